@@ -12,9 +12,10 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations optimum)
 STORED := comparison ablations families
+FAMILIES := one-armed two-armed aligned redundancy long
 STUDIES ?= $(notdir $(wildcard studies/[a-z]*))
 
-.PHONY: benchmark test check format docs findings studies paper speed release-check setup clean
+.PHONY: benchmark test check format docs shipped findings studies paper speed release-check setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -51,6 +52,15 @@ speed: $(READY)
 # The wheel and the source distribution of the last commit, each run in an empty environment.
 release-check: $(READY)
 	COARTIC_PACKAGES=1 $(BIN)/python -m pytest tests/test_packages.py
+
+# The results that are shipped, anew, by the present code: packed where they are as before. With
+# CHANGED=1 also where they are not.
+shipped: $(READY)
+	$(BIN)/coartic run comparison --out $(OUT)/shipped/comparison
+	$(BIN)/coartic run families --runs 3 --out $(OUT)/shipped/families \
+	  --tasks $(shell echo $(FAMILIES:%=%/v1/i000..i009) | tr ' ' ,)
+	$(BIN)/python -m coartic.benchmarks.shipped $(if $(CHANGED),--changed) \
+	  $(OUT)/shipped/comparison $(OUT)/shipped/families
 
 # The suites behind docs/findings.md, their reports, and the pages made from them.
 findings: $(READY)

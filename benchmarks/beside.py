@@ -83,7 +83,9 @@ def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
     own = dict(cells_of(plan))
     # What a source has is not performed here, where the code of its method may be another.
     missing = [
-        cell for asked, cell in own.items() if not held.issuperset((asked, n) for n in range(cell.runs))
+        cell
+        for asked, cell in own.items()
+        if not held.issuperset((asked, n) for n in range(cell.runs))
     ]
     parts = plans | {"this command": replace(plan, cells=tuple(missing))}
     check_together(parts)
@@ -105,7 +107,9 @@ def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
                 few.append(cell)
         if lacking:
             words = f"{name} is not finished: it lacks runs of {named(lacking)}"
-            warnings.warn(f"{words}, and gives those before the first that is missing", stacklevel=3)
+            warnings.warn(
+                f"{words}, and gives those before the first that is missing", stacklevel=3
+            )
         if few:
             words = f"{counted(few[0].runs, 'run')} of {named(few)}; {plan.runs} are asked for here"
             warnings.warn(f"{name} has {words}", stacklevel=3)

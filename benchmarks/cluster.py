@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import threading
 import time
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from coartic.benchmarks.pool import Local
+from coartic.benchmarks.pool import Crew, Local, errors_of_files
 from coartic.benchmarks.provenance import current_environment
 from coartic.benchmarks.registry import current_code
 from coartic.benchmarks.worker import Job, Outcome, fail
@@ -18,11 +19,24 @@ from coartic.text import error_line
 
 WORKERS_S = 600.0  # that runs wait while no worker is connected
 _PAUSE_S = 0.05  # between looks at what is done
+_RETURN_S = 2.0  # that a worker which begins anew is not connected
 _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """An executor: a Dask scheduler, whose workers have this version of coartic."""
+    """An executor: a Dask scheduler, whose workers have this version of coartic.
+
+    Parameters
+    ----------
+    address : str
+        Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
+    say : callable
+        Takes sentences on what it waits for.
+
+    Examples
+    --------
+    >>> run_suite("quick", "results/quick", executor=Dask("127.0.0.1:8786"))  # doctest: +SKIP
+    """
 
     def __init__(self, address: str, *, say: Callable[[str], None] = print) -> None:
         self.address, self.say = address, say
@@ -35,6 +49,8 @@ class Dask:
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed
 
+        place = dict[Any, int]()  # jobs of a method follow each other: workers keep its process
+        jobs = sorted(jobs, key=lambda job: place.setdefault(job.method.key, len(place)))
         try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
             job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
@@ -61,7 +77,9 @@ class Dask:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
         try:
             from distributed import Client
+            from distributed.comm import resolve_address
 
+            resolve_address(self.address)  # without a port, a client would wait for a minute
             return Client(self.address, set_as_default=False)
         except ImportError:
             raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
@@ -72,14 +90,20 @@ class Dask:
             raise CoarticError(f"{words}it prints, such as tcp://127.0.0.1:8786.") from None
 
     def _wait_for_workers(self, client: Any) -> None:
-        if client.scheduler_info()["workers"]:
-            return
+        for _ in range(2):
+            if client.nthreads():
+                return
+            time.sleep(_RETURN_S)
         self.say(f"no Dask worker is connected to {self.address}: waiting for one")
         try:
             client.wait_for_workers(1, timeout=WORKERS_S)
         except TimeoutError:
             words = f"Dask scheduler {self.address} had no workers for {WORKERS_S:g} s"
             raise CoarticError(f"{words}; start some. {_GOES_ON}") from None
+
+
+_kept = threading.local()
+"""The process of a thread of a Dask worker, with the method that it has run last."""
 
 
 def _remote(job: Job) -> list[Outcome]:
@@ -90,5 +114,8 @@ def _remote(job: Job) -> list[Outcome]:
         words = f"method {method.name!r} has code {here} on a Dask worker and {method.code} where "
         raise CoarticError(f"{words}the suite was started; install the same version everywhere")
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
-    ((_, outcomes),) = Local(1).perform([job])
+    with errors_of_files():
+        if not hasattr(_kept, "crew"):
+            _kept.crew = Crew(Local(1), stays=True)
+        ((_, outcomes),) = _kept.crew.perform([job])
     return [replace(outcome, environment=current_environment()) for outcome in outcomes]

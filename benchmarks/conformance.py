@@ -51,8 +51,11 @@ def law(name: str, problems: Iterable[str], finding: str) -> Law:
     return Law(name, problem is None, problem or finding)
 
 
-def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[Law]:
-    """Every law of a method, in order, on the shipped tasks or on others."""
+def check_method(
+    card: MethodCard, tasks: Sequence[Task] | None = None, *, verbose: bool = False
+) -> list[Law]:
+    """Every law of a method, in order, on the shipped tasks or on others; ``verbose`` shows what it
+    prints and logs, and where it crashes."""
     trials = {"trials": CHECK_TRIALS} if "trials" in card.defaults else {}
     parameters = trials | card.rules()["quick"]
 
@@ -72,7 +75,7 @@ def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[
     jobs, others = [job(task) for task in tasks], [job(task, seed=2) for task in tasks]
     bounded = [job(task, trial_budget=BUDGET) for task in tasks]
     last = [job(task) for task in filter(applies, [hopeless_task(tasks[0])])]
-    runs = perform_in_order([*jobs, *jobs, *others, *jobs, *bounded, *last])
+    runs = perform_in_order([*jobs, *jobs, *others, *jobs, *bounded, *last], verbose=verbose)
     names = [task.name for task in tasks]
     first, again, other, after, budget = (dict(zip(names, runs, strict=False)) for _ in range(5))
     hopeless = list(runs)
@@ -218,6 +221,6 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
         law(
             "methods",
             ["no method applies to it"] * (not methods),
-            f"{counted(len(methods), 'method')} can solve it, such as {', '.join(methods[:2])}",
+            f"{counted(len(methods), 'method')} can run on it, such as {', '.join(methods[:2])}",
         ),
     ]

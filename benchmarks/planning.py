@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from coartic import CoarticError, Task
 from coartic.benchmarks.registry import registry
@@ -29,7 +30,7 @@ def plan_suite(
     methods: Sequence[str] = (),
     method_files: Sequence[str | Path] = (),
     family_files: Sequence[str | Path] = (),
-    cells: Iterable[Cell] | None = None,
+    cells: Sequence[Cell] | None = None,
     runs: int | None = None,
     trials: int | None = None,
     seed: int = 0,
@@ -47,7 +48,7 @@ def plan_suite(
         them, and own tasks (Task, or Path); without names, all of it.
     method_files, family_files : sequence of str or Path
         Files with methods and families of your own.
-    cells : iterable of Cell, optional
+    cells : sequence of Cell, optional
         Cells in place of the suite's.
     runs, trials : int, optional
         Runs of each cell, and trials of each run for methods that have this parameter; by default
@@ -69,15 +70,20 @@ def plan_suite(
     CoarticError
         For anything unknown, out of bounds, or that does not go together.
     """
-    lists = {"method_files": method_files, "family_files": family_files}
-    for name, names in ({"tasks": tasks, "methods": methods} | lists).items():
-        if isinstance(names, str | Path | Task):
-            shown = names if isinstance(names, Task) else str(names)
+    lists = {"methods": methods, "method_files": method_files, "family_files": family_files}
+    kinds: dict[str, tuple[Any, tuple[type, ...], str]] = {
+        "tasks": (tasks, (str, Path, Task), "names, paths or tasks"),
+        "cells": (() if cells is None else cells, (Cell,), "cells"),
+        **{name: (names, (str, Path), "names or paths") for name, names in lists.items()},
+    }
+    for name, (items, allowed, what) in kinds.items():
+        if isinstance(items, str | Path | Task) and name != "cells":
+            shown = items if isinstance(items, Task) else str(items)
             raise CoarticError(f"{name} is a list: write {name}=[{brief_value(shown)}]")
-        kinds = (str, Path, Task) if name == "tasks" else (str, Path)
-        if not all(isinstance(item, kinds) for item in names):
-            what = "names, paths or tasks" if name == "tasks" else "names or paths"
-            raise CoarticError(f"{name} is {brief_value(names)}; it must be a list of {what}")
+        if not isinstance(items, Collection) or not all(
+            isinstance(each, allowed) for each in items
+        ):
+            raise CoarticError(f"{name} is {brief_value(items)}; it must be a list of {what}")
     numbers = {
         "runs": (runs, 1, MOST_RUNS),
         "trials": (trials, 1, MOST_TRIALS),

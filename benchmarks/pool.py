@@ -3,7 +3,8 @@
 A process performs jobs of one method, one after the other. It begins in a folder of its own and
 writes each answer into a file there, which is whole or not there: what a method does, breaks or
 prints is no matter of other methods. A process that ends costs the job that it was at; the others
-begin in a new one. What it has started ends with it unless it has left its group.
+begin in a new one. What it has started ends with it unless it has left its group. Where the folder
+of all is removed or full, nobody knows what methods did: the suite ends.
 
 The system counts a process's CPU time, in all its threads, and ends it where a job has used up its
 limit: other work on the machine changes no result. That of processes that a method starts is not
@@ -13,6 +14,7 @@ counted. What waits for ever is ended by wall time, later.
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 import multiprocessing
 import os
@@ -22,6 +24,7 @@ import tempfile
 import time
 from collections import defaultdict, deque
 from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing
 from multiprocessing import connection
 from pathlib import Path
 from types import ModuleType
@@ -40,10 +43,13 @@ _POLL_S = 0.2  # between looks for answers and at limits
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
 _LEAST_MEMORY = 2**30  # bytes of a process, four times what this project's methods take
 _LARGEST_FILE = 2**28  # bytes of an answer, or of what a job prints
+_ROOM = 2**20  # bytes that are free where answers are kept
 _LAST_WORDS = 3  # lines of what a process that died has printed
 _PRINTED = 4000  # bytes that are read of it
 _STARTS = 5  # processes in a row that may end before they begin a job
-_KILLED = (-9, 255)  # exit codes of a process that somebody has killed, or whose server
+_UNKEPT = 74  # exit code of a process that could not write its answer
+_REPEATED = (-9, 255, _UNKEPT)  # also of one that somebody has killed, or whose server
+_IDLE_S = 60.0  # that a process waits for more jobs
 _END_S = 1.0  # that a process which is killed has to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 _BEGUN, _SAID = "begun", "said"  # files beside the answers of a process
@@ -53,85 +59,152 @@ class Local:
     """Processes on this machine; ``jobs`` of them at once, or one a core.
 
     A job is ended after its limit of CPU time, a day where it has none; where it uses less, after
-    three times as much wall time and ``patience_s``.
+    three times as much wall time and ``patience_s``. With ``verbose`` methods print, log and fail
+    where they are seen.
     """
 
-    def __init__(self, jobs: int = -1, *, patience_s: float = 60.0) -> None:
+    def __init__(self, jobs: int = -1, *, patience_s: float = 60.0, verbose: bool = False) -> None:
         self.workers = threads_for(jobs)
         self.patience_s = patience_s
+        self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Each job with its outcomes, as they come; by one process, those of a method in order.
 
-        Raises CoarticError where one process after another ends before it begins a job.
+        Raises CoarticError where one process after another ends before it begins a job, and where
+        their temporary files cannot be kept.
         """
+        with errors_of_files(), closing(Crew(self)) as crew:
+            yield from crew.perform(jobs)
+
+
+class Crew:
+    """Worker processes and the folder of their answers, until it is closed."""
+
+    def __init__(self, local: Local, *, stays: bool = False) -> None:
+        self.local, self.stays = local, stays
+        """Whether a process that is done waits for more jobs of its method."""
+        self.folder = tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True)
+        self._idle: Worker | None = None
+
+    def close(self) -> None:
+        """End a process that waits, and remove the folder."""
+        if self._idle is not None:
+            self._idle.end()
+        self.folder.cleanup()
+
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, list[Outcome]]]:
+        """Each job with its outcomes, as in :meth:`Local.perform`. Raises OSError where temporary
+        files cannot be kept."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.method.key].append(job)
+        workers = self.local.workers
         waiting = deque(
-            of_method[first :: self.workers]  # each has some of every cell
+            of_method[first::workers]  # each has some of every cell
             for of_method in by_method.values()
-            for first in range(min(self.workers, len(of_method)))
+            for first in range(min(workers, len(of_method)))
         )
         crew, lost, repeated = list[Worker](), 0, set[int]()
-        with tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True) as folder:
-            try:
-                while waiting or crew:
-                    while waiting and len(crew) < self.workers:
-                        crew.append(Worker(folder, waiting.popleft(), self))
-                        crew[-1].start()
-                    sentinels = [w.process.sentinel for w in crew if w.process.pid is not None]
-                    connection.wait(sentinels, _POLL_S)
-                    for worker in tuple(crew):
-                        exit_code = worker.exit_code  # first: after the end comes no answer
-                        yield from worker.answers()
-                        if exit_code is None and worker.jobs and not worker.is_late:
-                            continue
-                        worker.end()
-                        crew.remove(worker)
-                        if not worker.jobs:
-                            continue
-                        job = worker.jobs[0]
-                        lost = lost + 1 if worker.since_s == math.inf else 0
-                        if lost == _STARTS:
-                            raise CoarticError(
-                                f"processes cannot begin {worker.last_words}; finished runs are "
-                                "kept"
-                            )
-                        if lost:
-                            time.sleep(_POLL_S)  # a server that was killed may yet be there
-                        elif exit_code in _KILLED and id(job) not in repeated:
-                            repeated.add(id(job))
-                        else:
-                            yield job, worker.failure(exit_code)
-                            worker.jobs.popleft()
-                        if worker.jobs:
-                            waiting.appendleft(list(worker.jobs))
-            finally:
-                for worker in crew:
+        try:
+            while waiting or crew:
+                while waiting and len(crew) < workers:
+                    crew.append(self.worker_for(waiting[0]))
+                    crew[-1].give(waiting.popleft())
+                sentinels = [w.process.sentinel for w in crew if w.process.pid is not None]
+                connection.wait(sentinels, _POLL_S)
+                for worker in tuple(crew):
+                    exit_code = worker.exit_code  # first: after the end comes no answer
+                    yield from worker.answers()
+                    if exit_code is None and worker.jobs and not worker.is_late:
+                        continue
+                    crew.remove(worker)
+                    if exit_code is None and not worker.jobs and self.stays:
+                        self._idle = worker
+                        continue
                     worker.end()
+                    if not worker.jobs:
+                        continue
+                    self.check_room()
+                    job = worker.jobs[0]
+                    lost = lost + 1 if worker.since_s == math.inf else 0
+                    if lost == _STARTS:
+                        raise CoarticError(
+                            f"processes cannot begin {worker.last_words}; finished runs are kept"
+                        )
+                    if lost:
+                        time.sleep(_POLL_S)  # a server that was killed may yet be there
+                    elif exit_code in _REPEATED and id(job) not in repeated:
+                        repeated.add(id(job))
+                    else:
+                        yield job, worker.failure(exit_code)
+                        worker.jobs.popleft()
+                    if worker.jobs:
+                        waiting.appendleft(list(worker.jobs))
+        finally:
+            for worker in crew:
+                worker.end()
+
+    def worker_for(self, jobs: Sequence[Job]) -> Worker:
+        """The process that waits, if it has run their method; else a new one."""
+        waits, self._idle = self._idle, None
+        if waits is not None and waits.method == jobs[0].method.key:
+            return waits
+        if waits is not None:
+            waits.end()
+        return Worker(self.folder.name, jobs[0].method.key, self.local)
+
+    def check_room(self) -> None:
+        """Raises OSError where the folder is gone or full: a process that ended may have ended
+        because of this."""
+        place = Path(self.folder.name, "room")
+        place.write_bytes(bytes(_ROOM))
+        place.unlink()
+
+
+@contextlib.contextmanager
+def errors_of_files() -> Iterator[None]:
+    """Raises CoarticError for an OSError."""
+    try:
+        yield
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        raise CoarticError(
+            f"temporary files of worker processes cannot be kept: {error.strerror or error}{where}. "
+            "Finished runs are kept: repeat the command, with another TMPDIR if this one is full"
+        ) from None
 
 
 class Worker:
     """A process that performs jobs of one method in their order."""
 
-    def __init__(self, folder: str, jobs: Sequence[Job], local: Local) -> None:
-        self.jobs = deque(jobs)
+    def __init__(self, folder: str, method: tuple[str, str, str], local: Local) -> None:
+        self.method = method
+        """:attr:`MethodCard.key` of the method."""
+        self.jobs = deque[Job]()
         """Jobs that are not answered yet."""
         self.since_s = math.inf
         """Clock when it began the first of these."""
         self._patience_s = local.patience_s
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
-        arguments = self._folder, jobs, local.workers
+        theirs, self._ours = multiprocessing.Pipe(duplex=False)
+        arguments = self._folder, theirs, local.workers, local.verbose
         self.process = CONTEXT.Process(target=perform_jobs, args=arguments)
+        self._theirs = theirs
 
-    def start(self) -> None:
-        """Begin it; where it cannot begin, it has ended."""
+    def give(self, jobs: Sequence[Job]) -> None:
+        """Let it perform jobs; where it cannot begin, it has ended."""
+        self.jobs.extend(jobs)
+        self.since_s = math.inf
+        (self._folder / _BEGUN).unlink(missing_ok=True)
         try:
-            start_process(self.process)
+            if self.process.pid is None:
+                start_process(self.process)
+                self._theirs.close()
+            self._ours.send(jobs)
         except (OSError, EOFError) as error:
-            (self._folder / _SAID).write_text(error_line(error))
+            (self._folder / _SAID).write_text(error_line(error), encoding="utf-8")
             return
         # While it compiles kernels: what it hands over is executed here.
         with contextlib.suppress(Exception):  # the process says the same
@@ -192,36 +265,58 @@ class Worker:
             self.process.join(_END_S)
 
 
-def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
-    """Perform jobs in this process, which answers in a folder of its own."""
+def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
+    """Perform the jobs that come through a pipe in this process, which answers in a folder of its
+    own."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
-    begin_worker(folder.parent)
-    descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
-    for stream in (1, 2):
-        os.dup2(descriptor, stream)
+    begin_worker(folder.parent, streams=1 if verbose else 3)
+    if verbose:
+        logging.basicConfig(level=logging.INFO)
+        logging.getLogger("coartic").setLevel(logging.DEBUG)
+        sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    else:
+        descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+        for stream in (1, 2):
+            os.dup2(descriptor, stream)
     bound_resources(workers)
-    for job in jobs:  # kernels are compiled, or loaded, on no run's clock
-        learns = job.specification.method.startswith(METHOD_PREFIX)
-        warm_up(job.specification.task, "learner" if learns else "motion", "trials")
-    place = folder / "place"
-    place.mkdir()
-    tempfile.tempdir = os.environ["TMPDIR"] = str(place)
-    os.chdir(place)
-    (folder / _BEGUN).touch()
-    process = os.getpid()
-    for number, job in enumerate(jobs):
-        os.truncate(folder / _SAID, 0)
-        limit_cpu_time(job.time_limit_s or _LONGEST_S)
-        outcomes = perform_job(job)
-        limit_cpu_time(0)
+    process, number = os.getpid(), 0
+    while pipe.poll(_IDLE_S):
         try:
-            text = answer_of(outcomes)
-        except Exception as error:
-            reason = f"its outcome cannot be kept: {error_line(error)}"
-            text = answer_of(fail(job, "crashed", reason))
-        if os.getpid() != process:  # a method has forked it
-            os._exit(1)
-        write_atomically(folder / str(number), text)
+            jobs = pipe.recv()
+        except EOFError:  # nobody has more
+            return
+        for job in jobs:  # kernels are compiled, or loaded, on no run's clock
+            learns = job.specification.method.startswith(METHOD_PREFIX)
+            warm_up(job.specification.task, "learner" if learns else "motion", "trials")
+        if not number:
+            place = folder / "place"
+            place.mkdir()
+            tempfile.tempdir = os.environ["TMPDIR"] = str(place)
+            os.chdir(place)
+        (folder / _BEGUN).touch()
+        for job in jobs:
+            text = answer_to(job, folder)
+            if os.getpid() != process:  # a method has forked it
+                os._exit(1)
+            try:
+                write_atomically(folder / str(number), text)
+            except OSError:
+                os._exit(_UNKEPT)
+            number += 1
+
+
+def answer_to(job: Job, folder: Path) -> bytes:
+    """Perform a job within its limit of CPU time; return its answer."""
+    with contextlib.suppress(OSError):  # there is none, or no longer
+        os.truncate(folder / _SAID, 0)
+    limit_cpu_time(job.time_limit_s or _LONGEST_S)
+    outcomes = perform_job(job)
+    limit_cpu_time(0)
+    try:
+        return answer_of(outcomes)
+    except Exception as error:
+        reason = f"its outcome cannot be kept: {error_line(error)}"
+        return answer_of(fail(job, "crashed", reason))
 
 
 def limit_cpu_time(limit_s: float) -> None:

@@ -38,7 +38,11 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """
     pipe, theirs = multiprocessing.Pipe()
     process = CONTEXT.Process(target=answer_questions, args=(theirs, str(path), shown), daemon=True)
-    start_process(process)
+    try:
+        start_process(process)
+    except (OSError, EOFError) as error:  # its server was killed
+        words = f"{shown}: cannot be imported: no process for it begins"
+        raise CoarticError(f"{words} ({error_line(error)}). Repeat the command") from None
     atexit.register(end_group, process.pid)
     theirs.close()
 

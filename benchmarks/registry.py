@@ -89,7 +89,10 @@ def current_code(where: str, name: str) -> str:
     """Hash of the code of a method that is imported from ``where``; ``none`` where it has none."""
     with _parsing:
         if where.endswith(".py"):
-            return {card.name: card.code for card in cards_of_file(Path(where))}.get(name, "none")
+            if where not in READERS:  # which reads the file anew whenever it is asked
+                list(cards_of_file(Path(where)))
+            cards = READERS[where]("", "cards")
+            return next((card["code"] for card in cards if card["name"] == name), "none")
         return code_of(Path(inspect.getfile(importlib.import_module(where))))
 
 

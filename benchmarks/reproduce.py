@@ -62,9 +62,9 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
         raise CoarticError(f"{folder}: run {run.id} cannot be shown: {error}") from None
 
 
-def perform_in_order(jobs: Sequence[Job]) -> Iterator[Run]:
+def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
     """Runs of one method, each a job of one seed, in this order, in one process of their own."""
-    for job, outcomes in Local(1).perform(jobs):
+    for job, outcomes in Local(1, verbose=verbose).perform(jobs):
         yield from score(job, outcomes)
 
 

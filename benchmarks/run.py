@@ -9,25 +9,45 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
-from coartic.benchmarks.worker import Job
+from coartic.benchmarks.worker import Job, Outcome
 from coartic.errors import CoarticError
 from coartic.files import folder_named
+from coartic.inputs import brief_value
 from coartic.runs.plan import Plan, Specification, trials_in
 from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
-from coartic.text import counted
+from coartic.text import counted, unknown
 
+
+@runtime_checkable
+class Executor(Protocol):
+    """Where methods run: :class:`coartic.benchmarks.pool.Local` or
+    :class:`coartic.benchmarks.cluster.Dask`."""
+
+    workers: int
+    """How many jobs it performs at once."""
+
+    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
+        """Each job with its outcomes, as they come."""
+
+
+_EXECUTORS = {
+    "jobs": "Local(jobs) of coartic.benchmarks.pool",
+    "scheduler": "Dask(scheduler) of coartic.benchmarks.cluster",
+}
+"""Options of the command, and what stands in their place in Python."""
 LEAST_BATCH = 8
 """Runs of a cell that are not divided among workers."""
 _SURE = frozenset({"ok", "infeasible"})  # whatever else is in the batch
@@ -115,8 +135,8 @@ def run_suite(
     suite: str | Path | Suite,
     folder: str | Path,
     *,
-    executor: Any = None,
-    watch: Watcher = lambda progress, specification: None,
+    executor: Executor | None = None,
+    watch: Watcher | None = None,
     **options: Any,
 ) -> Progress:
     """Run what a folder lacks of a suite: :func:`plan_suite`, then :func:`perform`.
@@ -146,6 +166,12 @@ def run_suite(
     >>> run_suite("paper", "results/first", tasks=["ascending"], runs=3)  # doctest: +SKIP
     3 runs in 4 s, none failed: results/first
     """
+    names = [*signature(plan_suite).parameters][1:]
+    for name in options:
+        if name in _EXECUTORS:
+            raise CoarticError(f"{name} is no option: give executor={_EXECUTORS[name]}")
+        if name not in names:
+            raise CoarticError(unknown("option", name, names))
     plan = plan_suite(suite, **options)
     return perform(plan, folder, executor=executor, watch=watch)
 
@@ -154,8 +180,8 @@ def perform(
     plan: Plan,
     folder: str | Path,
     *,
-    executor: Any = None,
-    watch: Watcher = lambda progress, specification: None,
+    executor: Executor | None = None,
+    watch: Watcher | None = None,
 ) -> Progress:
     """Perform what a results folder lacks of a plan.
 
@@ -168,8 +194,10 @@ def perform(
     folder : str or Path
         Results folder, made where there is none.
     executor : Local or Dask, optional
-        Where methods run; by default this machine, in a process for every core.
-    watch : callable
+        Where methods run; by default this machine, in a process for every core:
+        :class:`coartic.benchmarks.pool.Local`. A Dask cluster is a
+        :class:`coartic.benchmarks.cluster.Dask`.
+    watch : callable, optional
         Called before the first run and after each.
 
     Returns
@@ -184,7 +212,11 @@ def perform(
         be written.
     """
     folder, clock = folder_named(folder), time.perf_counter()
-    executor = executor or Local()
+    watch = watch or (lambda progress, specification: None)
+    executor = Local() if executor is None else executor
+    if not isinstance(executor, Executor):
+        known = " or ".join(_EXECUTORS.values())
+        raise CoarticError(f"executor is {brief_value(executor)}; it must be {known}")
     with writing(folder) as store:
         store.replace_plan(plan, current_environment(), command(), now())
         progress = Progress(folder, plan.size, stale=store.stale())

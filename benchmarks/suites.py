@@ -31,7 +31,7 @@ from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
 from coartic.runs.plan import Cell
 from coartic.runs.store import RUNS_FILE
-from coartic.tasks.families import Family, instance_of, named_by
+from coartic.tasks.families import Family, instance_of, named_by, shipped_families
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
 from coartic.text import Line, unknown
 
@@ -127,6 +127,40 @@ class Suite(FileData):
     """What to run: tables ``[[blocks]]``."""
 
 
+TAKEN_BY = {
+    "results folder": "coartic report {}",
+    "suite": "coartic run {}",
+    "task": "coartic run SUITE --tasks {}",
+    "family": "coartic run SUITE --family-file {}",
+    "method file": "coartic check METHOD --method-file {}",
+    "shipped family": "coartic list {}",
+}
+"""The command that takes a thing, by its kind."""
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of a shipped suite or family, a file or a folder, of :data:`TAKEN_BY`; empty
+    for anything else."""
+    if name in suites():
+        return "suite"
+    if {name, f"{name}/v1"} & {*shipped_families()}:
+        return "shipped family"
+    if name.endswith(".py"):
+        return "method file"
+    if not name.endswith(".toml"):
+        return "results folder" if (Path(name) / RUNS_FILE).is_file() else ""
+    content = read_toml(Path(name))
+    keys = {"blocks": "suite", "region": "family", "goals": "task"}  # of which each has one
+    return next((kind for key, kind in keys.items() if key in content), "")
+
+
+def check_kind(name: str, *kinds: str) -> None:
+    """Raises CoarticError, which names the right command, for a thing of another kind."""
+    kind = kind_of(name)
+    if kind and kind not in kinds:
+        raise CoarticError(f"{name} is a {kind}: {TAKEN_BY[kind].format(quote(name))}")
+
+
 def suites() -> dict[str, Suite]:
     """The shipped suites by name."""
     return {path.stem: read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
@@ -137,12 +171,11 @@ def load_suite(name: str) -> Suite:
 
     Raises CoarticError for an unknown name or a file that cannot be used.
     """
-    if name.endswith(".toml"):
-        return read_suite(Path(name))
     shipped = suites()
     if name not in shipped:
-        if (Path(name) / RUNS_FILE).is_file():
-            raise CoarticError(f"{name} is a results folder: coartic report {quote(name)}")
+        check_kind(name, "suite")
+        if name.endswith(".toml"):
+            return read_suite(Path(name))
         hint = " A suite of your own is a file that ends in .toml." if os.sep in name else ""
         raise CoarticError(f"{unknown('suite', name, shipped)}{hint}")
     return shipped[name]
@@ -153,8 +186,6 @@ def read_suite(path: Path) -> Suite:
     content = read_toml(path)
     if "cells" in content:
         raise CoarticError(f"{path}: tables [[cells]] are called [[blocks]]")
-    if "goals" in content and "blocks" not in content:
-        raise CoarticError(f"{path} is a task, not a suite: run a suite with --tasks {path}")
     try:
         return Suite.model_validate({"name": path.stem, **content})
     except ValidationError as error:

@@ -8,9 +8,13 @@ method files are not imported.
 from __future__ import annotations
 
 import json
+import logging
+import sys
 import time
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -33,6 +37,8 @@ from coartic.runs.card import MethodCard
 from coartic.runs.plan import SEARCH, Specification, run_seed
 from coartic.runs.run import PARTS, Times
 from coartic.text import error_line
+
+_log = logging.getLogger(__name__)  # which is heard where a method is checked
 
 
 @dataclass(frozen=True)
@@ -147,6 +153,9 @@ def perform_job(job: Job) -> list[Outcome]:
         )
         for number in job.numbers
     ]
+    budget = specification.trial_budget or "any number of"
+    asked = specification.method, specification.task.name, job.suite_seed, budget
+    _log.debug("%s on %s: seed %s, %s trials", *asked)
     warm = specification.method in _seen
     _seen.add(specification.method)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
@@ -169,14 +178,14 @@ def perform_job(job: Job) -> list[Outcome]:
     runs = len(sessions)
     times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
     pairs = zip(results, sessions, strict=True)
-    return [outcome_of(specification.method, result, session, times) for result, session in pairs]
+    return [outcome_of(job.method, result, session, times) for result, session in pairs]
 
 
 _seen: set[str] = set()
 """Methods that this process has run."""
 
 
-def outcome_of(method: str, result: Any, session: Session, times: Times) -> Outcome:
+def outcome_of(method: MethodCard, result: Any, session: Session, times: Times) -> Outcome:
     """A result as plain data, or how the run failed."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
@@ -190,13 +199,26 @@ def outcome_of(method: str, result: Any, session: Session, times: Times) -> Outc
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
             raise result
-        return Outcome("ok", **spent, **statement(method, result, session))
+        return Outcome("ok", **spent, **statement(method.name, result, session))
     except SolutionError as error:
         return Outcome("solver-failed", str(error), **spent)
     except NotApplicableError as error:
         return Outcome("infeasible", str(error), **spent)
     except BaseException as error:
-        return Outcome("crashed", error_line(error), **spent)
+        _log.debug("Traceback of the run:", exc_info=error)
+        return Outcome("crashed", place_of(error, method) + error_line(error), **spent)
+
+
+def place_of(error: BaseException, method: MethodCard) -> str:
+    """The line of a user's method in which it crashed, as ``mine.py, line 12: ``; empty where its
+    file had no part in it."""
+    if method.is_ours:
+        return ""
+    module = sys.modules.get(method.where)
+    file = str(getattr(module, "__file__", method.where))
+    frames = traceback.walk_tb(error.__traceback__)
+    lines = [line for frame, line in frames if frame.f_code.co_filename == file]
+    return f"{Path(file).name}, line {lines[-1]}: " if lines else ""
 
 
 def statement(method: str, result: Any, session: Session) -> dict[str, Any]:

@@ -74,9 +74,10 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
                 os.environ[name] = value
 
 
-def begin_worker(folder: Path | None = None) -> None:
-    """Leave the terminal, and lead a group of processes. It ends with this one or when the parent
-    has ended, and then ``folder`` with it; the server of both lives as long as any worker."""
+def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
+    """Leave the terminal with its first ``streams`` (input, output, errors), and lead a group of
+    processes. It ends with this one or when the parent has ended, and then ``folder`` with it; the
+    server of both lives as long as any worker."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:
@@ -86,7 +87,7 @@ def begin_worker(folder: Path | None = None) -> None:
             end_group(os.getpid())
 
     nobody = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
+    for stream in range(streams):
         os.dup2(nobody, stream)
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)

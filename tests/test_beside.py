@@ -4,6 +4,7 @@ import hashlib
 import lzma
 import shutil
 import sqlite3
+import sys
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -270,6 +271,38 @@ def packed(parts, tmp_path, monkeypatch):
     shipped.pack(parts[1], tmp_path / "packed")
     monkeypatch.setattr(shipped, "_FOLDER", tmp_path / "packed")
     return parts[1]
+
+
+def test_results_are_packed_again_where_they_have_not_changed(
+    packed, tmp_path, monkeypatch, capsys
+):
+    """Of another code they may be, and times may differ."""
+
+    def pack(folder, *options):
+        monkeypatch.setattr(sys, "argv", ["shipped", *options, str(folder)])
+        return shipped.main(), capsys.readouterr().out
+
+    before = (tmp_path / "packed" / "SHA256SUMS").read_text()
+    for number, (change, said) in enumerate(
+        {
+            f"DELETE FROM results WHERE id = {OF_EC1}": "is missing",
+            "UPDATE results SET trials = trials + 1": "trials: ",
+        }.items()
+    ):
+        other = shutil.copytree(packed, tmp_path / str(number))
+        edit(other, change)
+        code, text = pack(other)
+        assert (code, said in text, "--changed" in text) == (1, True, True)
+    assert (tmp_path / "packed" / "SHA256SUMS").read_text() == before
+    same = shutil.copytree(packed, tmp_path / "same")
+    edit(same, "UPDATE results SET cpu_s = 9")
+    assert pack(same) == (0, f"{same}: no differences to what is shipped\n")
+    assert pack(tmp_path / "1", "--changed")[0] == 0
+    with shipped.open_shipped("paper") as store:
+        assert (store.runs().trials == load(tmp_path / "1").runs.trials).all()
+    edit(same, "UPDATE methods SET code = '0123456789ab' WHERE name = 'dual-process/EC1'")
+    code, text = pack(same)
+    assert (code, "is not 0123456789ab now: run the suite again" in text) == (1, True)
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -2,10 +2,13 @@
 
 import pytest
 
-from coartic import CoarticError
+from coartic import CoarticError, load_task
 from coartic.benchmarks import cluster as cluster_module
 from coartic.benchmarks.cluster import Dask
-from coartic.benchmarks.run import perform
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.run import perform, run_suite
+from coartic.benchmarks.suites import Cell
+from coartic.runs.store import open_store
 from tests.support.suites import InProcess, paper_cells, planned, run_and_write, same_results
 
 pytestmark = [pytest.mark.process, pytest.mark.filterwarnings("ignore")]  # Dask's own
@@ -21,7 +24,8 @@ def distributed():
 @pytest.fixture(scope="module")
 def address(distributed):
     """Of a cluster in this process, which is as far as patches reach."""
-    with distributed.LocalCluster(n_workers=2, processes=False, **QUIET) as cluster:
+    more = {"n_workers": 2, "threads_per_worker": 1, "processes": False}
+    with distributed.LocalCluster(**more, **QUIET) as cluster:
         yield cluster.scheduler_address
 
 
@@ -29,6 +33,29 @@ def test_runs_come_out_as_they_do_here(address, tmp_path):
     there = run_and_write(tmp_path / "there", CELLS, executor=Dask(address), runs=3, trials=40)
     same_results(there, run_and_write(tmp_path / "here", CELLS, runs=3, trials=40))
     assert set(there.runs.together) == {3}
+
+
+def test_runs_of_a_method_share_a_process(address, tmp_path):
+    """One a worker, however many runs it performs: it has imported the method's file."""
+    (tmp_path / "mine.py").write_text("""
+import os
+from coartic.method import Information, Method, Result
+from coartic.motion.solution import Movement
+
+class Mine(Method):
+    name = "mine"
+    title = citation = "x"
+    told = frozenset({Information.CORRECTIVE_PROCESS})
+    def solve(self, session):
+        movements = [Movement(n, "right", "corrective") for n in range(1, session.goals_count + 1)]
+        return Result(tuple(movements), {"process": os.getpid()})
+""")
+    mine = registry([tmp_path / "mine.py"])["mine"]
+    cells = [Cell(load_task(task), mine) for task in ("ascending", "descending")]
+    out = tmp_path / "out"
+    assert len(run_and_write(out, cells, executor=Dask(address), runs=8).runs) == 16
+    with open_store(out) as store:
+        assert len({store.run(run_id).details["process"] for run_id in store.ids()}) <= 2
 
 
 def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
@@ -57,9 +84,28 @@ def test_a_cluster_without_workers(distributed, tmp_path, monkeypatch):
     assert len(messages) == 1
 
 
+def test_a_glance_without_workers_is_none(address, tmp_path, monkeypatch):
+    """A scheduler may name none for a moment."""
+    messages, glances = [], [{}]
+    executor = Dask(address, say=messages.append)
+    client = executor._client()
+    monkeypatch.setattr(cluster_module, "_RETURN_S", 0.0)
+    monkeypatch.setattr(executor, "_client", lambda: client)
+    monkeypatch.setattr(client, "nthreads", lambda: glances.pop() if glances else {"somewhere": 1})
+    perform(planned(CELLS, runs=1, trials=5), tmp_path, executor=executor)
+    assert (messages, glances) == ([], [])
+
+
+@pytest.mark.parametrize("executor", [2, object(), "tcp://127.0.0.1:8786"])
+def test_what_is_no_executor(tmp_path, executor):
+    with pytest.raises(CoarticError, match=r"executor is .*Local\(jobs\).*Dask\(address\)"):
+        run_suite("quick", tmp_path, tasks=["ascending"], executor=executor)
+    assert [*tmp_path.iterdir()] == []
+
+
 def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
     """What was finished before is kept."""
-    monkeypatch.setattr(cluster_module, "Local", InProcess)
+    monkeypatch.setattr(cluster_module, "Crew", lambda *_, **__: InProcess())
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
     with cluster:
         executor = Dask(cluster.scheduler_address)

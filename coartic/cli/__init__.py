@@ -27,6 +27,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Comparative benchmark of coarticulation in motor skill acquisition.",
 )
 
@@ -96,5 +97,6 @@ def main() -> None:
     except BrokenPipeError:  # whoever read, such as head, has enough: typer ends quietly
         raise
     except OSError as error:
-        complain("Error", str(error.strerror or error))
+        place = f": {error.filename}" if error.filename else ""
+        complain("Error", f"{error.strerror or error}{place}")
         sys.exit(1)

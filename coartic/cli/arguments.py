@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -87,7 +88,21 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
 
     Raises CoarticError for an unknown name.
     """
-    from coartic.benchmarks.suites import methods_named
+    from coartic.benchmarks.suites import check_kind, methods_named
 
-    ids = method_names(registered) if names else {}
-    return [method for n in names for method in methods_named(id_named(n, ids), registered)]
+    ids, meant = method_names(registered) if names else {}, list[str]()
+    for name in names:
+        try:
+            meant += methods_named(id_named(name, ids), registered)
+        except CoarticError:
+            check_kind(name)  # or it is nothing else
+            if Path(file := file_name(name)).is_file():
+                words = f"method {name!r} is not known: add --method-file {file}"
+                raise CoarticError(f"{words}, if it is defined there") from None
+            raise
+    return meant
+
+
+def file_name(method: str) -> str:
+    """The name of the file that ``coartic new`` writes for a method."""
+    return re.sub(r"\W", "_", method) + ".py"

@@ -84,7 +84,7 @@ def trace(
         "results"
     ),
 ) -> None:
-    """Name the runs behind a row of a report's table."""
+    """Name the runs behind a row of a report's table: run `coartic report` first."""
     from coartic.analysis.report import trace as traced
     from coartic.analysis.words import titled_apart
     from coartic.benchmarks.registry import registry

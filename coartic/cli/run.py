@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -92,8 +91,7 @@ def run(
     from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.run import perform
-    from coartic.benchmarks.suites import load_suite, select_cells, suites
-    from coartic.inputs import read_toml
+    from coartic.benchmarks.suites import check_kind, load_suite, select_cells, suites
     from coartic.tasks.families import own_families
 
     def named(text: str | None) -> list[str]:
@@ -105,8 +103,7 @@ def run(
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     registered = registry(method_file or ())
     for file in family_file or ():
-        if str(read_toml(file).get("goals")).startswith("[["):  # places, not how many
-            raise CoarticError(f"{file} is a task, not a family: give it by --tasks {file}")
+        check_kind(str(file), "family")
     names = given.methods_meant(named(methods), registered)
     if beside and not names:  # the user's own alone
         names = [name for name, card in registered.items() if card.where.endswith(".py")]
@@ -186,14 +183,14 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import name_of
     from coartic.analysis.words import number
-    from coartic.benchmarks.suites import load_suite, suites
-    from coartic.inputs import read_toml
+    from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
     (name,) = given.tasks_meant([name])
-    is_file = name.endswith(".toml")
-    if name in suites() or (is_file and "goals" not in read_toml(Path(name))):
+    if name.endswith(".toml"):
+        check_kind(name, "suite", "task")
+    if (kind := kind_of(name)) == "suite":
         suite = load_suite(name)
         yield "Suite", f"{name}: {suite.title}"
         yield "", suite.description
@@ -207,7 +204,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Tasks", ", ".join(dict.fromkeys(tasks))
         yield "Methods", ", ".join(dict.fromkeys(methods))
         yield "Run it", f"coartic run {name}"
-    elif name in builtin_tasks() or address_of(name) or is_file:
+    elif name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
         task = load_task(name)
         yield "Task", f"{name} ({task.label}): {task.description}"
         yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
@@ -215,7 +212,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
         if name in builtin_tasks():
             yield "Goals are", "reconstructed" if task.reconstructed else "printed in the paper"
-    elif name in shipped_families() or f"{name}/v1" in shipped_families():
+    elif kind == "shipped family":
         family = shipped_families().get(name) or shipped_families()[f"{name}/v1"]
         yield "Family", f"{family.name}: {family.description}"
         yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
@@ -224,6 +221,8 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         try:
             methods = given.methods_meant([name], registered)
         except CoarticError as error:
+            if not str(error).startswith("unknown"):
+                raise
             names = [*suites(), *builtin_tasks(), *shipped_families(), *registered]
             raise CoarticError(unknown("task, suite, method or family", name, names)) from error
         for card in map(registered.__getitem__, methods):
@@ -280,16 +279,19 @@ def check(
         ),
     ],
     method_file: given.MethodFiles = None,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", help="Show what the method prints, logs and crashes with."),
+    ] = False,
 ) -> None:
     """Check a method or a task file against the rules."""
     from coartic import builtin_tasks
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.suites import check_kind
     from coartic.tasks.task import address_of
 
     (task,) = given.tasks_meant([subject])
-    if subject.endswith(".py"):
-        raise CoarticError(f"name a method of it: coartic check METHOD --method-file {subject}")
     if task in builtin_tasks() or address_of(task):
         raise CoarticError(
             f"{task} is a task, not a method. `coartic draw {task} --out FOLDER` writes its file, "
@@ -297,12 +299,13 @@ def check(
         )
     registered = registry(method_file or [])
     if subject.endswith(".toml"):
-        if not Path(subject).is_file():
-            raise CoarticError(f"{subject}: there is no such file.")
+        check_kind(subject, "task")
         broken = show_laws(subject, check_task_file(Path(subject), registered))
     else:
         names = given.methods_meant([subject], registered)
-        broken = sum(show_laws(name, check_method(registered[name])) for name in names)
+        broken = sum(
+            show_laws(name, check_method(registered[name], verbose=verbose)) for name in names
+        )
     if broken:
         sys.exit(1)
 
@@ -332,7 +335,7 @@ def new(
     from coartic.files import write_output
     from coartic.runs.card import card_of
 
-    path = Path(re.sub(r"\W", "_", name) + ".py") if out is None else out
+    path = Path(given.file_name(name)) if out is None else out
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
     mine = type("Mine", (template.Mine,), {"name": name})

@@ -24,7 +24,7 @@ class InProcess:
 
     workers = 1
 
-    def __init__(self, jobs=1):
+    def __init__(self, jobs=1, verbose=False):
         self.workers = max(1, jobs)
 
     def perform(self, jobs):
