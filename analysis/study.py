@@ -23,6 +23,7 @@ from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
 from coartic.files import folder_named
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
@@ -233,6 +234,9 @@ class Study:
             There are no runs of the method on the task; the stored movements cannot be executed or
             do not do what is stored of them.
         """
+        condition = f"{METHOD_PREFIX}{method}"  # which goes by its own name as well
+        if (task, method) not in self.cells and (task, condition) in self.cells:
+            method = condition
         if (task, method) not in self.cells:
             on_task = [name for on, name in self.cells if on == task]
             asked = ("method", method, on_task) if on_task else ("task", task, self.tasks)

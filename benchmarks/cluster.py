@@ -77,7 +77,7 @@ class Dask:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
         try:
             from distributed import Client
-            from distributed.comm import resolve_address
+            from distributed.comm.addressing import resolve_address
 
             resolve_address(self.address)  # without a port, a client would wait for a minute
             return Client(self.address, set_as_default=False)

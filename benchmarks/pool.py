@@ -170,7 +170,7 @@ def errors_of_files() -> Iterator[None]:
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
         raise CoarticError(
-            f"temporary files of worker processes cannot be kept: {error.strerror or error}{where}. "
+            f"worker processes have no place for answers: {error.strerror or error}{where}. "
             "Finished runs are kept: repeat the command, with another TMPDIR if this one is full"
         ) from None
 
@@ -256,6 +256,8 @@ class Worker:
             return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
         if exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME:
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
+        if exit_code == _UNKEPT:
+            return fail(job, "crashed", "its answer could not be written: its folder was removed")
         return fail(job, "crashed", f"the worker process ended {self.last_words}")
 
     def end(self) -> None:

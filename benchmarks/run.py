@@ -70,8 +70,9 @@ class Progress:
     """Runs that are not ok, of all."""
     crashed: int = 0
     """Runs that crashed, of all."""
-    others: int = 0
-    """Runs in the folder that are not asked for."""
+    others: Counter[int] = field(default_factory=Counter)
+    """Runs in the folder that earlier commands asked for and this one does not, by the seed of
+    their suite; they are kept, and nothing shows them."""
     wall_s: float = 0.0
     """Seconds from the call until the last run was kept, or nothing found to do."""
     waiting: Counter[str] = field(default_factory=Counter)
@@ -119,7 +120,7 @@ class Progress:
             f"{counted(count, 'run')} {what}"
             for count, what in (
                 (self.stale, "made by a different version of the code"),
-                (self.others - self.stale, "of earlier commands, which are kept"),
+                (self.others.total(), "of earlier commands, which are kept"),
             )
             if count > 0
         ]
@@ -219,7 +220,8 @@ def perform(
         raise CoarticError(f"executor is {brief_value(executor)}; it must be {known}")
     with writing(folder) as store:
         store.replace_plan(plan, current_environment(), command(), now())
-        progress = Progress(folder, plan.size, stale=store.stale())
+        progress = Progress(folder, plan.size, stale=store.stale(), others=store.others())
+        progress.others[plan.seed] -= progress.stale
         missing = missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.specification.method] += len(job.numbers)
@@ -241,7 +243,6 @@ def perform(
                         watch(progress, run.specification)
             jobs = alone
         progress.wall_s = time.perf_counter() - clock
-        progress.others = len(store.ids()) - plan.size
         return progress
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from itertools import groupby
 from typing import Any
 
 
@@ -51,14 +50,14 @@ def fields_of(node: ast.AST) -> dict[str, Any]:
     return fields
 
 
-def joined(parts: list[ast.expr]) -> list[Any]:
+def joined(parts: list[ast.expr]) -> list[ast.expr]:
     """Return the parts of an f-string with neighbouring texts as one text: Python divides them
     differently since version 3.12."""
-    together: list[Any] = []
-    for is_text, some in groupby(parts, lambda part: isinstance(part, ast.Constant)):
-        if is_text:
-            text = "".join(part.value for part in some)
-            together += [ast.Constant(text)] if text else []
-        else:
-            together += some
+    together: list[ast.expr] = []
+    for part in parts:
+        last = together[-1] if together else None
+        if isinstance(part, ast.Constant) and isinstance(last, ast.Constant):
+            together[-1] = ast.Constant(f"{last.value}{part.value}")
+        elif not isinstance(part, ast.Constant) or part.value:
+            together.append(part)
     return together

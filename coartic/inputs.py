@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic.errors import CoarticError
-from coartic.text import LONGEST_LINE, did_you_mean, plain, short_repr
+from coartic.text import LONGEST_LINE, counted, did_you_mean, plain, short_repr
 
 if TYPE_CHECKING:
     import numpy as np
@@ -158,24 +158,25 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
     ``keys`` are the keys that it may have, wherever they belong.
     """
-    sentences = explain_all(error, list(keys))
-    lines = [f"{plain(source)}: {sentence}" for sentence in sentences[:_SHOWN]]
-    if len(sentences) > _SHOWN:
-        lines.append(f"{plain(source)}: has {len(sentences) - _SHOWN} more problems")
+    sentences, more = explain_first(error, list(keys))
+    lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
+    if more:
+        lines.append(f"{plain(source)}: has {counted(more, 'more problem')}")
     return "\n".join(lines)
 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
     """The problems of a file, the first :data:`_SHOWN` of them, as part of a sentence."""
-    return "; ".join(explain_all(error, keys)[:_SHOWN])
+    return "; ".join(explain_first(error, keys)[0])
 
 
-def explain_all(error: ValidationError, keys: Sequence[str]) -> list[str]:
-    """A sentence for each problem."""
+def explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[str], int]:
+    """A sentence for each of the first :data:`_SHOWN` problems, and how many more there are."""
     details = error.errors(include_url=False)
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
-    return list(dict.fromkeys(plain(explain_problem(detail, keys)) for detail in details))
+    sentences = (plain(explain_problem(detail, keys)) for detail in details[:_SHOWN])
+    return list(dict.fromkeys(sentences)), max(0, len(details) - _SHOWN)
 
 
 def error_saying(text: str) -> PydanticCustomError:

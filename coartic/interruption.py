@@ -31,6 +31,8 @@ def catch_signals() -> None:
             _heard.append((number, time.monotonic()))
             raise KeyboardInterrupt
 
+    if hasattr(signal, "pthread_sigmask"):  # where all are blocked, no process would end
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for number in ENDING:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
@@ -47,10 +49,11 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 
 
 def end_if_interrupted() -> None:
-    """End the process where a signal has been heard: 130 after Ctrl-C, else 143."""
+    """End the process where a signal has been heard: 130 after Ctrl-C, else 143. From here on none
+    is heard: the command has ended."""
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
     if _heard:
-        for number in ENDING:
-            signal.signal(number, signal.SIG_IGN)
         with suppress(OSError):  # nobody may be there to read it
             os.write(2, f"{' '.join(_words)}\n".encode())
         sys.exit(130 if _heard[0][0] == signal.SIGINT else 143)

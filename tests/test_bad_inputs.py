@@ -9,14 +9,16 @@ import pytest
 from coartic import CoarticError, builtin_tasks, load_task
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import run_suite
-from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.tasks.families import read_family
+from coartic.benchmarks.suites import SUITE_FOLDER, load_suite, select_cells
+from coartic.tasks.families import FAMILY_FOLDER, read_family
 from coartic.tasks.task import TASK_FOLDER
 from coartic.text import did_you_mean
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
+FAMILY_FILE = FAMILY_FOLDER / "long.v1.toml"
+SUITE_FILE = SUITE_FOLDER / "quick.toml"
 NO_METHOD = Path(__file__).parents[1] / "LICENSE"
 FAMILY = """
 title = "Mine"
@@ -74,6 +76,11 @@ TASKS = [
 FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be at least 2"),
     (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be at most 8"),
+    (family("[2, 3]", "[5, 3]"), "goals is [5, 3]; it should have the lower number first"),
+    (family("[4, 4]", "[5, 4]"), "links is [5, 4]; it should have the lower number first"),
+    (family("[-5, 5]", "[5, -5]"), "region.x is [5, -5]; it should have the lower number first"),
+    (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
+    (family("[-5, 5]", "[-5, inf]"), "region.x[1] is inf; it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
@@ -135,6 +142,15 @@ def test_a_file(read, name, text, words, tmp_path):
     assert name in line or "suite 'own'" in line or "method '" in line
 
 
+def test_of_many_problems_the_first_are_said(tmp_path):
+    (tmp_path / "mine.toml").write_text("".join(f"a{n} = 1\n" for n in range(100)) + GOOD)
+    with pytest.raises(CoarticError) as caught:
+        load_task(tmp_path / "mine.toml")
+    *lines, last = str(caught.value).splitlines()
+    assert len(set(lines)) == 20
+    assert last.endswith("has 80 more problems")
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -150,6 +166,12 @@ def test_a_file(read, name, text, words, tmp_path):
         ({"tasks": ["absent.toml"]}, "absent.toml"),
         ({"tasks": Path("a.toml")}, "tasks is a list: write tasks=['a.toml']"),
         ({"tasks": [3]}, "tasks is [3]; it must be a list of names, paths or tasks"),
+        ({"tasks": None}, "tasks is None; it must be a list of names, paths or tasks"),
+        ({"methods": 3}, "methods is 3; it must be a list of names or paths"),
+        ({"cells": "x"}, "cells is 'x'; it must be a list of cells"),
+        ({"jobs": 2}, "jobs is no option: give executor=Local(jobs)"),
+        ({"scheduler": "x"}, "scheduler is no option: give executor=Dask(scheduler)"),
+        ({"method_file": "a.py"}, "unknown option 'method_file'; did you mean 'method_files'?"),
         ({"runs": "3"}, "runs is '3'; it must be a whole number from 1 to "),
         ({"runs": True}, "runs is True; it must be a whole number from 1 to "),
         ({"seed": -1}, "seed is -1; it must be a whole number from 0 to "),
@@ -229,7 +251,7 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["animate", "x", "--out", ""], "is empty"),
         (["report", "a" * 5000], "File name too long"),
         (["run", "paper", "--out", "a" * 5000], "File name too long"),
-        (["check", "/dev/zero.toml"], "no such file"),
+        (["check", "/dev/zero.toml"], "No such file"),
         (["list", "two-armed/v2/i003"], "two-armed/v1"),
         (["list", "two-armed1"], "two-armed-1"),
         (["check", "two-armed-1"], "two-armed-1 is a task, not a method. `coartic draw"),
@@ -245,7 +267,14 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["animate", "0", "--width", "1.5"], "--width is 1.5; it must be a whole number from 200"),
         (["run"], "name a suite: ablations, "),
         (["run", "papr"], "did you mean 'paper'"),
-        (["run", "paper", "--family-file", TASK_FILE], "a task, not a family: give it by --tasks"),
+        (["run", "paper", "--family-file", TASK_FILE], "is a task: coartic run SUITE --tasks"),
+        (["run", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
+        (["check", SUITE_FILE], "is a suite: coartic run"),
+        (["check", "quick"], "quick is a suite: coartic run quick"),
+        (["check", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
+        (["check", "two-armed"], "is a shipped family: coartic list two-armed"),
+        (["list", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
+        (["list", "mine.py"], "coartic check METHOD --method-file mine.py"),
         (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
         (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "`coartic trace` names"),
         (["report", "nowhere"], "there is no folder nowhere"),

@@ -100,12 +100,11 @@ def test_a_folder_is_read_in_one_state(parts, tmp_path):
     left = shutil.copytree(parts[0], tmp_path / "left")
     with open_store(left) as store:
         before = store.ids()
-        with (
-            closing(sqlite3.connect(left / RUNS_FILE, timeout=0)) as other,
-            pytest.raises(sqlite3.OperationalError, match="locked"),
-        ):
+        with closing(sqlite3.connect(left / RUNS_FILE, timeout=0, isolation_level=None)) as other:
+            other.execute("BEGIN")
             other.execute("DELETE FROM results")
-            other.commit()
+            with pytest.raises(sqlite3.OperationalError, match="locked"):
+                other.execute("COMMIT")
         assert store.ids() == before
 
 

@@ -6,7 +6,7 @@ import sqlite3
 import subprocess
 import sys
 from collections import Counter
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -14,16 +14,18 @@ from typer.main import get_command
 
 from coartic import __version__, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks import pool
+from coartic.benchmarks import pool, template
 from coartic.benchmarks.run import Progress
 from coartic.cli import COMMANDS, app, draw
 from coartic.cli.terminal import Display
 from coartic.runs.plan import Cell, run_seed
 from coartic.runs.store import RUNS_FILE
+from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session
 from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, planned
 
+TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
 
 
@@ -102,8 +104,7 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
 
 def test_check(coartic, tmp_path):
     """A task file and a method that keep the rules, and ones that do not."""
-    shipped = ROOT / "coartic" / "tasks" / "paper" / "1-ascending.toml"
-    assert coartic("check", shipped)[0] == 0
+    assert coartic("check", TASK_FILE)[0] == 0
     (tmp_path / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), encoding="utf-8")
     assert coartic("check", tmp_path / "mine.toml")[0] != 0
     code, text, _ = coartic("check", "test/peeks", "--method-file", BROKEN)
@@ -236,6 +237,110 @@ def test_modules_in_the_working_folder_are_not_imported(tmp_path):
     assert done.returncode == 0, done.stderr
     assert not list(temporary.iterdir())
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_path, monkeypatch):
+    """And what to do for a report of it, where the command is interrupted."""
+    out, words = tmp_path / "out", []
+    assert coartic(*SMALL, "--methods", "EC1", "--out", out)[0] == 0
+
+    @contextmanager
+    def interruptible(sentence):
+        try:
+            yield
+        except KeyboardInterrupt:
+            words.append(sentence())
+            raise
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("coartic.cli.run.interruptible", interruptible)
+    monkeypatch.setattr(InProcess, "perform", interrupted)
+    code, text, error = coartic(*SMALL, "--methods", "EC1", "--out", out, "--seed", 7)
+    assert (code, text) != (0, "")
+    assert f"{out} holds 2 runs of seed 0" in error
+    assert "To report 2 runs of seed 0 there, repeat the earlier command" in words[0]
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
+    coartic, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert coartic(*SMALL, "--methods", "EC1", "--out", "out")[0] == 0
+    assert coartic("new", "my-search")[0] == 0
+    for command in ("check", "list"):
+        assert "out is a results folder: coartic report out" in coartic(command, "out")[2]
+        assert "add --method-file my_search.py" in coartic(command, "my-search")[2]
+    study = load("out")  # in which a condition goes by its own name as well
+    assert study.executed("ascending", "EC1").run_ids == tuple(study.runs.run_id)
+
+
+def test_help_has_a_short_name(coartic):
+    for command in ((), ("run",), ("trace",)):
+        assert coartic(*command, "-h") == coartic(*command, "--help")
+
+
+SURROUNDED = """
+import os, signal, sys
+if sys.argv[1] == "blocked":
+    signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())
+else:
+    os.close(int(sys.argv[1]))
+os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
+"""
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform == "win32", reason="signals and streams of POSIX")
+@pytest.mark.parametrize("what", ["blocked", "0", "1", "2"])
+def test_a_command_ends_well_whatever_started_it(tmp_path, what):
+    """With all signals blocked, or without input, output or errors."""
+    mine = tmp_path / "mine.py"
+    mine.write_text(Path(template.__file__).read_text())
+    command = ("-m", "coartic", *SMALL, "--methods", "EC1,NAME", "--method-file", mine, "--out")
+    status, _ = call_apart(
+        tmp_path, [sys.executable, "-c", SURROUNDED, what, *map(str, command), tmp_path / "out"]
+    )
+    assert status == 0
+    assert load(tmp_path / "out").runs.status.tolist() == ["ok"] * 4
+
+
+@pytest.mark.process
+def test_kernels_that_may_not_be_compiled_get_a_sentence(tmp_path):
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, "-m", "coartic", "check", TASK_FILE]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("Error: NUMBA_DISABLE_JIT is set")
+
+
+@pytest.mark.process
+def test_what_a_method_prints_and_where_it_crashes(tmp_path):
+    """With --verbose all of it, and a place in any case."""
+    text = Path(template.__file__).read_text().replace("def optimise", "def unused")
+    body = """
+    def optimise(self, *_):
+        import logging
+        print("it prints")
+        logging.info("it logs")
+        return helper()
+
+def helper():
+    raise RuntimeError("here")
+"""
+    (tmp_path / "mine.py").write_text(text + body)
+    command = [sys.executable, "-m", "coartic", "check", "NAME", "--method-file", "mine.py"]
+    for more in ((), ("--verbose",)):
+        done = subprocess.run([*command, *more], capture_output=True, text=True, cwd=tmp_path)
+        shown = done.stdout + done.stderr
+        place = f"mine.py, line {len((text + body).splitlines())}: RuntimeError: here"
+        assert place in done.stdout
+        assert done.returncode == 1
+        for words in ("it prints", "INFO:root:it logs", "Traceback", "return helper()"):
+            assert (words in shown) == bool(more), words
 
 
 def test_list(coartic, tmp_path):

@@ -138,7 +138,7 @@ CASES = [
     ("test/taker", "information", "hand_over is for this project's own compiled methods"),
     ("test/freeloader", "information", "used 'corrective process', which it does not declare"),
     ("test/lucky", "determinism", "declared not to be stochastic, but another seed"),
-    ("test/unhelpful", "failure", "gives crashed ZeroDivisionError: no goal is that far"),
+    ("test/unhelpful", "failure", "ZeroDivisionError: no goal is that far"),
 ]
 
 
@@ -173,6 +173,13 @@ def test_shipped_tasks_keep_every_law(methods, path):
             "[start]\nright = [0.5, 0.5]\nleft = [0]\n",
             "solvable",
             "divide all lengths by 7.1",
+        ),
+        (
+            # Beyond what the corrective process can do with the only hand there is.
+            'name = "behind"\nlocked_base = ["x", "y"]\nhands = ["right"]\n'
+            "goals = [[-2.0, 0.1], [2.0, 2.0]]",
+            "methods",
+            "methods can run on it, such as dual-process/EC1",
         ),
         (
             'hands = ["left"]' + GOOD.replace('"RR"', '"LL"'),

@@ -98,7 +98,7 @@ def test_a_glance_without_workers_is_none(address, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("executor", [2, object(), "tcp://127.0.0.1:8786"])
 def test_what_is_no_executor(tmp_path, executor):
-    with pytest.raises(CoarticError, match=r"executor is .*Local\(jobs\).*Dask\(address\)"):
+    with pytest.raises(CoarticError, match=r"executor is .*Local\(jobs\).*Dask\(scheduler\)"):
         run_suite("quick", tmp_path, tasks=["ascending"], executor=executor)
     assert [*tmp_path.iterdir()] == []
 

@@ -19,13 +19,14 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import Job
+from coartic.runs.store import writing
 from tests.support.processes import comes, folders_of_session, processes
 from tests.support.suites import KNOWN, made_once, planned, run_and_write
 
 pytestmark = pytest.mark.process
 
 METHODS = """
-import itertools, os, signal, sys, tempfile, threading, time
+import itertools, os, shutil, signal, sys, tempfile, threading, time
 import numpy as np
 import coartic.benchmarks.scoring, coartic.benchmarks.worker, coartic.motion.solution
 from coartic.method import Information, Method, MethodError, Parameters, Result
@@ -81,6 +82,12 @@ HANDLED = {
                        "            open(__file__ + '.killed', 'w').close()\n"
                        "            os.kill(os.getpid(), signal.SIGKILL)\n"
                        "        return Result(corrected(session))", "ok", ""),
+    "removes_its_folder": ("shutil.rmtree(os.path.dirname(os.getcwd()))\n"
+                           "        return Result(corrected(session))", "crashed", "could not be"),
+    "loses_it_once": ("if not os.path.exists(__file__ + '.lost'):\n"
+                      "            open(__file__ + '.lost', 'w').close()\n"
+                      "            shutil.rmtree(os.path.dirname(os.getcwd()))\n"
+                      "        return Result(corrected(session))", "ok", ""),
     "breaks": ("raise SystemExit(0)", "crashed", "SystemExit: 0"),
     "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
     "writes": ("open('large', 'wb').truncate(2**40)", "crashed", "File too large"),
@@ -165,7 +172,7 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.status == status, run.reason
     assert words in run.reason
     assert run.reason.isprintable()
-    died = name in ("exits", "quits_well", "is_killed")
+    died = name in ("exits", "quits_well", "is_killed", "removes_its_folder")
     assert run.isna().wall_s == (died or "CPU" in words)
     assert run.isna().cpu_s == (died or "wall" in words)
     assert run.isna().reward if status != "ok" else run.reward == HONEST
@@ -251,6 +258,42 @@ def test_what_somebody_kills_is_repeated(tmp_path, whom):
     perform(planned(cells, runs=8), tmp_path / "out", executor=Local(2), watch=kill)
     assert killed
     assert load(tmp_path / "out").runs.status.tolist() == ["ok"] * 8
+
+
+@pytest.mark.parametrize("why", ["removed", "full"])
+def test_without_a_place_for_answers_the_suite_ends(tmp_path, monkeypatch, why):
+    """And nothing is kept: no method has crashed. Repeated, the suite goes on."""
+    end = {"removed": "shutil.rmtree(os.path.dirname(os.path.dirname(os.getcwd())))",
+           "full": "os._exit(1)"}  # fmt: skip
+    body = f"""if self.name == "test/does" and not os.path.exists(__file__ + ".over"):
+            open(__file__ + ".begun", "w").close()
+            {end[why]}
+        while not os.path.exists(__file__ + ".begun"): time.sleep(0.01)
+        return Result(corrected(session))"""
+    task, methods = load_task("ascending"), entries(tmp_path, [("honest", body)])
+    plan, out = planned([Cell(task, method) for method in methods]), tmp_path / "out"
+    resource = pytest.importorskip("resource")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    if why == "full":  # as a disk that takes a little more, and the file of results
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2**19, limits[1]))
+    try:
+        with pytest.raises(CoarticError, match="no place for answers: .*Finished runs are kept"):
+            perform(plan, out, executor=Local(2))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    with writing(out) as store:
+        assert {status for *_, status, _ in store.present()} <= {"ok"}
+    (tmp_path / "mine.py.over").touch()
+    assert run_and_write(out, plan.cells, executor=Local(2)).runs.status.tolist() == ["ok", "ok"]
+
+
+def test_a_server_that_is_killed_while_a_file_is_read(tmp_path, monkeypatch):
+    def killed(_):
+        raise EOFError
+
+    monkeypatch.setattr("coartic.benchmarks.reader.start_process", killed)
+    with pytest.raises(CoarticError, match=r"mine.py: cannot be imported: no process .* begins"):
+        entries(tmp_path, [("honest", "pass")])
 
 
 def test_other_methods_and_the_parent_notice_nothing(folder, runs):

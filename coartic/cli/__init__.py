@@ -79,6 +79,10 @@ for command, example in COMMANDS:
 def main() -> None:
     """Run the command line; exit code 2 for errors that the user can put right."""
     gc.set_threshold(100_000, 50, 1_000)  # what is imported stays: do not look through it often
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:  # it is closed: its number would go to a file of ours
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+            os.set_inheritable(getattr(sys, name).fileno(), True)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")

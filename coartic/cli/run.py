@@ -126,7 +126,10 @@ def run(
 
     def saved() -> str:
         done = counted(display.done, "finished run")
-        return one_line(f"Saved in {out}: {done}; repeat the command to resume.")
+        kept = f" To report {display.others} there, repeat the earlier command." * bool(
+            display.others
+        )
+        return one_line(f"Saved in {out}: {done}; repeat the command to resume.{kept}")
 
     with interruptible(saved), display:
         if beside:

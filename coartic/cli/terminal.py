@@ -56,6 +56,8 @@ class Display:
     def __init__(self) -> None:
         self.done = 0
         """Runs performed now."""
+        self.others = ""
+        """Runs of earlier commands in the folder, in words; empty where there are none."""
         self._is_live = sys.stderr.isatty()
         self._last = time.monotonic()
         self._end = ""
@@ -75,6 +77,11 @@ class Display:
             if progress.stale:
                 count = counted(progress.stale, "run")
                 self.line(f"Ignoring {count} made by a different version of the code.")
+            if held := +progress.others:
+                seeds = " and ".join(map(str, sorted(held)))
+                self.others = f"{counted(held.total(), 'run')} of seed {seeds}"
+                words = "which this command does not ask for: they are kept, and not reported"
+                self.line(f"{progress.folder} holds {self.others}, {words}.")
             if progress.present:
                 coming = counted(total - progress.present, "run")
                 self.line(f"Already there: {progress.present} of {total}; to come: {coming}.")

@@ -29,6 +29,7 @@ from typing import IO, Any
 
 from llvmlite import binding  # which Numba brings, in the one version that it takes
 
+from coartic.errors import CoarticError
 from coartic.motion.sources import FINGERPRINT, PACKAGE
 
 
@@ -114,7 +115,12 @@ _INNER = _OPTIONS | {"no_cpython_wrapper": True}
 
 
 def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
-    """Compile a function as the decorator of this name in :mod:`coartic.motion.compiled` says."""
+    """Compile a function as the decorator of this name in :mod:`coartic.motion.compiled` says.
+
+    Raises CoarticError where Numba is told to compile nothing.
+    """
+    if numba.config.DISABLE_JIT:
+        raise CoarticError("NUMBA_DISABLE_JIT is set: unset it, as coartic's kernels are compiled")
     match kind:
         case "entry":
             return keep_on_disk(njit(**_OPTIONS)(function), function)

@@ -17,7 +17,7 @@ import sqlite3
 import time
 import warnings
 import zlib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from itertools import groupby
@@ -243,6 +243,13 @@ class Store:
                 AND old.id NOT IN (SELECT setting FROM cells)"""
             )
             return int(row[0])
+
+    def others(self) -> Counter[int]:
+        """Number of runs that the plan does not ask for, by the seed of their suite."""
+        query = f"""SELECT suite_seed, count(*) FROM results
+            WHERE id NOT IN (SELECT results.id {_ASKED_FOR}) GROUP BY suite_seed"""
+        with explain_errors(self.folder):
+            return Counter(dict(self._db.execute(query)))
 
     def ids(self, prefix: str = "") -> list[str]:
         """Ids of all runs, asked for or not, that begin so."""

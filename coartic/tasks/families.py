@@ -17,6 +17,7 @@ the others ask the compiled kernels, which use IEEE arithmetic alone
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable
@@ -24,7 +25,8 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
 from coartic.inputs import MOST_CELLS, FileData, check_limits, error_saying, explain_file, read_toml
@@ -63,6 +65,8 @@ _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 def in_thousandths(value: float) -> int:
     """A number of up to three decimals as a whole number of thousandths."""
+    if not math.isfinite(value):
+        raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
         raise error_saying(f"{value} should have at most three decimals")
     return round(value * _PARTS)
@@ -70,7 +74,17 @@ def in_thousandths(value: float) -> int:
 
 Thousandths = Annotated[int, BeforeValidator(in_thousandths)]
 """A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
-Span = tuple[Thousandths, Thousandths]
+
+
+def in_order(span: tuple[int, int]) -> tuple[int, int]:
+    """The lowest and the highest of some numbers, in this order."""
+    if span[0] > span[1]:
+        raise PydanticCustomError("order", "should have the lower number first")
+    return span
+
+
+_ordered = AfterValidator(in_order)
+Span = Annotated[tuple[Thousandths, Thousandths], _ordered]
 """From, to; every thousandth between as likely."""
 _Count = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
@@ -133,9 +147,9 @@ class Family(FileData):
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals; the robot has both arms anyway."""
-    goals: tuple[_Count, _Count]
+    goals: Annotated[tuple[_Count, _Count], _ordered]
     """How many there are, from, to; each number as likely."""
-    links: tuple[_PerArm, _PerArm]
+    links: Annotated[tuple[_PerArm, _PerArm], _ordered]
     """How many each of both arms has, from, to; they have one length (to a thousandth)."""
     reach: Thousandths = 4 * _PARTS
     """Sum of an arm's links, length unit; the paper's."""
