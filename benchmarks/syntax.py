@@ -57,7 +57,7 @@ def joined(parts: list[ast.expr]) -> list[ast.expr]:
     for part in parts:
         last = together[-1] if together else None
         if isinstance(part, ast.Constant) and isinstance(last, ast.Constant):
-            together[-1] = ast.Constant(f"{last.value}{part.value}")
+            together[-1] = ast.Constant(str(last.value) + str(part.value))
         elif not isinstance(part, ast.Constant) or part.value:
             together.append(part)
     return together
