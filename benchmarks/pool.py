@@ -127,7 +127,8 @@ class Crew:
                         continue
                     self.check_room()
                     job = worker.jobs[0]
-                    lost = lost + 1 if worker.since_s == math.inf else 0
+                    begun = worker.since_s < math.inf or exit_code == _UNKEPT
+                    lost = 0 if begun else lost + 1
                     if lost == _STARTS:
                         raise CoarticError(
                             f"processes cannot begin {worker.last_words}; finished runs are kept"
@@ -139,8 +140,9 @@ class Crew:
                     else:
                         yield job, worker.failure(exit_code)
                         worker.jobs.popleft()
-                    if worker.jobs:
-                        waiting.appendleft(list(worker.jobs))
+                    rest = list(worker.jobs)  # what is repeated is so alone: answers may be lost
+                    alone = 1 if rest and id(rest[0]) in repeated else 0
+                    waiting.extendleft(part for part in (rest[alone:], rest[:alone]) if part)
         finally:
             for worker in crew:
                 worker.end()

@@ -274,8 +274,6 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
     for command in ("check", "list"):
         assert "out is a results folder: coartic report out" in coartic(command, "out")[2]
         assert "add --method-file my_search.py" in coartic(command, "my-search")[2]
-    study = load("out")  # in which a condition goes by its own name as well
-    assert study.executed("ascending", "EC1").run_ids == tuple(study.runs.run_id)
 
 
 def test_help_has_a_short_name(coartic):

@@ -133,11 +133,12 @@ def test_runs_are_tidy(tmp_path):
     assert runs.best_known.tolist() == [-best] * 4
     assert runs.gap.to_numpy() == pytest.approx((-best - runs.reward).to_numpy(float) / best)
     for task, words in (
-        ("two-armed-1", "unknown method 'EC3'; did you mean 'dual-process/EC3'"),
+        ("two-armed-1", "unknown method 'EC33'. Known: dual-process/EC3"),
         ("two-armed", "unknown task 'two-armed'; did you mean 'two-armed-1'"),
     ):
         with pytest.raises(coartic.CoarticError, match=words):
-            study.executed(task, "EC3")
+            study.executed(task, "EC33")
+    assert study.executed("two-armed-1", "EC3").run_ids == tuple(runs.run_id[:3])
     postures = study.configurations("two-armed-1", "dual-process/EC3")
     assert postures.shape == (3, 4, 10)
     robot = study.tasks["two-armed-1"].robot
