@@ -1,10 +1,11 @@
-"""The optimum of each task: the best known reward and the proven bound."""
+"""The best known reward of each task, which gaps are to, and the proven bound."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -13,36 +14,70 @@ from numpy.typing import ArrayLike
 from coartic import Task
 from coartic.analysis.solutions import initial_solution
 from coartic.robot import Array
-from coartic.runs.plan import SEARCH
+from coartic.runs.plan import SEARCH, label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
 
+SHIPPED = "shipped"
+"""Source of a reward that no run of the folder exceeds."""
 
-def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, KnownOptimum]:
-    """Best known reward with all joints free by task, for the tasks of a folder.
 
-    What the shipped data say where the task is the same in all that matters, bettered by
-    what the folder's own searches found. Searches of an instance of a family are short, and any
-    run of the folder may better them. A reward of 0, which leaves no gap, does not count.
+@dataclass(frozen=True)
+class BestKnown(KnownOptimum):
+    """The best reward known of a task, and where it comes from."""
+
+    source: str = SHIPPED
+    """:data:`SHIPPED`, or the label of the method with the best run."""
+    run_id: str = ""
+    """The best run; empty where the reward is shipped."""
+    only_here: bool = False
+    """Whether nothing is shipped of the task and no search for the optimum has a solution."""
+
+
+def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown]:
+    """Return the best known reward by task: of what is shipped and of all runs of a folder.
+
+    Every run on the task as it is counts, also those of searches and those copied from other
+    folders; a run with another base solves another task. A task has none where its best reward is
+    0, which leaves no gap, and where only runs of one method tell it, which would be compared with
+    themselves.
+
+    Parameters
+    ----------
+    runs : DataFrame
+        Stored runs of the folder, with ``task``, ``method``, ``setting``, ``run_id``, ``status``,
+        ``parameters``, ``reward`` and ``proven_bound`` (ticks), ``hands``.
+    tasks : iterable of Task
+
+    Returns
+    -------
+    dict
+        By the name of the task.
     """
-    optima: dict[str, KnownOptimum] = {}
-    solved = runs[runs.status == "ok"]
-    asked = restrictions(solved)
-    solved = solved[asked.base == BASE]
-    searches = solved[solved.method.str.startswith(SEARCH)]
-    searches = searches[asked.other_arm[searches.index] == "free"]
-    for name, task in tasks.items():
-        of_task = searches[searches.task == name]
-        candidates = [from_runs(of_task)] if len(of_task) else []
-        if (entry := best_shipped(task)) is not None:
-            candidates.append(entry)
-        of_task = solved[solved.task == name]
-        if task.family is not None and len(of_task):
-            candidates.append(KnownOptimum(int(of_task.reward.max()), None))
-        reward = max((each.reward for each in candidates), default=0)
-        if reward < 0:
-            bounds = [each.bound for each in candidates if each.bound is not None]
-            optima[name] = KnownOptimum(reward, min(bounds, default=None))
-    return optima
+    asked = restrictions(runs)
+    solved = runs[(runs.status == "ok") & (asked.base == BASE)]
+    is_search = solved.method.str.startswith(SEARCH)
+    solved = pd.concat([solved[is_search], solved[~is_search]])  # of equal runs a search counts
+    by_task, known = dict([*solved.groupby("task")]), {}
+    for task in tasks:
+        here, shipped = by_task.get(task.name, solved[:0]), best_shipped(task)
+        searches = here[is_search[here.index]]
+        labels = {*map(label_of, here.method, here.setting)}
+        if shipped is None and not len(searches) and len(labels) < 2:
+            continue
+        # A search that keeps the other arm still proves nothing of solutions that move it.
+        bounds = [*searches.proven_bound[asked.other_arm[searches.index] == "free"].dropna()]
+        bounds += [shipped.bound] if shipped is not None and shipped.bound is not None else []
+        bound = min(map(int, bounds), default=None)
+        if shipped is not None and not (here.reward > shipped.reward).any():
+            best = BestKnown(shipped.reward, bound, shipped.hands)
+        else:
+            run = here.iloc[int(here.reward.astype(int).to_numpy().argmax())]
+            only_here = shipped is None and not len(searches)
+            source = label_of(run.method, run.setting), str(run.run_id)
+            best = BestKnown(int(run.reward), bound, str(run.hands), *source, only_here)
+        if best.reward < 0:
+            known[task.name] = best
+    return known
 
 
 def locks_base(runs: pd.DataFrame) -> bool:

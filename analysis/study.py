@@ -17,8 +17,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
-from coartic.analysis.frames import gaps
-from coartic.analysis.optima import known_optima
+from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
@@ -29,7 +28,7 @@ from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
 from coartic.runs.run import execute_all
 from coartic.runs.store import explain_errors, open_store
-from coartic.tasks.optima import KnownOptimum
+from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 from coartic.text import counted, unknown
 
@@ -124,21 +123,24 @@ def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     ``hands`` those of the solution.
     """
     tasks, parameters = plan.tasks, {text: json.loads(text) for text in runs.parameters.unique()}
-    optima = known_optima(runs, tasks)
+    best = {name: each.reward for name, each in best_known(runs, tasks.values()).items()}
     rows = [
         {
             **parameters[text],
             "family": tasks[name].family,
             "split": tasks[name].split,
             "goals": len(tasks[name].goals),
-            "best_known": optima[name].reward if name in optima else None,
         }
         for name, text in zip(runs.task, runs.parameters, strict=True)
     ]
     more = pd.DataFrame(rows, runs.index)
     runs = runs.join(more[[name for name in more if name not in runs]])
-    runs["best_known"] = runs.get("best_known", pd.Series(dtype="Int64")).astype("Int64")
-    runs = runs.assign(gap=gaps(runs))
+    as_it_is = restrictions(runs).base == BASE  # other runs solve another task
+    runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
+    runs["gap"] = gap_share(*(
+        runs[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
+        for name in ("reward", "best_known")
+    ))
     runs.attrs["units"] = UNITS
     return runs
 
@@ -299,9 +301,9 @@ class Study:
         return values
 
     @cached_property
-    def optima(self) -> dict[str, KnownOptimum]:
-        """Best known reward by task with all joints free, of an instance at least this folder's."""
-        return known_optima(self.runs, self.tasks)
+    def optima(self) -> dict[str, BestKnown]:
+        """Best known reward by task, with the proven bound and where the reward comes from."""
+        return best_known(self.runs, self.tasks.values())
 
     @cached
     def _movements(self, part: str) -> dict[str, tuple[Movement, ...]]:

@@ -70,7 +70,7 @@ def table(
             table = rows_by_name.reindex(columns=names).rename_axis("row")
             table.attrs["tasks"] = {name: marked(task) for name, task in study.tasks.items()}
             table.attrs["methods"] = names_of_settings(study)
-            table.attrs["known"] = bool(study.optima)
+            table.attrs["known"] = any(not best.only_here for best in study.optima.values())
             return table
 
         return frame

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from coartic import Task, load_task
 from coartic.analysis import frames
+from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about
 from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, TABLES
@@ -32,12 +34,27 @@ def study(rewards):
     return study_of(rows, optima=made_up_optima(*{each["task"] for each in rows}))
 
 
-def test_gaps_are_from_the_initial_solution_to_the_optimum():
+def test_targets_lie_between_the_initial_solution_and_the_best_known():
     seen = study({("two-armed-1", "dual-process/EC2"): [-520]})
-    assert scores.initial_and_optimum(seen) == {"two-armed-1": (-675.0, -465)}
+    assert costs.spans(seen) == {"two-armed-1": (-675.0, -465)}
     assert frames.gaps(scores.scores(seen)).tolist() == pytest.approx([(520 - 465) / 465])
-    missed = replace(seen.optima["two-armed-1"], reward=-680)  # below the initial solution
-    assert not scores.initial_and_optimum(MadeUp(seen, optima={"two-armed-1": missed}))
+
+
+def test_which_tasks_are_ranked_does_not_depend_on_the_corrective_process():
+    """One that it cannot do, and one on which nothing is better, have gaps, and no targets."""
+    behind = Task(name="behind", goals=[(-2.0, 0.1), (2.0, 2.0)], locked_base=("x", "y"),
+                  hands=["right"])  # fmt: skip
+    tasks = [load_task("ascending"), behind]
+    ticks = {"ascending": {"one": -319, "two": -330}, "behind": {"one": -110, "two": -100}}
+    rows = [row(method, reward, task=task, run_id=f"{task}-{method}", seed=0)
+            for task, of_task in ticks.items() for method, reward in of_task.items()]  # fmt: skip
+    best = {"ascending": BestKnown(-319, None), "behind": BestKnown(-100, -100)}
+    seen = study_of(rows, tasks, optima=best, rewards=lambda: iter(()))
+    ranked = TABLES["ranking"](seen)
+    assert ranked.gap.to_dict() == pytest.approx({"two": 11 / 319 / 2, "one": 0.1 / 2})
+    assert not costs.spans(seen)
+    assert TABLES["runtimes"](seen).empty
+    assert FIGURES["runtimes"](seen) is None
 
 
 LEARNER = {("ascending", "dual-process/EC1"): [-300, -301, -302, -303],
@@ -253,10 +270,11 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
 
 
 def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
-    """-293 and -480 of the learner, and -292 of the shipped optimum where one is known."""
+    """-293 and -480 of the learner, where goals are larger than those of the shipped tasks."""
     mine = {("ascending", "mine"): [-300, -293], ("two-armed-1", "mine"): [-500, -490]}
     seen = study(LEARNER | mine)
-    unknown = study_of(seen.runs.assign(commit=""), optima={})
+    larger = [task.model_copy(update={"radius": 0.11}) for task in seen.tasks.values()]
+    unknown = study_of(seen.runs.assign(commit=""), larger)
     ranked = TABLES["ranking"](unknown)
     learned = (8.5 / 293, 1.5 / 480)
     assert ranked.gap.iloc[0] == pytest.approx(sum(learned) / 2)
@@ -270,7 +288,7 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     for words in (sentence, plot.alt, *columns_of(ranked).values()):
         assert not re.search("optimum|known", words)
     assert "Two-armed 1 † is known: gaps there are" in about.notes_of(unknown, ranked)[0]
-    assert TABLES["runtimes"](unknown).empty  # no targets
+    assert TABLES["tasks"](unknown).source.tolist() == ["mine", "dual-process/EC4"]
     one = MadeUp(seen, optima=made_up_optima("ascending"))
     assert TABLES["ranking"](one).loc["mine", "on ascending"] == pytest.approx(4.5 / 292)
     assert "Gap of mine to the optimum: 1.5 %" in ranking.nearest(one)  # of ascending alone
@@ -305,6 +323,8 @@ def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
     assert "mine is the only method on Two-armed 2 †: name others, too." in alone
     assert "ends" not in alone
     both = study(rewards | {("two-armed-2", "theirs"): [-300]})
+    optima |= {"two-armed-2": BestKnown(-300, None, only_here=True)}
+    assert scores.common_tasks(MadeUp(both, optima=optima)) == ["ascending", "two-armed-1"]
     words = "mine, not of this project, ends 3.0 % from the best of this folder on Two-armed 2 †."
     assert words in ranking.nearest(MadeUp(both, optima=optima))
 

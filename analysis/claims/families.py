@@ -12,10 +12,10 @@ from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_
 from coartic.analysis.claims.judging import Finding, all_of, mean_beyond
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, LEARNER, LEARNERS, most_exploring
+from coartic.analysis.optima import BestKnown
 from coartic.analysis.topics.instances import best_of_instances
 from coartic.analysis.words import estimate
 from coartic.estimates import FEWEST, mean
-from coartic.tasks.optima import KnownOptimum
 
 OF_ONE_ARM = ("one-armed/v1",)
 OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -52,7 +52,7 @@ def in_every_family(
     return replace(finding, evidence=all_positive(finding.tests, parts).evidence)
 
 
-def reported_instances(read: Reader, family: str) -> dict[str, KnownOptimum]:
+def reported_instances(read: Reader, family: str) -> dict[str, BestKnown]:
     """The best known of a family's instances but for those of development, for tuning."""
     reported = {
         name: best

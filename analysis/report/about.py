@@ -12,7 +12,6 @@ from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.published import RUNS
-from coartic.analysis.topics.scores import is_known
 from coartic.analysis.words import NO_BREAK, listed, marked
 from coartic.errors import CoarticError
 from coartic.learner.learning import TRIALS
@@ -87,11 +86,9 @@ def limits(study: Study) -> dict[str, Any]:
         "few": fewest if fewest < RUNS else 0,
         "seed": study.plan.seed,
         "unproven": [
-            marked(task)
-            for task, best in optima
-            if best and not best.proven and is_known(study, task.name)
+            marked(task) for task, best in optima if best and not (best.proven or best.only_here)
         ],
-        "own": [marked(task) for task, best in optima if best and not is_known(study, task.name)],
+        "own": [marked(task) for task, best in optima if best and best.only_here],
         "unknown": [marked(task) for task, best in optima if best is None],
         "side_by_side": bool(runs.together.max() > 1),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
@@ -102,14 +99,14 @@ def limits(study: Study) -> dict[str, Any]:
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
     """Notes that belong to numbers of these columns."""
-    unproven, unknown, columns = limits(study)["unproven"], limits(study)["unknown"], set(columns)
+    unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []
     if unproven and columns & {"gap", "optimum"}:
         notes.append(
             f"The optimum of {listed(unproven)} is not proven: it is the best known reward."
         )
-    if unknown and "gap" in columns:
+    if own and "gap" in columns:
         notes.append(
-            f"No optimum of {listed(unknown)} is known: gaps there are to the best of this folder."
+            f"No optimum of {listed(own)} is known: gaps there are to the best of this folder."
         )
     return notes

@@ -13,6 +13,7 @@ import pandas as pd
 from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.optima import initial_reward
 from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import CellRuns, Study, cached, load
@@ -51,6 +52,19 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 
 @cached
+def spans(study: Study) -> dict[str, tuple[float, int]]:
+    """Return the rewards of the initial solution and best known by task, between which targets lie.
+
+    Without tasks that have no initial solution, or none that can be bettered.
+    """
+    rewards = {
+        name: (initial_reward(study.tasks[name]), best.reward)
+        for name, best in study.optima.items()
+    }
+    return {name: pair for name, pair in rewards.items() if pair[0] < pair[1]}  # NaN: none
+
+
+@cached
 def times_of(
     study: Study, cell: CellRuns, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
@@ -62,7 +76,7 @@ def times_of(
     even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. A run whose spend is not known,
     such as the time of a cold one, has no part; times are those of :func:`.scores.solve_times`.
     """
-    initial, optimum = scores.initial_and_optimum(study)[cell.task]
+    initial, optimum = spans(study)[cell.task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
     runs, learned, rows = cell.runs, improvements(study), []
     totals = runs[spend]
@@ -83,10 +97,10 @@ def times_of(
 
 
 def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
-    """Cells of each method on those of :func:`.scores.common_tasks` whose optimum is known, in
-    lists' order; of methods that ran on all of them."""
-    rewards, compared = scores.initial_and_optimum(study), scores.compared(study)
-    tasks = [task for task in scores.common_tasks(study) if task in rewards]
+    """Cells of each method on those of :func:`.scores.common_tasks` with targets, in lists' order;
+    of methods that ran on all of them."""
+    compared = scores.compared(study)
+    tasks = [task for task in scores.common_tasks(study) if task in spans(study)]
     return {
         method: [cell for task, cell in compared[method].items() if task in tasks]
         for method in methods.in_order(compared)
@@ -122,8 +136,8 @@ def runtimes(
     Raises
     ------
     CoarticError
-        For what is no results folder, targets out of bounds, and where no task has a known optimum
-        that is better than the initial solution.
+        For what is no results folder, targets out of bounds, and where no task has a best known
+        reward above that of its initial solution.
     """
     study = results if isinstance(results, Study) else load(results)
     shares = np.asarray(targets, dtype=np.float64)
@@ -131,8 +145,8 @@ def runtimes(
         raise CoarticError(
             f"targets are {brief_value(targets)}: needed are numbers above 0 and up to 1"
         )
-    if not scores.initial_and_optimum(study):
-        raise CoarticError("no task has a known optimum that is better than its initial solution")
+    if not spans(study):
+        raise CoarticError("no task has a best known reward above that of its initial solution")
     rows = []
     for name, cells in cells_compared(study).items():
         for spend in SPENDS:
@@ -162,7 +176,7 @@ def list_runtimes(study: Study) -> Rows:
                 row |= running_times.budget_for(times[spend], share).columns(name)
         if scores.groups(study)[method] == scores.BY_TRIAL:
             of_method = scores.compared(study)[method]
-            for task in (task for task in scores.initial_and_optimum(study) if task in of_method):
+            for task in (task for task in spans(study) if task in of_method):
                 half = times_of(study, of_method[task], "trials", (0.5,))
                 row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
         yield method, row | runs_of(*cells)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import pandas as pd
 
 from coartic.analysis.methods import most_exploring
-from coartic.analysis.optima import gap_share, locks_base
+from coartic.analysis.optima import BestKnown, gap_share, locks_base
 from coartic.analysis.statistics.instances import Scores
 from coartic.analysis.study import Study, cached
 from coartic.runs.plan import SEARCH
-from coartic.tasks.optima import KnownOptimum
 
 
 @cached
-def best_of_instances(study: Study) -> dict[str, KnownOptimum]:
+def best_of_instances(study: Study) -> dict[str, BestKnown]:
     """Best known reward of each instance of a family that has one."""
     optima = study.optima.items()
     return {name: best for name, best in optima if study.tasks[name].family is not None}

@@ -108,9 +108,8 @@ def draw_learning_curves(study: Study) -> Parts | None:
         for label, look in looks.items()
     ]
     handles += [style.legend_line("initial solution", **style.INITIAL)]
-    handles += [style.legend_line(scores.optimum_in_words(study), **style.OPTIMUM)] * bool(
-        study.optima
-    )
+    if known := [task.name for task in tasks if task.name in study.optima]:
+        handles.append(style.legend_line(scores.reference(study, known), **style.OPTIMUM))
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(ends, "{task}, {method}: {best:.0f}")

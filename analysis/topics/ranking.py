@@ -106,7 +106,7 @@ def list_against_learner(study: Study) -> Rows:
 def list_ranking(study: Study) -> Rows:
     """Gap over all tasks and on each, grouped by the use of the reward."""
     over, tested = main_gaps(study).set_index("method"), list_against_learner(study)
-    single = [t for t in scores.best_rewards(study) if study.tasks[t].family is None]
+    single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
     # Methods without a mean gap that solved every run on some task, by their gaps on the first.
     others = [
         (place, scores.cell_gap(study, cell), method)
@@ -179,7 +179,7 @@ def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
     for sign, method in ((1, first), (-1, second)):
         for task in tasks:
             cell = scores.compared(study)[method][task]
-            values = gap_share(cell.rewards, scores.best_rewards(study)[task])
+            values = gap_share(cell.rewards, study.optima[task].reward)
             if study.plan.methods[cell.method].stochastic:
                 signs.append(sign)
                 drawn.append(values)

@@ -1,7 +1,7 @@
 """Scores: a frame of the runs that are compared, and the table of methods.
 
-Methods are compared by their gap to the best reward of a task (:func:`best_rewards`). The learner
-explores one-armed and two-armed tasks under different conditions, so that one method joins them:
+Methods are compared by their gap to the best known reward of a task. The learner explores
+one-armed and two-armed tasks under different conditions, so that one method joins them:
 ``dual-process (EC1, EC4)`` is EC1 where a task has one arm and EC4 where it has two.
 """
 
@@ -15,14 +15,13 @@ import pandas as pd
 
 from coartic.analysis import methods
 from coartic.analysis.methods import EC1, EC3, EC4, is_search, is_setting, name_of
-from coartic.analysis.optima import gap_share, initial_reward, locks_base
+from coartic.analysis.optima import gap_share, locks_base
 from coartic.analysis.settings import compares_settings
 from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_run
 from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
 from coartic.analysis.words import marked, number, tally
 from coartic.estimates import standard_deviation
 from coartic.method import Information
-from coartic.tasks.optima import best_shipped
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward of each trial",
@@ -32,63 +31,24 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
 """Groups of methods by their use of the reward."""
 
 
-def optimum_in_words(study: Study) -> str:
-    """``optimum``, or ``best known reward`` where an optimum is not proven."""
-    proven = all(best.proven for best in study.optima.values())
-    return "optimum" if proven else "best known reward"
-
-
-@cached
-def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
-    """Rewards of the initial solution and of the optimum by task, where the optimum is better.
-
-    Without tasks where one of them is not known. The initial solution is the corrective process
-    alone with the task's initial hands, the optimum that with all joints free.
-    """
-    both = {
-        name: (initial_reward(study.tasks[name]), best.reward)
-        for name, best in study.optima.items()
-    }
-    return {name: pair for name, pair in both.items() if pair[0] < pair[1]}  # initial: NaN if none
-
-
-@cached
-def best_rewards(study: Study) -> dict[str, float]:
-    """The reward that gaps are to, by task: the optimum of :func:`initial_and_optimum`; where none
-    is known, the best of this folder with a free base, if there are two methods at least."""
-    best = {name: float(pair[1]) for name, pair in initial_and_optimum(study).items()}
-    for name in (name for name in study.tasks if name not in study.optima):
-        cells = [cell for (task, _), cell in study.cells.items() if task == name]
-        rewards = [c.rewards.max() for c in cells if len(c.good) and not locks_base(c.runs)]
-        if len(rewards) > 1 and max(rewards) < 0:
-            best[name] = max(rewards)
-    return {task: best[task] for task in study.tasks if task in best}
-
-
-def is_known(study: Study, task: str) -> bool:
-    """Whether more than runs of this folder that search for no optimum tells the best reward."""
-    best = study.optima.get(task)
-    return best is not None and (best.bound or best_shipped(study.tasks[task])) is not None
-
-
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """What gaps on these tasks are to: ``optimum``, ``best known reward``, or ``best of this
-    folder`` where no optimum is known."""
-    has_optimum = {is_known(study, task) for task in tasks}
-    if has_optimum == {True, False}:
-        return "best known reward or best of this folder"
-    return optimum_in_words(study) if True in has_optimum else "best of this folder"
+    """Return what gaps on these tasks are to: ``optimum`` where all are proven, ``best of this
+    folder`` where nothing else is known of any, or else ``best known reward``."""
+    best = [study.optima[task] for task in tasks]
+    if all(each.proven for each in best):
+        return "optimum"
+    return "best of this folder" if all(each.only_here for each in best) else "best known reward"
 
 
 @cached
 def labels_by_task(study: Study) -> dict[str, dict[str, str]]:
-    """Labels by task of every method, on tasks of :func:`best_rewards`.
+    """Labels by task of every method, on tasks with a best known reward.
 
     A method has its own label on all tasks; the learner's conditions together have several.
     """
     by_method: dict[str, dict[str, str]] = {}
     for task, label in study.cells:
-        if task in best_rewards(study):
+        if task in study.optima:
             by_method.setdefault(label, {})[task] = label
     one_armed = by_method.get(EC1, {})
     for more in (EC4, EC3):
@@ -121,13 +81,19 @@ def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
 
 @cached
 def common_tasks(study: Study) -> list[str]:
-    """The tasks that a mean is over: those with a known optimum, or all where there is none; where
-    no method ran on all of them, the first on which one did."""
-    tasks = list(initial_and_optimum(study) or best_rewards(study))
-    ran_on = [cells.keys() for cells in compared(study).values()]
-    if any(ran >= {*tasks} for ran in ran_on):
-        return tasks
-    return [task for task in tasks if any(task in ran for ran in ran_on)][:1]
+    """Return the tasks that a mean is over, which are all tasks unless too few methods ran on all.
+
+    Of the sets of tasks on which a method ran, the set with the most pairs of a task and an
+    algorithm that ran on the whole set.
+    """
+    ran_on = {method: {*cells} for method, cells in compared(study).items()}
+
+    def pairs(tasks: set[str]) -> tuple[int, int]:
+        ran = {methods.algorithm_of(method) for method, on in ran_on.items() if on >= tasks}
+        return len(tasks) * len(ran), len(tasks)
+
+    tasks = max(ran_on.values(), key=pairs, default=set())
+    return [task for task in study.tasks if task in tasks]
 
 
 @cached
@@ -135,7 +101,7 @@ def scores(study: Study) -> pd.DataFrame:
     """Return a row for each run of the compared methods, for :func:`coartic.analysis.ranking`.
 
     Columns ``method`` (label, or the learner's conditions together), ``task``, ``run``, ``seed``,
-    ``reward`` (NaN for a run without a solution) and ``best_known`` (:func:`best_rewards`).
+    ``reward`` (NaN for a run without a solution) and ``best_known``.
     """
     columns = ["method", "task", "run", "seed", "reward", "best_known"]
     parts = [
@@ -143,7 +109,7 @@ def scores(study: Study) -> pd.DataFrame:
             method=method,
             task=task,
             reward=cell.runs.reward.where(cell.runs.status == "ok").astype(float),
-            best_known=best_rewards(study)[task],
+            best_known=study.optima[task].reward,
         )[columns]
         for method, cells in compared(study).items()
         for task, cell in cells.items()
@@ -178,13 +144,11 @@ def groups(study: Study) -> dict[str, str]:
 
 
 def cell_gap(study: Study, cell: CellRuns) -> float:
-    """Gap of a cell's mean reward to the optimum, or to the best of this folder where none is
-    known; NaN without a reward."""
-    optimum = study.optima.get(cell.task)
-    best = optimum.reward if optimum else best_rewards(study).get(cell.task)
-    if not best or not len(cell.good) or locks_base(cell.runs):
+    """Gap of a cell's mean reward to the best known; NaN where either is missing."""
+    best = study.optima.get(cell.task)
+    if best is None or not len(cell.good) or locks_base(cell.runs):
         return math.nan
-    return float(gap_share(cell.rewards.mean(), best))
+    return float(gap_share(cell.rewards.mean(), best.reward))
 
 
 def failed_runs(cells: Iterable[CellRuns], consequence: str) -> str:

@@ -14,12 +14,12 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.words import marked, number, titled_apart
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
-@table("task, arms, base, initial, optimum, bound")
+@table("task, arms, base, initial, optimum, source, bound")
 def list_tasks(study: Study) -> Rows:
     """One row a task: initial and best possible reward."""
     for name, task in one_by_one(study).items():
@@ -30,9 +30,11 @@ def list_tasks(study: Study) -> Rows:
             "base": f"locked in {locked}" if locked else "free",
             "initial": initial_reward(task),
             "optimum": best.reward if best else None,
+            "source": best.source if best else None,
             "bound": best.bound if best else None,
+            "run_ids": best.run_id if best else "",
         }
-        yield name, row | runs_of()
+        yield name, row
 
 
 def how_long(study: Study) -> str:

@@ -6,10 +6,10 @@ from pathlib import Path
 import pandas as pd
 
 from coartic import load_task
+from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan
-from coartic.tasks.optima import KnownOptimum
 
 MADE_WITH = {
     "coartic": "0", "model_code": "code", "commit": {"id": "abc4567", "dirty": True},
@@ -40,7 +40,7 @@ def made_up_optima(*tasks):
     Whatever the shipped ones are: those of the two-armed tasks change with their goals.
     """
     best = {"ascending": -292, "two-armed-1": -465, "two-armed-2": -306}
-    return {task: KnownOptimum(best[task], best[task]) for task in tasks}
+    return {task: BestKnown(best[task], best[task]) for task in tasks}
 
 
 def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
