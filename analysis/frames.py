@@ -2,28 +2,110 @@
 
 The frame has a row for each run, with the columns ``method``, ``task``, ``reward`` (ticks, NaN for
 a run that failed) and ``best_known``, the best reward known of the task. ``load(folder).runs`` is
-such a frame.
+such a frame. Rewards are negative ticks; costs, as an ``Objective`` has them, are their negatives.
+A frame that cannot be meant so is refused in a sentence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
+from pandas.api.types import infer_dtype, is_hashable
 
 from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics import running_times
+from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
-from coartic.estimates import Estimate, mean
+from coartic.inputs import brief_value
+from coartic.runs.plan import label_of
+
+SCORES = ("reward", "best_known")
 
 
-def check_columns(frame: pd.DataFrame, *names: str) -> None:
-    """Raise CoarticError for a frame without one of some columns."""
-    missing = [name for name in names if name not in frame.columns]
-    if missing:
+def checked(
+    frame: pd.DataFrame,
+    *,
+    numbers: Sequence[str] = (),
+    names: Sequence[str] = (),
+    others: Sequence[str] = (),
+) -> pd.DataFrame:
+    """Return columns of a frame that a user made, the ``numbers`` as float64 with NaN for missing.
+
+    Raises CoarticError for what is no frame, a missing column, no rows, a missing name, and for
+    ``numbers`` that are text or infinite.
+    """
+    if not isinstance(frame, pd.DataFrame):
+        raise CoarticError(f"needed is a pandas.DataFrame; this is {brief_value(frame)}")
+    wanted = [*dict.fromkeys((*names, *others, *numbers))]
+    if missing := [name for name in wanted if name not in frame.columns]:
         raise CoarticError(f"the frame has no column {', '.join(missing)}")
+    if not len(frame):
+        raise CoarticError("the frame has no rows")
+    columns = frame[wanted].copy()
+    not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
+    for name in names:
+        refuse_rows(columns, name, columns[name].isna(), not_na)
+        is_list = ~columns[name].map(is_hashable).astype(bool)
+        refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
+    for name in numbers:
+        kind = infer_dtype(columns[name], skipna=True)
+        if kind not in ("integer", "floating", "mixed-integer-float", "empty"):
+            is_number = columns[name].map(lambda value: isinstance(value, (int, float)))
+            refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
+        columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
+        refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
+    return columns
+
+
+def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
+    """Raise CoarticError for the first row that is wrong, with its value and what is needed."""
+    if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
+        (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
+        raise CoarticError(
+            f"column {column} has {brief_value(value)} in row {brief_value(row)}: {needed}"
+        )
+
+
+def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
+    """Return checked columns with the ``gap`` of each row.
+
+    Raises CoarticError for rewards above 0 or above the best known, which is to be below 0.
+    """
+    for name in ("reward", "best_known"):
+        sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
+        refuse_rows(columns, name, columns[name] > 0, sign)
+    share = "a gap is a share of the best known reward, which has to be below 0"
+    refuse_rows(columns, "best_known", columns.best_known == 0, share)
+    excess = columns.reward - columns.best_known
+    known = "it is above best_known, which is to be the highest reward of the task"
+    refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), known)
+    return columns.assign(gap=gap_share(columns.reward, columns.best_known))
+
+
+def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
+    """Return a user's frame of methods on tasks, checked, with the ``gap`` of each row.
+
+    ``method`` has the setting besides where a method of the frame has several; ``task`` is
+    numbered. Raises CoarticError as :func:`checked` and :func:`with_gaps` do, and for several best
+    known rewards of one task. ``more``: other columns of numbers.
+    """
+    columns = checked(frame, names=("method", "task"), numbers=(*SCORES, *more))
+    columns = with_gaps(columns)
+    task, _ = pd.factorize(columns.task)
+    several = columns.best_known.groupby(task).transform("nunique") > 1
+    refuse_rows(columns, "task", several, "the task has several best_known; needed is one")
+    names = columns.method.to_numpy(object)
+    if "setting" in frame.columns:
+        settings = frame.setting.astype(object).where(frame.setting.notna(), "").astype(str)
+        several = settings.groupby(pd.factorize(names)[0]).transform("nunique") > 1
+        labels = np.array([*map(label_of, map(str, names), settings)], dtype=object)
+        names = np.where(several, labels, names)
+    return columns.assign(task=task, method=pd.Series(names, columns.index, dtype=object))
 
 
 def gaps(frame: pd.DataFrame) -> pd.Series:
@@ -32,18 +114,20 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     Parameters
     ----------
     frame : DataFrame
-        With columns ``reward`` and ``best_known``, ticks.
+        With columns ``reward`` and ``best_known``, negative ticks; NaN for a run that failed, and
+        where no reward is known.
 
     Returns
     -------
     Series
         (best known - reward) / \\|best known\\| of each row: 0.01 is 1 % more ticks than the best
-        known. NaN for a run that failed, and where no reward is known.
+        known. NaN where one of them is NaN.
 
     Raises
     ------
     CoarticError
-        For a frame without these columns.
+        For a frame without rows or one of these columns, for text, and for rewards above 0 (costs
+        are positive, rewards negative) or above the best known.
 
     Examples
     --------
@@ -51,12 +135,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     >>> gaps(frame).round(3).tolist()
     [0.038, 0.0]
     """
-    check_columns(frame, "reward", "best_known")
-    reward, best = (
-        frame[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
-        for name in ("reward", "best_known")
-    )
-    return pd.Series(gap_share(reward, best), frame.index, name="gap")
+    return with_gaps(checked(frame, numbers=SCORES)).gap
 
 
 def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
@@ -81,7 +160,8 @@ def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.
     Raises
     ------
     CoarticError
-        For a frame without one of the columns.
+        For a frame without rows or one of the columns, and for values of ``columns`` that are text
+        or infinite.
 
     Examples
     --------
@@ -91,9 +171,8 @@ def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.
     0  0     3  0.3      0.2      0.37
     1  1     3  0.1      0.1      0.10
     """
-    check_columns(frame, *by, *columns)
-    rows = []
-    for key, group in frame.groupby([*by], sort=False, dropna=False):
+    values, rows = checked(frame, numbers=columns, others=by), []
+    for key, group in values.groupby([*by], sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
         for name in columns:
             there = group[name].dropna().to_numpy(dtype=np.float64)
@@ -109,7 +188,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     frame : DataFrame
-        With columns ``method``, ``task``, ``reward`` and ``best_known``.
+        With columns ``method``, ``task`` (names, numbers or tuples), ``reward`` and ``best_known``
+        (negative ticks). Where it has a column ``setting``, a method with several settings has a
+        row for each, ``"cma-es/bandit noise=0.1"``.
 
     Returns
     -------
@@ -123,7 +204,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        For a frame without these columns.
+        As :func:`gaps` does, for missing names, and for several best known rewards of a task.
 
     Examples
     --------
@@ -137,22 +218,20 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     mine    0.021     2       0
     yours   0.062     1       0
     """
-    check_columns(frame, "method", "task", "reward", "best_known")
-    frame = frame.assign(gap=gaps(frame))
-    every = set(frame.task[frame.best_known.notna()])
-    rows = {}
-    for method, of_method in frame.groupby("method", sort=False):
+    frame = scored(frame)
+    every, rows = {*frame.task[frame.best_known.notna()]}, []
+    for _, of_method in frame.groupby("method", sort=False):
         solved = of_method[of_method.gap.notna()]
-        by_task = {str(task): runs.gap.to_numpy() for task, runs in solved.groupby("task")}
-        solved_all = by_task and set(by_task) == every
-        rows[method] = {
-            **(task_mean(by_task) if solved_all else Estimate(np.nan)).columns("gap"),
+        by_task = dict([*solved.groupby("task").gap])
+        solved_all = by_task and by_task.keys() == every
+        rows.append({
+            **(task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap"),
             "tasks": len(by_task),
             "runs": len(of_method),
             "failed": int(of_method.reward.isna().sum()),
-        }
-    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("method")
-    return table.sort_values("gap", kind="stable")
+        })  # fmt: skip
+    methods = pd.Index(frame.method.unique(), name="method", tupleize_cols=False)
+    return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
@@ -162,7 +241,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     ----------
     frame : DataFrame
         With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known``: a row each time a run became better, or one for its end.
+        ``best_known`` (negative ticks): a row each time a run became better, or one for its end.
+        Settings as in :func:`ranking`.
     targets : sequence of float
         Gaps to the best known that count as reached, such as ``[0.1, 0.05, 0.01]``.
 
@@ -171,11 +251,14 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     DataFrame
         A row at each number of trials at which a method's share rises: ``method``, ``trials``,
         ``share`` of all pairs of run and target (tasks count alike) that are reached within them.
+        Of a task on which a method has no run, and of a run without a reward, no target is reached.
+        A method that reaches no target has one row, of share 0 and infinite trials.
 
     Raises
     ------
     CoarticError
-        For a frame without these columns, and without targets.
+        As :func:`ranking` does, for trials below 1, for targets that are no gaps, and where no best
+        reward is known.
 
     Examples
     --------
@@ -188,17 +271,26 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     0   mine    40.0    0.5
     1   mine   900.0    1.0
     """
-    check_columns(frame, "method", "task", "run", "trials", "reward", "best_known")
-    if not len(targets):
-        raise CoarticError("targets are empty: name gaps, such as [0.1, 0.05, 0.01]")
-    frame = frame.assign(gap=gaps(frame))
-    rows = []
+    run = checked(frame, names=("run",)).run
+    frame = scored(frame, "trials").assign(run=run)
+    refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
+    reach = np.empty(0)
+    with suppress(TypeError, ValueError):  # no numbers
+        reach = np.asarray(targets, dtype=np.float64)
+    if reach.ndim != 1 or not reach.size or not (reach >= 0).all():
+        raise CoarticError(
+            f"targets are {brief_value(targets)}: needed are gaps, such as [0.1, 0.05, 0.01]"
+        )
+    if not frame.best_known.notna().any():
+        raise CoarticError("the frame has no best_known reward, so no targets")
+    every, rows = frame.task[frame.best_known.notna()].unique(), []
     for method, of_method in frame.groupby("method", sort=False):
-        times = [
-            np.array([[run.trials[run.gap <= target].min() for target in targets]
-                      for _, run in of_task.groupby("run")], dtype=np.float64)
-            for _, of_task in of_method.groupby("task")
-        ]  # fmt: skip
-        trials, share = running_times.share_by_budget(times)
-        rows.append(pd.DataFrame({"method": method, "trials": trials, "share": share}))
-    return pd.concat(rows, ignore_index=True)
+        times = []
+        for task in every:
+            runs = of_method[of_method.task == task].groupby("run")
+            reached = [[run.trials[run.gap <= gap].min() for gap in reach] for _, run in runs]
+            trials = np.array(reached or [[np.nan] * len(reach)], dtype=np.float64)
+            times.append(np.where(np.isnan(trials), np.inf, trials))
+        steps = zip(*running_times.share_by_budget(times), strict=True)
+        rows += [(method, *step) for step in steps]
+    return pd.DataFrame(rows, columns=["method", "trials", "share"])

@@ -137,10 +137,12 @@ def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     runs = runs.join(more[[name for name in more if name not in runs]])
     as_it_is = restrictions(runs).base == BASE  # other runs solve another task
     runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
-    runs["gap"] = gap_share(*(
-        runs[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
-        for name in ("reward", "best_known")
-    ))
+    runs["gap"] = gap_share(
+        *(
+            runs[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
+            for name in ("reward", "best_known")
+        )
+    )
     runs.attrs["units"] = UNITS
     return runs
 

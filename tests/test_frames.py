@@ -62,6 +62,103 @@ def test_a_method_that_lacks_a_task_or_failed_on_it_is_not_ranked():
         frames.gaps(frame.drop(columns="best_known"))
 
 
+def small_frame(**changes):
+    """Two methods with a run each on one task."""
+    frame = pd.DataFrame({"method": ["a", "b"], "task": "t", "run": 0, "trials": [1, 9],
+                          "reward": [-300, -310], "best_known": -292})  # fmt: skip
+    return frame.assign(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"reward": [300, 380], "best_known": 292}, "reward has 300.0 in row 0: a reward is minus"),
+        ({"best_known": 292}, "best_known has 292.0 in row 0: a reward is minus"),
+        ({"reward": [-300, -291]}, "reward has -291.0 in row 1: it is above best_known"),
+        ({"best_known": [-292, -200]}, "task has 't' in row 0: the task has several best_known"),
+        ({"best_known": 0}, "best_known has 0.0 in row 0: a gap is a share"),
+        ({"reward": ["-300", "-310"]}, "reward has '-300' in row 0: needed are numbers"),
+        ({"reward": [-300, -np.inf]}, "reward has -inf in row 1: needed are finite numbers"),
+        ({"method": ["a", None]}, "method has nan in row 1: needed is a name"),
+        ({"task": [np.nan, "t"]}, "task has nan in row 0: needed is a name"),
+        ({"task": [["t"], ["t"]]}, "task has .'t'. in row 0: needed is a name, a number or a tup"),
+    ],
+)
+def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
+    for compute in (frames.ranking, lambda frame: frames.ecdf(frame, [0.1])):
+        with pytest.raises(coartic.CoarticError, match=words):
+            compute(small_frame(**changes))
+
+
+@pytest.mark.parametrize(
+    ("compute", "words"),
+    [
+        (frames.gaps, "no column reward"),
+        (frames.ranking, "no column method, task, reward"),
+        (lambda frame: frames.ecdf(frame, [0.1]), "no column run"),
+        (lambda frame: frames.means(frame, ["method"], ["reward"]), "no column method, reward"),
+    ],
+)
+def test_what_is_no_frame_of_results_is_refused(compute, words):
+    with pytest.raises(coartic.CoarticError, match="no rows"):
+        compute(small_frame()[:0])
+    with pytest.raises(coartic.CoarticError, match=r"needed is a pandas.DataFrame; this is \[1\]"):
+        compute([1])
+    with pytest.raises(coartic.CoarticError, match=words):
+        compute(pd.DataFrame({"best_known": [-292]}))
+
+
+def test_trials_targets_and_numbers_are_checked():
+    for trials in ([0, 9], [np.nan, 9]):
+        with pytest.raises(coartic.CoarticError, match=r"trials has (0.0|nan) in row 0"):
+            frames.ecdf(small_frame(trials=trials), [0.1])
+    with pytest.raises(coartic.CoarticError, match="run has nan in row 1"):
+        frames.ecdf(small_frame(run=[0, None]), [0.1])
+    for targets in ([], 0.1, [-0.1], ["a"], [np.nan]):
+        with pytest.raises(coartic.CoarticError, match="targets are"):
+            frames.ecdf(small_frame(), targets)
+    for values in (["x", "y"], [np.inf, 1]):
+        with pytest.raises(
+            coartic.CoarticError, match=r"number has ('x'|inf) in row 0: needed are"
+        ):
+            frames.means(small_frame(number=values), ["method"], ["number"])
+
+
+@pytest.mark.parametrize(
+    "tasks", [[1, 2], [(1, 2), (1, 3)], ["x", 2], pd.Categorical([1, 2]), [1.5, 2.5]]
+)
+def test_tasks_are_names_numbers_tuples_or_categories(tasks):
+    frame = pd.concat([small_frame(method=name, task=tasks) for name in ("mine", 2)])
+    ranked = frames.ranking(frame)
+    assert ranked.index.tolist() == ["mine", 2]
+    assert ranked.gap.tolist() == pytest.approx([13 / 292] * 2)
+    assert ranked.tasks.tolist() == [2, 2]
+    assert frames.ecdf(frame, [0.04]).share.tolist() == [0.5, 0.5]
+
+
+def test_a_method_with_several_settings_has_a_row_for_each():
+    """Missing and empty are the default."""
+    frame = small_frame(method="a", setting=["", "h=2"])
+    frame = pd.concat([frame, small_frame(method=["b", "a"], setting=["h=1", None])])
+    ranked = frames.ranking(frame.reset_index(drop=True))
+    assert ranked.gap.round(4).to_dict() == {"b": 0.0274, "a": 0.0445, "a h=2": 0.0616}
+    assert ranked.runs.to_dict() == {"b": 1, "a": 2, "a h=2": 1}
+    assert [*frames.ecdf(frame, [0.1]).method.unique()] == ["a", "a h=2", "b"]
+
+
+def test_a_task_that_a_method_lacks_is_not_reached():
+    """Nor is anything of a run without a reward; a method that reaches nothing has a row."""
+    both = small_frame(method="both", task=["easy", "hard"], best_known=[-300, -200])
+    easy, none = both[:1].assign(method="easy"), both.assign(method="none", reward=np.nan)
+    curves = frames.ecdf(pd.concat([both, easy, none]), [0.05])
+    assert curves.set_index("method").share.to_dict() == {"both": 0.5, "easy": 0.5, "none": 0.0}
+    assert np.isinf(curves.trials[curves.method == "none"]).all()
+    unknown = small_frame(task=["easy", "unknown"], method="a", best_known=[-300, np.nan])
+    assert frames.ecdf(unknown, [0.05]).share.tolist() == [1.0]
+    with pytest.raises(coartic.CoarticError, match="no best_known"):
+        frames.ecdf(unknown.assign(best_known=np.nan), [0.05])
+
+
 def test_verdicts_of_planted_means(monkeypatch):
     monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
     rng = np.random.default_rng(2)

@@ -21,6 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import estimates
+from coartic.analysis.frames import checked
 from coartic.analysis.methods import KNOWN_METHODS, is_built_in, look_alike
 
 INCH = 25.4  # mm
@@ -174,7 +175,13 @@ def means(
         Width of the intervals, points.
     **line
         Looks of the line and its marks, as Matplotlib's ``plot`` takes them.
+
+    Raises
+    ------
+    CoarticError
+        For a frame without rows or one of the columns, and for text in the place of numbers.
     """
+    checked(frame, numbers=[x, y], others=[by] * bool(by))
     groups = frame.groupby(by, sort=False) if by else [("", frame)]
     for number, (color, (name, rows)) in enumerate(
         zip(itertools.cycle(PALETTE), groups, strict=False)

@@ -15,7 +15,7 @@ of the others differs by a factor of ten between tasks.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,13 +31,13 @@ Scores = Mapping[str, Sequence[Runs]]
 """Scores of the runs on each instance, by family."""
 
 
-def task_mean(values: Mapping[str, ArrayLike]) -> Estimate:
+def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     """Mean over given tasks of the mean over runs, with stratified BCa interval."""
 
     def statistic(*strata: Array, axis: int = -1) -> Array:
         return np.asarray(sum(runs.mean(axis) for runs in strata) / len(strata))
 
-    return estimates.bootstrap_estimate(tuple(map(estimates.vector, values.values())), statistic)
+    return estimates.bootstrap_estimate(tuple(map(estimates.vector, values)), statistic)
 
 
 def value(runs: Runs) -> float:

@@ -42,10 +42,13 @@ def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Budgets at which the share of targets reached rises, and the share from there on."""
+    """Budgets at which the share of targets reached rises, and the share from there on; an infinite
+    budget and a share of 0 where none is reached."""
     values, weights, _ = pairs(times)
-    last = np.append(values[1:] != values[:-1], True)[: len(values)]
-    return values[last], np.cumsum(weights)[last]
+    if not len(values):
+        return np.array([math.inf]), np.zeros(1)
+    last = np.append(values[1:] != values[:-1], True)
+    return values[last], np.minimum(np.cumsum(weights)[last], 1.0)  # 1 but for rounding
 
 
 def share_reached(times: RunningTimes) -> float:

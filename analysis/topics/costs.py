@@ -152,8 +152,7 @@ def runtimes(
         for spend in SPENDS:
             times = [times_of(study, cell, spend, tuple(shares.tolist())) for cell in cells]
             if all(map(len, times)):
-                budgets, reached = map(np.ndarray.tolist, running_times.share_by_budget(times))
-                steps = zip(budgets or [np.inf], reached or [0.0], strict=True)
+                steps = zip(*running_times.share_by_budget(times), strict=True)
                 rows += [(name, spend, *step) for step in steps]
     return pd.DataFrame(rows, columns=["method", "spend", "budget", "share"])
 

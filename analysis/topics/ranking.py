@@ -155,7 +155,7 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
     that only one of them has do not count, unlike in the table ``against-learner``.
     """
     frame = scores.scores(study)
-    frame = frame.assign(gap=frames.gaps(frame))
+    frame = frame.assign(gap=gap_share(frame.reward, frame.best_known))
     differences = []
     for task in scores.common_tasks(study):
         of_task = frame[frame.task == task]
