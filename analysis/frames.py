@@ -40,7 +40,7 @@ def checked(
     ``numbers`` that are text or infinite.
     """
     if not isinstance(frame, pd.DataFrame):
-        raise CoarticError(f"needed is a pandas.DataFrame; this is {brief_value(frame)}")
+        raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
     wanted = [*dict.fromkeys((*names, *others, *numbers))]
     if missing := [name for name in wanted if name not in frame.columns]:
         raise CoarticError(f"the frame has no column {', '.join(missing)}")

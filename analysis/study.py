@@ -86,10 +86,16 @@ MOST_EXECUTED = 500
 def cached(
     function: Callable[Concatenate[Study, Asked], Computed],
 ) -> Callable[Concatenate[Study, Asked], Computed]:
-    """A function of a study that computes its result once for each study and its arguments."""
+    """A function of a study that computes its result once for each study and its arguments.
+
+    It raises CoarticError for what is no study, such as a folder.
+    """
 
     @wraps(function)
     def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
+        if not isinstance(study, Study):
+            needed = "needed is a study, as coartic.analysis.load(folder) returns it"
+            raise CoarticError(f"{needed}, not a {type(study).__name__}")
         key = function, args, tuple(named.items())
         if key not in study._computed:
             study._computed[key] = function(study, *args, **named)

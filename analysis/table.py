@@ -34,7 +34,9 @@ class Column(NamedTuple):
 
 COLUMNS = {
     name: Column(**row)
-    for name, row in tomllib.loads(Path(__file__).with_name("columns.toml").read_text()).items()
+    for name, row in tomllib.loads(
+        Path(__file__).with_name("columns.toml").read_text("utf-8")
+    ).items()
 }
 """Headers and formats of columns; other columns go by their names."""
 

@@ -87,9 +87,8 @@ def commit_of_checkout() -> dict[str, Any] | None:
 
     def git(*arguments: str) -> str:
         command = ["git", "-C", str(PACKAGE.parent), *arguments]
-        return subprocess.check_output(
-            command, stderr=subprocess.DEVNULL, text=True, timeout=20, env=clean
-        ).strip()
+        said = subprocess.check_output(command, stderr=subprocess.DEVNULL, timeout=20, env=clean)
+        return os.fsdecode(said).strip()
 
     try:
         if Path(git("rev-parse", "--show-toplevel")).resolve() != PACKAGE.parent.resolve():

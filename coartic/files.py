@@ -105,15 +105,17 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """A file or folder by its name. Raises CoarticError for an empty name, which is not the current
-    folder, and for one that nothing can have."""
+    """A file or folder by its name. Raises CoarticError for what is no name, for an empty name,
+    which is not the current folder, and for one that nothing can have."""
+    if not isinstance(name, str | os.PathLike):
+        raise CoarticError(f"{what} is {plain(repr(name), 80)}: needed is a text or a path")
     if isinstance(name, str) and not name.strip():
         raise CoarticError(f"{what} is empty; the current folder is .")
     try:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError, PermissionError):
             os.lstat(name)  # ValueError: a NUL in the name
         return Path(name)
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise CoarticError(f"{what} {plain(repr(name), 80)} cannot be used: {reason}") from None
 

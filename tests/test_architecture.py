@@ -158,6 +158,37 @@ def test_names_need_no_compiler(command, said, unneeded):
     assert not imported & ({"numba", "pandas", "matplotlib"} | unneeded)
 
 
+def has_encoding(call):
+    """Whether a call that reads or writes text names the encoding; all other calls have it."""
+    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+    keywords = {keyword.arg: keyword.value for keyword in call.keywords}
+    if keywords.keys() & {"encoding", "errors"} or name not in (
+        "open", "read_text", "write_text", "run", "check_output", "Popen"
+    ):  # fmt: skip
+        return True
+    if name in ("read_text", "write_text"):
+        return len(call.args) > (name == "write_text")
+    if name == "open":
+        if ast.unparse(call.func) in ("os.open", "webbrowser.open"):
+            return True
+        place = 1 if isinstance(call.func, ast.Name) else 0
+        mode = call.args[place] if len(call.args) > place else keywords.get("mode")
+        return isinstance(mode, ast.Constant) and "b" in str(mode.value)
+    return "text" not in keywords and "universal_newlines" not in keywords
+
+
+def test_texts_are_read_and_written_in_an_encoding_that_is_named():
+    """Else a locale decides, and a dagger ends a report."""
+    calls = ["x.read_text()", "x.write_text('')", "open(x)", "open(x, 'w')", "x.open()"]
+    assert not any(has_encoding(ast.parse(text).body[0].value) for text in calls)
+    calls = ["x.read_text('utf-8')", "open(x, 'rb')", "x.open('xb')", "open(x, encoding='ascii')"]
+    assert all(has_encoding(ast.parse(text).body[0].value) for text in calls)
+    for path in sources():
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.Call):
+                assert has_encoding(node), f"{path}, line {node.lineno}"
+
+
 def test_one_kinematic_module():
     """No cosine or sine is taken outside the robot, the functions handed to it, and the referee."""
     home = {"coartic/robot.py", "coartic/motion/trigonometry.py", "analysis/verify.py"}

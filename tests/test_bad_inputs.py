@@ -4,9 +4,13 @@ import os
 from functools import partial
 from pathlib import Path
 
+import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from coartic import CoarticError, builtin_tasks, load_task
+from coartic.analysis.figures import picture
+from coartic.analysis.sections import FIGURES, TABLES
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER, load_suite, select_cells
@@ -214,9 +218,22 @@ def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
     assert len(line) < 700
 
 
+@pytest.mark.parametrize("what", [*TABLES.values(), *FIGURES.values()])
+def test_tables_and_figures_are_of_a_study(what):
+    with pytest.raises(CoarticError, match="needed is a study, as .* returns it, not a str"):
+        what("folder")
+    with pytest.raises(CoarticError, match="needed is a study, as .* returns it, not a DataFrame"):
+        what(pd.DataFrame({"reward": [-300]}))
+
+
+def test_a_picture_has_an_ending():
+    with pytest.raises(CoarticError, match=r"a picture ends in .svg, .pdf, .png; not in '.bmp'"):
+        picture(Figure(), ".bmp")
+
+
 @pytest.mark.parametrize("name", ["a" * 5000, "x\0y", 3, None])
 def test_a_folder_that_cannot_be(name):
-    with pytest.raises(CoarticError, match=r"'?.* cannot be used: ") as caught:
+    with pytest.raises(CoarticError, match="cannot be used: |(3|None): needed is a text") as caught:
         run_suite("paper", name, tasks=["ascending"], methods=["EC1"], runs=1)
     assert len(str(caught.value)) < 300
 

@@ -77,6 +77,21 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
 
 def test_a_table_is_copied_for_a_spreadsheet_and_two_methods_are_compared(opened, traced):
     page = opened(permissions=["clipboard-read", "clipboard-write"])
+    name = page.locator("#table-ranking tbody td").first
+    formula = name.inner_text()
+    for text, due in (
+        ("=1", "'=1"),
+        ("@x", "'@x"),
+        ("-x", "'-x"),
+        ("−1.5", "-1.5"),
+        (formula, formula),
+    ):
+        name.evaluate("(cell, text) => { cell.textContent = text; }", text)
+        page.locator("#table-ranking").locator("xpath=../preceding-sibling::p[1]/button").click()
+        page.wait_for_function(
+            "due => navigator.clipboard.readText().then((text) => text.includes(`\\n${due}\\t`))",
+            arg=due,
+        )
     page.locator("#table-ranking").locator("xpath=../preceding-sibling::p[1]/button").click()
     page.get_by_text("rows are in the clipboard").wait_for()
     lines = page.evaluate("navigator.clipboard.readText()").split("\n")

@@ -221,6 +221,26 @@ def call_apart(place, command):
 
 
 @pytest.mark.process
+def test_a_locale_changes_no_report(tmp_path, coartic, in_this_process):
+    """Also one whose encoding lacks daggers and minus signs."""
+    (tmp_path / "mine.toml").write_text(f'title = "Grüße †"\n{GOOD}', "utf-8")
+    runs, task = tmp_path / "runs", tmp_path / "mine.toml"
+    assert coartic(*SMALL[:2], "--tasks", f"ascending,{task}", *SMALL[4:], "--out", runs)[0] == 0
+    assert coartic("report", runs, "--out", tmp_path / "here")[0] == 0
+    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    subprocess.run(
+        [sys.executable, "-m", "coartic", "report", runs, "--out", tmp_path / "there"],
+        env=os.environ | locale | {"PYTHONPATH": str(ROOT)}, check=True, capture_output=True,
+    )  # fmt: skip
+    here, there = (
+        {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*.*")}
+        for folder in (tmp_path / "here", tmp_path / "there")
+    )
+    assert here == there
+    assert "Grüße †".encode() in here[Path("report.html")]
+
+
+@pytest.mark.process
 def test_modules_in_the_working_folder_are_not_imported(tmp_path):
     """By no process of a command that is installed, whatever a stranger has put there."""
     program, gift = tmp_path / "bin" / "program.py", tmp_path / "gift"

@@ -13,8 +13,10 @@ from coartic.analysis.claims.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics import instances
+from coartic.analysis.study import tidy
 from coartic.analysis.words import p_value
 from coartic.benchmarks import run_suite
+from tests.support.made_up import plan_for, row
 
 
 @pytest.mark.parametrize("module", [context_tests, frames, instances, judging, pages])
@@ -102,7 +104,7 @@ def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
 def test_what_is_no_frame_of_results_is_refused(compute, words):
     with pytest.raises(coartic.CoarticError, match="no rows"):
         compute(small_frame()[:0])
-    with pytest.raises(coartic.CoarticError, match=r"needed is a pandas.DataFrame; this is \[1\]"):
+    with pytest.raises(coartic.CoarticError, match="needed is a pandas.DataFrame, not a list"):
         compute([1])
     with pytest.raises(coartic.CoarticError, match=words):
         compute(pd.DataFrame({"best_known": [-292]}))
@@ -213,6 +215,17 @@ def test_one_task_refutes_no_claim():
     others = judge({"": ("", "", mean_beyond("{}", CARRIED[:-1]))}).loc[""]
     assert opposite.opposite_p_holm == others.p_holm > 0.05
     assert opposite.verdict == "undecided"
+
+
+def test_runs_with_another_base_have_no_gap():
+    """They solve another task, and may better the best known of this one."""
+    rows = [row("one", -300, task="ascending"),
+            row("one", -250, task="ascending", run=1, parameters='{"base": ""}')]  # fmt: skip
+    runs = pd.DataFrame(rows).astype({"proven_bound": "Int64"})
+    tidied = tidy(runs, plan_for([coartic.load_task("ascending")], runs))
+    assert tidied.best_known.tolist() == [-292, pd.NA]
+    assert tidied.gap.tolist() == pytest.approx([8 / 292, np.nan], nan_ok=True)
+    assert frames.ranking(tidied).gap.tolist() == pytest.approx([8 / 292])
 
 
 def test_runs_are_tidy(tmp_path):

@@ -161,6 +161,20 @@ def test_text_from_files_is_escaped():
     assert r"\textbackslash{}input\textbraceleft{}x\textbraceright{}" in latex
 
 
+@pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
+def test_no_text_is_a_formula_of_a_spreadsheet(text, tmp_path):
+    """And it is read as it was; numbers stay numbers."""
+    frame = pd.DataFrame(
+        {"method": [text, "a=b"], "reward": [-1.5, -2], "run_ids": ["", "x"]},
+        index=pd.Index([f"{text} row", "other"], name="row"),
+    )
+    path = tmp_path / "methods.csv"
+    path.write_text(render.table_csv(frame), "utf-8")
+    cells = [line.split(",") for line in path.read_text("utf-8").splitlines()]
+    assert cells[1:] == [[f"'{text} row", f"'{text}", "-1.5", ""], ["other", "a=b", "-2.0", "x"]]
+    pd.testing.assert_frame_equal(rows_of(path).fillna(""), frame, check_dtype=False)
+
+
 def test_a_report_is_not_written_through_a_link(traced, tmp_path):
     study = replace(traced, folder=tmp_path / "results")
     study.folder.mkdir()

@@ -18,6 +18,8 @@ from coartic.analysis.figures import style
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import RECONSTRUCTED, id_of
+from coartic.errors import CoarticError
+from coartic.inputs import brief_value
 from coartic.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
@@ -85,8 +87,10 @@ def picture(drawing: Figure, ending: str) -> bytes:
     """A figure as a file with this ending, one of :data:`FORMATS`.
 
     The same figure gives the same bytes on machines with the same fonts: ids are salted, no date is
-    written.
+    written. Raises CoarticError for another ending.
     """
+    if ending not in FORMATS:
+        raise CoarticError(f"a picture ends in {', '.join(FORMATS)}; not in {brief_value(ending)}")
     stream, dated = io.BytesIO(), {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}
     with rc_context(style.RC):
         drawing.savefig(stream, format=ending[1:], dpi=300, metadata={dated[ending]: None})

@@ -18,7 +18,14 @@ from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
-from coartic.analysis.report.render import IN_LATEX, MOST_ROWS, TONES, html_table, latex_table
+from coartic.analysis.report.render import (
+    IN_LATEX,
+    MOST_ROWS,
+    TONES,
+    html_table,
+    latex_table,
+    table_csv,
+)
 from coartic.analysis.report.trace import stamp
 from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.study import Study, cached
@@ -69,7 +76,7 @@ def files_of_table(name: str, for_paper: bool, study: Study) -> dict[str, bytes]
     frame = TABLES[name](study)
     if not len(frame):
         return {}
-    files = {f"tables/{name}.csv": frame.to_csv(lineterminator="\n").encode()}
+    files = {f"tables/{name}.csv": table_csv(frame).encode()}
     if for_paper and name in IN_LATEX and len(frame) <= MOST_ROWS:
         (caption,) = (each.caption for each in SECTIONS if id_of(each.table) == name)
         text = latex_table(frame, name, caption, about.notes_of(study, frame.columns))

@@ -54,10 +54,11 @@
       status.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";
     };
     tools.addEventListener("input", show);
-    /* Rows in sight, for a spreadsheet: tabs between cells, a plain minus, thousands not apart. */
+    /* Rows in sight, for a spreadsheet: tabs between cells, a plain minus, thousands not apart, and an apostrophe before
+       text that it would take for a formula. */
     tools.querySelector("button").addEventListener("click", async () => {
       const rows = [...table.rows].filter((row) => !row.hidden);
-      const plain = (cell) => cell.innerText.replace(/\u202f/g, "").replace(/−/g, "-").replace(/\s+/g, " ").trim();
+      const plain = (cell) => cell.innerText.replace(/\u202f/g, "").replace(/−/g, "-").replace(/\s+/g, " ").trim().replace(/^(?=[=+@]|-(?!\d))/, "'");
       await navigator.clipboard.writeText(rows.map((row) => [...row.cells].map(plain).join("\t")).join("\n"));
       status.textContent = `${rows.length - 1} rows are in the clipboard`;
     });

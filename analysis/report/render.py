@@ -11,6 +11,7 @@ import math
 import textwrap
 from collections.abc import Sequence
 from fnmatch import fnmatch
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -52,8 +53,21 @@ IN_LATEX = {
     "methods": "task, method, runs, reward, gap, hands, trials",
 }
 """Tables for a paper, and their columns, which fit the width of a text; others are CSV alone."""
+FORMULA = ("=", "+", "-", "@")
+"""Beginnings of text that spreadsheets compute."""
 MOST_ROWS = 50
 """Rows of a table on one page; a longer one is CSV alone."""
+
+
+def table_csv(frame: pd.DataFrame) -> str:
+    """Return a table as CSV, with an apostrophe before text that a spreadsheet would take for a
+    formula; :func:`.trace.rows_of` reads it."""
+    return frame.map(guarded).rename(index=guarded).to_csv(lineterminator="\n")
+
+
+def guarded(value: Any) -> Any:
+    """Return a value; text that a spreadsheet would take for a formula behind an apostrophe."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
 def column_of(name: str) -> Column:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from coartic import CoarticError, Task
 from coartic.analysis.methods import name_of
-from coartic.analysis.report.render import columns_of, is_number, texts_of
+from coartic.analysis.report.render import columns_of, guarded, is_number, texts_of
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.words import NONE, marked, number
 from coartic.runs.plan import hash_of, label_of
@@ -40,9 +41,15 @@ def rows_of(table: Path) -> pd.DataFrame:
         frame = pd.read_csv(table, index_col="row", keep_default_na=False, na_values=[""])
         if "run_ids" not in frame or not frame.index.is_unique:
             raise ValueError("its rows do not name runs")
+        frame = frame.map(unguarded).rename(index=unguarded)
     except ValueError as error:
         raise CoarticError(f"{table} is no table of a report: {plain(str(error))}") from None
     return frame
+
+
+def unguarded(value: Any) -> Any:
+    """Return a value without the apostrophe that :func:`.render.guarded` puts before it."""
+    return value[1:] if isinstance(value, str) and value == guarded(value[1:]) else value
 
 
 def stamp(runs: pd.DataFrame) -> str:

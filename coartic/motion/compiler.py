@@ -161,7 +161,7 @@ class MachineCode(FunctionCache):
     is compiled again in the next process.
     """
 
-    lock: IO[str] | None = None
+    lock: IO[bytes] | None = None
     """Held while this process compiles."""
 
     def load_overload(self, *wanted: Any) -> Any:
@@ -197,7 +197,7 @@ class MachineCode(FunctionCache):
         with contextlib.suppress(ImportError, OSError):
             import fcntl
 
-            file = open(f"{self.cache_path}/{self._py_func.__name__}.lock", "w")  # noqa: SIM115
+            file = open(f"{self.cache_path}/{self._py_func.__name__}.lock", "wb")  # noqa: SIM115
             for _ in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
                 with contextlib.suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
