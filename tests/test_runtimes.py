@@ -68,7 +68,7 @@ def test_what_cannot_be_shown(study, tmp_path):
     for targets in ([], [0.0], [0.5, 1.01], [math.nan], [[0.5]], None):
         with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):
             runtimes(study, targets=targets)
-    with pytest.raises(CoarticError, match="no task has a known optimum"):
+    with pytest.raises(CoarticError, match="no task has a best known reward"):
         runtimes(MadeUp(study, optima={}))
     with pytest.raises(CoarticError, match="there is no folder"):
         runtimes(tmp_path / "nowhere")
