@@ -18,9 +18,9 @@ from pandas.api.types import infer_dtype, is_hashable
 
 from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics import running_times
-from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
+from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.inputs import brief_value
 from coartic.runs.plan import label_of
 
