@@ -49,6 +49,7 @@ TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
+# For type checkers, which take an array of unknown shape for one point.
 Vector = np.ndarray[tuple[int], np.dtype[Any]]
 Matrix = np.ndarray[tuple[int, int], np.dtype[Any]]
 CHUNK = 8192
