@@ -56,14 +56,14 @@ def shipped_hashes() -> dict[str, str]:
 
 def differences(folder: Path) -> Iterator[str]:
     """Yield a sentence for each shipped run that a folder lacks or has another result of, whichever
-    code made them, and for each method of the folder whose code is not that of this version."""
+    code made it. Raises CoarticError where other code than this made the folder."""
     from coartic.benchmarks.registry import built_in
     from coartic.benchmarks.reproduce import compare_runs
 
     with open_store(folder) as made:
         for name, card in made.plan().methods.items():
             if name not in built_in() or built_in()[name].code != card.code:
-                yield f"the code of method {name} is not {card.code} now: run the suite again"
+                raise CoarticError(f"{folder}: other code of {name} made it: run the suite again")
         if (suite := made.plan().suite) not in shipped_hashes():
             return
         ids = {run_id.partition("-")[0]: run_id for run_id in made.runs().run_id}
@@ -97,7 +97,10 @@ def main() -> int:
     parser.add_argument("--changed", action="store_true", help="pack results that have changed")
     parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")
     given = parser.parse_args()
-    changes = {folder: list(differences(folder)) for folder in given.folders}
+    try:
+        changes = {folder: list(differences(folder)) for folder in given.folders}
+    except CoarticError as error:
+        parser.error(str(error))
     for folder, sentences in changes.items():
         print(f"{folder}: {len(sentences) or 'no'} differences to what is shipped")
         for sentence in sentences[:_SHOWN]:
