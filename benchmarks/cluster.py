@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from coartic.benchmarks.pool import Crew, Local, errors_of_files
+from coartic.benchmarks.pool import Crew, Local
 from coartic.benchmarks.provenance import current_environment
 from coartic.benchmarks.registry import current_code
 from coartic.benchmarks.worker import Job, Outcome, fail
@@ -108,14 +108,17 @@ _kept = threading.local()
 
 def _remote(job: Job) -> list[Outcome]:
     """Perform a job on a worker's machine, in a process that ends with its limit."""
+    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.method
     here = current_code(method.where, method.name)
     if here != method.code:
         words = f"method {method.name!r} has code {here} on a Dask worker and {method.code} where "
         raise CoarticError(f"{words}the suite was started; install the same version everywhere")
-    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
-    with errors_of_files():
-        if not hasattr(_kept, "crew"):
-            _kept.crew = Crew(Local(1), stays=True)
+    if not hasattr(_kept, "crew"):
+        _kept.crew = Crew(Local(1), stays=True)
+    try:
         ((_, outcomes),) = _kept.crew.perform([job])
+    except CoarticError:  # such as a folder that is gone
+        del _kept.crew
+        raise
     return [replace(outcome, environment=current_environment()) for outcome in outcomes]

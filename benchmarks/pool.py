@@ -72,18 +72,18 @@ class Local:
         """Each job with its outcomes, as they come; by one process, those of a method in order.
 
         Raises CoarticError where one process after another ends before it begins a job, and where
-        their temporary files cannot be kept.
+        their answers have no place.
         """
-        with errors_of_files(), closing(Crew(self)) as crew:
+        with closing(Crew(self)) as crew:
             yield from crew.perform(jobs)
 
 
 class Crew:
-    """Worker processes and the folder of their answers, until it is closed."""
+    """Worker processes and the folder of their answers, until it is closed. If it ``stays``, a
+    process that is done waits for more jobs of its method."""
 
     def __init__(self, local: Local, *, stays: bool = False) -> None:
         self.local, self.stays = local, stays
-        """Whether a process that is done waits for more jobs of its method."""
         self.folder = tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True)
         self._idle: Worker | None = None
 
@@ -94,8 +94,7 @@ class Crew:
         self.folder.cleanup()
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Each job with its outcomes, as in :meth:`Local.perform`. Raises OSError where temporary
-        files cannot be kept."""
+        """Each job with its outcomes, as in :meth:`Local.perform`."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.method.key].append(job)
@@ -143,18 +142,25 @@ class Crew:
                     rest = list(worker.jobs)  # what is repeated is so alone: answers may be lost
                     alone = 1 if rest and id(rest[0]) in repeated else 0
                     waiting.extendleft(part for part in (rest[alone:], rest[:alone]) if part)
+        except OSError as error:
+            place = f" ({error.filename})" if error.filename else ""
+            raise CoarticError(
+                f"worker processes have no place for answers: {error.strerror or error}{place}. "
+                "Finished runs are kept: repeat the command, with a TMPDIR that has room"
+            ) from None
         finally:
             for worker in crew:
                 worker.end()
 
     def worker_for(self, jobs: Sequence[Job]) -> Worker:
         """The process that waits, if it has run their method; else a new one."""
-        waits, self._idle = self._idle, None
-        if waits is not None and waits.method == jobs[0].method.key:
+        method, waits = jobs[0].method.key, self._idle
+        self._idle = None
+        if waits is not None and waits.method == method:
             return waits
         if waits is not None:
             waits.end()
-        return Worker(self.folder.name, jobs[0].method.key, self.local)
+        return Worker(self.folder.name, method, self.local)
 
     def check_room(self) -> None:
         """Raises OSError where the folder is gone or full: a process that ended may have ended
@@ -162,19 +168,6 @@ class Crew:
         place = Path(self.folder.name, "room")
         place.write_bytes(bytes(_ROOM))
         place.unlink()
-
-
-@contextlib.contextmanager
-def errors_of_files() -> Iterator[None]:
-    """Raises CoarticError for an OSError."""
-    try:
-        yield
-    except OSError as error:
-        where = f" ({error.filename})" if error.filename else ""
-        raise CoarticError(
-            f"worker processes have no place for answers: {error.strerror or error}{where}. "
-            "Finished runs are kept: repeat the command, with another TMPDIR if this one is full"
-        ) from None
 
 
 class Worker:

@@ -9,19 +9,20 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from inspect import signature
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
+from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
-from coartic.benchmarks.worker import Job, Outcome
+from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.inputs import brief_value
@@ -29,19 +30,6 @@ from coartic.runs.plan import Plan, Specification, trials_in
 from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
 from coartic.text import counted, unknown
-
-
-@runtime_checkable
-class Executor(Protocol):
-    """Where methods run: :class:`coartic.benchmarks.pool.Local` or
-    :class:`coartic.benchmarks.cluster.Dask`."""
-
-    workers: int
-    """How many jobs it performs at once."""
-
-    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Each job with its outcomes, as they come."""
-
 
 _EXECUTORS = {
     "jobs": "Local(jobs) of coartic.benchmarks.pool",
@@ -136,7 +124,7 @@ def run_suite(
     suite: str | Path | Suite,
     folder: str | Path,
     *,
-    executor: Executor | None = None,
+    executor: Local | Dask | None = None,
     watch: Watcher | None = None,
     **options: Any,
 ) -> Progress:
@@ -181,7 +169,7 @@ def perform(
     plan: Plan,
     folder: str | Path,
     *,
-    executor: Executor | None = None,
+    executor: Local | Dask | None = None,
     watch: Watcher | None = None,
 ) -> Progress:
     """Perform what a results folder lacks of a plan.
@@ -215,7 +203,7 @@ def perform(
     folder, clock = folder_named(folder), time.perf_counter()
     watch = watch or (lambda progress, specification: None)
     executor = Local() if executor is None else executor
-    if not isinstance(executor, Executor):
+    if not isinstance(executor, Local | Dask):
         known = " or ".join(_EXECUTORS.values())
         raise CoarticError(f"executor is {brief_value(executor)}; it must be {known}")
     with writing(folder) as store:

@@ -35,8 +35,9 @@ def test_runs_come_out_as_they_do_here(address, tmp_path):
     assert set(there.runs.together) == {3}
 
 
-def test_runs_of_a_method_share_a_process(address, tmp_path):
-    """One a worker, however many runs it performs: it has imported the method's file."""
+def test_runs_of_a_method_share_a_process(distributed, tmp_path):
+    """One a worker, however many runs it performs: it has imported the method's file. Workers are
+    processes, as on a cluster."""
     (tmp_path / "mine.py").write_text("""
 import os
 from coartic.method import Information, Method, Result
@@ -53,9 +54,12 @@ class Mine(Method):
     mine = registry([tmp_path / "mine.py"])["mine"]
     cells = [Cell(load_task(task), mine) for task in ("ascending", "descending")]
     out = tmp_path / "out"
-    assert len(run_and_write(out, cells, executor=Dask(address), runs=8).runs) == 16
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **QUIET) as cluster:
+        run_and_write(out, cells, executor=Dask(cluster.scheduler_address), runs=8)
     with open_store(out) as store:
-        assert len({store.run(run_id).details["process"] for run_id in store.ids()}) <= 2
+        runs = [store.run(run_id) for run_id in store.ids()]
+    assert (len(runs), {run.status for run in runs}) == (16, {"ok"})
+    assert len({run.details["process"] for run in runs}) <= 2
 
 
 def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ import pandas as pd
 from coartic import load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.planning import plan_suite
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
@@ -19,7 +20,7 @@ BROKEN = ROOT / "tests" / "plugins" / "broken.py"
 KNOWN = registry()
 
 
-class InProcess:
+class InProcess(Local):
     """An executor without processes, for tests of everything else."""
 
     workers = 1
