@@ -59,8 +59,8 @@ class Local:
     """Processes on this machine; ``jobs`` of them at once, or one a core.
 
     A job is ended after its limit of CPU time, a day where it has none; where it uses less, after
-    three times as much wall time and ``patience_s``. With ``verbose`` methods print, log and fail
-    where they are seen.
+    three times as much wall time and ``patience_s``. With ``verbose``, what methods print and log,
+    and their tracebacks, are shown.
     """
 
     def __init__(self, jobs: int = -1, *, patience_s: float = 60.0, verbose: bool = False) -> None:
@@ -300,6 +300,7 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
             except OSError:
                 os._exit(_UNKEPT)
             number += 1
+    end_group(process)  # nobody has asked for long
 
 
 def answer_to(job: Job, folder: Path) -> bytes:
