@@ -96,7 +96,8 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """
     columns = checked(frame, names=("method", "task"), numbers=(*SCORES, *more))
     columns = with_gaps(columns)
-    task, _ = pd.factorize(columns.task)
+    number, tasks = pd.factorize(columns.task)
+    task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     several = columns.best_known.groupby(task).transform("nunique") > 1
     refuse_rows(columns, "task", several, "the task has several best_known; needed is one")
     names = columns.method.to_numpy(object)

@@ -14,6 +14,7 @@ from coartic.analysis.topics import (
     coarticulation,
     costs,
     learning,
+    own,
     random_tasks,
     ranking,
     rewards,
@@ -52,6 +53,20 @@ class Section:
 
 
 SECTIONS = (
+    Section(
+        "own",
+        "Own methods",
+        "How good are your own methods?",
+        table=own.list_own,
+        caption="Methods from files on each task (rewards in ticks)",
+        sentence=own.own_in_words,
+        answer="Own",
+        note="Nearest: the built-in method with the smallest gap on the task. p is of the test "
+        "that the mean reward differs from the learner's, corrected for the tasks of the method "
+        "(Holm). A gap over several tasks is on those on which the method solved every run.",
+        single=False,
+        folded=True,
+    ),
     Section(
         "settings",
         "Settings",

@@ -437,7 +437,7 @@ def test_p_of_shared_goals_is_corrected_by_method():
 def test_a_signature_stands_beside_random_search():
     study = beside_guesses(2.0)
     contexts = coarticulation.shared_goal(study)
-    of_guesses = guesses.guesses_beside(study, contexts)
+    (of_guesses,) = guesses.every_guess_beside(study, contexts)
     first, _, _ = coarticulation.next_goal(study).partition("\n")
     assert f"{contexts.spreads:.1f} SD apart; random search: {of_guesses.spreads:.1f})" in first
 

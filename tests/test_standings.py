@@ -16,7 +16,7 @@ from coartic.analysis.report import about
 from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.statistics import running_times
-from coartic.analysis.topics import costs, ranking, scores
+from coartic.analysis.topics import costs, own, ranking, scores
 from coartic.analysis.topics.ranking import leaders, paired_difference
 from coartic.analysis.topics.rewards import changed_hands
 from coartic.analysis.topics.scores import BY_TRIAL
@@ -277,7 +277,7 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     unknown = study_of(seen.runs.assign(commit=""), larger)
     ranked = TABLES["ranking"](unknown)
     learned = (8.5 / 293, 1.5 / 480)
-    assert ranked.gap.iloc[0] == pytest.approx(sum(learned) / 2)
+    assert ranked.gap["dual-process (EC1, EC4)"] == pytest.approx(sum(learned) / 2)
     assert ranked.loc["mine", ["on ascending", "on two-armed-1"]].tolist() == pytest.approx(
         [3.5 / 293, 15 / 480]
     )
@@ -319,14 +319,58 @@ def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
         "ascending", "two-armed-1"
     ]  # fmt: skip
     optima = made_up_optima("ascending", "two-armed-1")
-    alone = ranking.nearest(MadeUp(seen, optima=optima))
-    assert "mine is the only method on Two-armed 2 †: name others, too." in alone
-    assert "ends" not in alone
+    alone = own.own_in_words(MadeUp(seen, optima=optima))
+    assert alone == "mine is the only method on Two-armed 2 †: name others, too."
     both = study(rewards | {("two-armed-2", "theirs"): [-300]})
     optima |= {"two-armed-2": BestKnown(-300, None, only_here=True)}
-    assert scores.common_tasks(MadeUp(both, optima=optima)) == ["ascending", "two-armed-1"]
-    words = "mine, not of this project, ends 3.0 % from the best of this folder on Two-armed 2 †."
-    assert words in ranking.nearest(MadeUp(both, optima=optima))
+    both = MadeUp(both, optima=optima)
+    assert scores.common_tasks(both) == ["ascending", "two-armed-1"]
+    first, *others = own.own_in_words(both).split("\n")
+    assert first == "theirs ran on 1 of 3 tasks: gap of 0.0 % there."
+    assert others[1].startswith("Gap of mine to the best of this folder on Two-armed 2 †: 3.0 %.")
+
+
+def test_what_a_method_did_not_run_on_is_said():
+    """With its gap, and that of others, on what it ran on: in words, ranking and running times."""
+    some = {("ascending", "mine"): [-300, -301, -302]}
+    seen = study(LEARNER | CMA | some)
+    first, more = own.own_in_words(seen).split("\n")
+    assert first == "mine ran on 1 of 2 tasks: gap of 3.1 % there; CMA-ES 0.5 % on the same task."
+    assert more.startswith("Gap of mine to the optimum on Ascending: 3.1 % [")
+    assert "; of CMA-ES there: 0.5 %; of the learner there: 3.3 %." in more
+    ranked = TABLES["ranking"](seen)
+    assert ranked.index.tolist()[:2] == ["mine", "cma-es/bandit"]
+    assert ranked.gap["mine"] == pytest.approx(9 / 292)
+    assert ranked.tasks[:3].tolist() == [1, 2, 2]
+    texts = [text.get_text() for text in FIGURES["ranking"](seen).figure.axes[0].texts]
+    assert any("mine (1 of 2 tasks)" in text for text in texts)
+    assert ranking.nearest(seen).startswith("CMA-ES comes nearest of the two that learn (0.4 %)")
+    cells = costs.cells_compared(seen)
+    assert [cell.task for cell in cells["mine"]] == ["ascending"]
+    assert len(cells["cma-es/bandit"]) == 2
+
+
+def test_a_method_that_ran_on_all_is_said_beside_the_learner():
+    seen = study(TEN | strangers(("mine", 2), ("yours", 3), runs=10))
+    first, *_ = own.own_in_words(seen).split("\n")
+    assert first == "yours: gap of 3.2 %, better than the learner on 2 of 2 tasks."
+    assert own.own_methods(seen) == ["yours", "mine"]
+    few = study(
+        {key: rewards[:1] for key, rewards in (CMA | strangers(("mine", 2), runs=1)).items()}
+    )
+    assert own.own_in_words(few).split("\n")[0] == "mine: gap of 3.2 % (CMA-ES 0.3 %)."
+    assert own.own_in_words(study(TEN)) == ""
+
+
+def test_a_failed_run_leaves_its_task_out():
+    seen = study(LEARNER | {(task, "mine"): [-490, -491] for task in ("ascending", "two-armed-1")})
+    failed = (seen.runs.method == "mine") & (seen.runs.task == "ascending") & (seen.runs.run == 1)
+    runs = seen.runs.assign(status=np.where(failed, "timeout", "ok"))
+    runs["reward"] = runs.reward.mask(failed)
+    again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
+    first, *_, last = own.own_in_words(again).split("\n")
+    assert first.startswith("mine ran on 1 of 2 tasks: gap of 5.5 % there; the learner 3.5 %")
+    assert last == "1 of 4 runs of mine failed, and these tasks do not count."
 
 
 @pytest.mark.parametrize(("runs", "better", "words"), [
@@ -341,20 +385,23 @@ def test_runs_without_spread_are_tested_by_their_number(runs, better, words):
     seen.plan.methods["mine"] = replace(seen.plan.methods["mine"], stochastic=False)
     row_of = TABLES["ranking"](seen).loc["mine"]
     assert row_of.better == pytest.approx(better, nan_ok=True)
-    assert words in ranking.nearest(seen)
+    assert words in own.own_in_words(seen)
 
 
 def test_on_one_task_a_method_stands_beside_the_learners_reward():
     few = {("ascending", "mine"): [-309, -301]}
-    sentence = ranking.nearest(study(TEN | few))
-    assert "mine, not of this project, ends 4.5 % away on Ascending; its mean reward is" in sentence
+    sentence = own.own_in_words(study(TEN | few))
     assert f"−305.0, the learner's −303.0 (p{chr(160)}=" in sentence
-    once = ranking.nearest(study(TEN | {("ascending", "mine"): [-309]}))
-    assert once.endswith("−303.0 (the runs are too few, or too alike, for a test).")
+    once = own.own_in_words(study(TEN | {("ascending", "mine"): [-309]}))
+    assert "−303.0 (the runs are too few, or too alike, for a test)." in once
     shorter = study(TEN | few)
     shorter.runs.loc[shorter.runs.method == "mine", "trials"] = 500
-    made = "ends 4.5 % away on Ascending with 500 trials (the learner: 10);"
-    assert made in ranking.nearest(shorter)
+    assert "It made 500 trials (the learner: 10)." in own.own_in_words(shorter)
+    rows = TABLES["own"](shorter)
+    assert rows.nearest.tolist() == ["dual-process (EC1, EC4)"]
+    assert rows[["gap", "nearest_gap", "learner"]].iloc[0].tolist() == pytest.approx(
+        [13 / 292, 11 / 292, -303]
+    )
 
 
 def test_a_method_from_a_file_stands_with_its_parameters():
@@ -368,7 +415,7 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert not any("climbing" in name for name in ranked.index)
     assert ranked.better["mine width=0.2"] == 2
-    assert "mine width=0.2, not of this project, ends" in ranking.nearest(again)
+    assert own.own_in_words(again).startswith("mine (width=0.2): gap of 3.5 %, better than the")
     assert "as its author declares" in ranking.nearest(again)
     assert "declares" not in ranking.nearest(study(TEN))
 

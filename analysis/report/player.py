@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
+from coartic.analysis.methods import GUESSES, LEARNERS, in_order, main_methods, name_of
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation import shared_goal
+from coartic.analysis.topics.guesses import every_guess_beside
+from coartic.analysis.topics.own import own_methods
 from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS
@@ -24,9 +26,12 @@ def player(study: Study) -> str:
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
+        widths = every_guess_beside(study, shared)
+        strongest = max(widths, key=lambda each: (each.spreads >= 0, each.spreads), default=None)
         (up, down), first = shared.tasks, shared.method
         both = {**preset_of(up), "label": f"{up.label} or {down.label}", "others": down.goals[1:]}
-        presets.append(both | {"runs": methods_played(study, [up.name, down.name])})
+        guesses = GUESSES if strongest is None else strongest.method
+        presets.append(both | {"runs": methods_played(study, [up.name, down.name], guesses)})
     alone = {
         name: preset_of(task) | {"runs": methods_played(study, [name])}
         for name, task in one_by_one(study).items()
@@ -35,13 +40,13 @@ def player(study: Study) -> str:
     presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]
     if not presets:
         return ""
-    ids = [run["id"] for run in presets[0]["runs"]]
+    begin = first_shown(study, presets, first)
     where = {name: presets.index(preset) for name, preset in alone.items()}
     return figure(
         presets,
         still="<p>The movements are played by a script, and scripts are switched off here.</p>",
         page=None,
-        first={"who": first if first in ids else ids[0]},
+        first=begin,
         cells=[
             (method, f"on {task}", {"preset": where[task], "who": label})
             for method, labels in labels_by_task(study).items()
@@ -51,21 +56,34 @@ def player(study: Study) -> str:
     )
 
 
-def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
+def first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> dict[str, Any]:
+    """Return the preset and the method of the film that is chosen at first: of the nearest method
+    from a file if there is one, or else of the preferred method if the first preset has it."""
+    ids = [[run["id"] for run in preset["runs"]] for preset in presets]
+    for method in own_methods(study):
+        for number, played in enumerate(ids):
+            if method in played:
+                return {"preset": number, "who": method}
+    return {"who": preferred if preferred in ids[0] else ids[0][0]}
+
+
+def methods_played(study: Study, tasks: list[str], guesses: str = GUESSES) -> list[dict[str, Any]]:
     """Methods with solved runs on all of these tasks: their names, and of each task the movements
     of the run nearest the median reward; of several tasks also the postures of all runs at goal 1,
-    which they share. Methods that follow paths are left out: the script moves straight."""
+    which they share. Methods that follow paths are left out: the script moves straight. Of guesses
+    it has those with the label ``guesses``, which the script puts beside the others."""
     labels = [label for name, label in study.cells if name == tasks[0]]
     ranked = {label for labels in labels_by_task(study).values() for label in labels.values()}
     shown = {*LEARNERS, *main_methods(labels), *ranked}
     runs = []
     for label in in_order([label for label in labels if label in shown]):
-        films = [film_of(study, (name, label)) for name in tasks]
+        played = guesses if label == GUESSES else label
+        films = [film_of(study, (name, played)) for name in tasks]
         if all(films):
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
-                    film["reached"] = study.configurations(name, label)[:, 0].round(3).tolist()
-            runs.append({"id": label, "name": name_of(label), "films": films})
+                    film["reached"] = study.configurations(name, played)[:, 0].round(3).tolist()
+            runs.append({"id": label, "name": name_of(played), "films": films})
     return runs
 
 

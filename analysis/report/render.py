@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.methods import name_of
+from coartic.analysis.methods import is_built_in, look_alike, name_of
 from coartic.analysis.table import COLUMNS, Column
 from coartic.analysis.words import (
     NARROW_SPACE,
@@ -39,6 +39,7 @@ TONES = {
 }
 """Class of a verdict on the page, by its words."""
 IN_LATEX = {
+    "own": "task, method, runs, reward, gap, nearest, nearest_gap",
     "settings": "task, method, runs, reward, behind, p_holm",
     "contexts": "place, method, runs, distance, dependence, p_holm, p_guesses",
     "published": "task, condition, published, ours, runs, difference, verdict",
@@ -133,7 +134,8 @@ def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
 
 
 def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
-    """A table for the page. Its first column holds while the others scroll; rows have links.
+    """A table for the page. Its first column holds while the others scroll; rows have links, those
+    of methods from files beside others a class.
 
     The caption says what is the same in all rows.
     """
@@ -166,9 +168,13 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
             ]
         cells.append(texts)
         heads.append(f'<th scope="col">{head}</th>')
+    foreign = [not is_built_in(look_alike(str(label))) for label in frame.get("method", ())]
+    marks = [' class="own"' * (is_own and not all(foreign)) for is_own in foreign]
     lines = "\n".join(
-        f'<tr id="{id_}">{"".join(f"<td>{text}</td>" for text in row)}</tr>'
-        for id_, row in zip(ids_of.values(), zip(*cells, strict=True), strict=True)
+        f'<tr id="{id_}"{mark}>{"".join(f"<td>{text}</td>" for text in row)}</tr>'
+        for id_, mark, row in zip(
+            ids_of.values(), marks or [""] * len(frame), zip(*cells, strict=True), strict=True
+        )
     )
     return (
         f'<table id="table-{name}">\n<caption><span>{html.escape(caption)}</span></caption>\n'

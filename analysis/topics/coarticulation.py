@@ -32,7 +32,12 @@ from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.guesses import context_beyond_p, guesses_beside, selects
+from coartic.analysis.topics.guesses import (
+    context_beyond_p,
+    every_guess_beside,
+    guesses_beside,
+    selects,
+)
 from coartic.analysis.topics.scores import failed_runs
 from coartic.analysis.words import marked, number, p_value
 from coartic.drawing import MARKERS
@@ -201,13 +206,16 @@ def next_goal(study: Study) -> str:
     beyond = shared.p_beyond(guesses) if needed and guesses is not None else math.nan
     who = "The learner" if is_learner(shared.method) else name_of(shared.method)
     runs, p = counted(shared.n, "run"), p_value(shared.p)
-    in_sd = not any(math.isnan(each.spreads) for each in (shared, guesses) if each is not None)
+    in_sd = not math.isnan(shared.spreads)
 
-    def distance(contexts: TwoContexts) -> str:
-        return number(contexts.spreads, 1) if in_sd else number(contexts.apart, 2)
+    def distance(contexts: TwoContexts) -> float:
+        return contexts.spreads if in_sd else contexts.apart
 
-    apart = f"{distance(shared)} {'SD' if in_sd else 'length units and rad'} apart"
-    beside = f"random search: {distance(guesses)}" if guesses is not None else ""
+    digits, unit = (1, "SD") if in_sd else (2, "length units and rad")
+    apart = f"{number(distance(shared), digits)} {unit} apart"
+    by_chance = [distance(each) for each in every_guess_beside(study, shared)]
+    by_chance = [each for each in by_chance if not math.isnan(each)]
+    beside = f"random search: {number(max(by_chance), digits)}" if by_chance else ""
     apart_beside = f"{apart} ({beside})" if beside else apart
     if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):
         text = "Too few runs to tell whether the next goal changes the posture."

@@ -14,7 +14,7 @@ from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.optima import initial_reward
-from coartic.analysis.settings import compares_settings, name_in
+from coartic.analysis.settings import compares_settings
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import CellRuns, Study, cached, load
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -97,17 +97,17 @@ def times_of(
 
 
 def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
-    """Cells of each method on those of :func:`.scores.common_tasks` with targets, in lists' order;
-    of methods that ran on all of them."""
-    compared = scores.compared(study)
+    """Cells of each method on those of :func:`.scores.common_tasks` with targets, in lists' order,
+    of methods that ran on all of them; of methods from files that did not, on all with targets."""
+    compared, of_methods = scores.compared(study), {}
     tasks = [task for task in scores.common_tasks(study) if task in spans(study)]
-    return {
-        method: [cell for task, cell in compared[method].items() if task in tasks]
-        for method in methods.in_order(compared)
-        if tasks
-        and compared[method].keys() >= {*tasks}
-        and not (len(tasks) == 1 and method.startswith(methods.TOGETHER))
-    }
+    for method in methods.in_order(compared):
+        ran_on = [task for task in compared[method] if task in spans(study)]
+        on = tasks if {*tasks} <= {*ran_on} or methods.is_built_in(method) else ran_on
+        is_whole = {*on} <= {*ran_on} and not (len(on) == 1 and method.startswith(methods.TOGETHER))
+        if on and is_whole:
+            of_methods[method] = [cell for task, cell in compared[method].items() if task in on]
+    return of_methods
 
 
 def runtimes(
@@ -115,7 +115,8 @@ def runtimes(
 ) -> pd.DataFrame:
     """Share of reward targets that methods reach within a budget: the ECDF of running times.
 
-    Of the methods that the report compares and that have runs on all tasks; tasks count alike.
+    Of the methods that the report compares and that have runs on all tasks; tasks count alike. Of a
+    method from a file that lacks some of these tasks, on the tasks that it ran on.
 
     Parameters
     ----------
@@ -158,7 +159,7 @@ def runtimes(
 
 
 @table(
-    "method, reached, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
+    "method, reached, tasks, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
     "seconds_to_half[], half on *",
 )
 def list_runtimes(study: Study) -> Rows:
@@ -169,7 +170,7 @@ def list_runtimes(study: Study) -> Rows:
         if not all(map(len, times["trials"])):
             continue
         reached = running_times.share_reached(times["trials"])
-        row: Row = {"method": method, "reached": reached}
+        row: Row = {"method": method, "reached": reached, "tasks": len(cells)}
         for name, spend, share in COSTS:
             if all(map(len, times[spend])):
                 row |= running_times.budget_for(times[spend], share).columns(name)
@@ -224,7 +225,7 @@ def draw_runtimes(study: Study) -> Parts | None:
             y = 100 * np.append(rows.share, rows.share.iloc[-1])
             line: Any = {**looks[str(label)], "linewidth": 1.3}
             (drawn,) = axes.step(x, y, where="post", **line)
-            name = name_in(study, str(label))
+            name = scores.shown_name(study, str(label))
             style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
         axes.set_xlim(edge, most)
         axes.set_ylim(-2, 102)
@@ -234,7 +235,9 @@ def draw_runtimes(study: Study) -> Parts | None:
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
-    entries = [style.legend_line(name_in(study, label), **look) for label, look in looks.items()]
+    entries = [
+        style.legend_line(scores.shown_name(study, label), **look) for label, look in looks.items()
+    ]
     style.legend(drawing, entries, 3)
     shares = spoken(ends, "{method} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."

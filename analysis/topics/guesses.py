@@ -54,8 +54,12 @@ def selects(study: Study, label: str) -> bool:
 
 
 def guesses_beside(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """The guesses whose postures lie farthest apart in the same two contexts; None without one
-    that made as many trials."""
+    """The guesses whose postures lie farthest apart in the same two contexts; None without any."""
+    return max(every_guess_beside(study, contexts), key=lambda pair: pair.apart, default=None)
+
+
+def every_guess_beside(study: Study, contexts: TwoContexts) -> list[TwoContexts]:
+    """Return the guesses in the same two contexts that made as many trials as the method."""
     names, pairs = [task.name for task in contexts.tasks], []
     for label in (
         each for each in guesses_on(study, names[0]) if each in guesses_on(study, names[1])
@@ -67,7 +71,7 @@ def guesses_beside(study: Study, contexts: TwoContexts) -> TwoContexts | None:
         if all(m >= w for m, w in zip(most, wanted, strict=True)):
             first, second = (study.executed(name, label) for name in names)
             pairs.append(TwoContexts(first, second, contexts.goal, contexts.hand))
-    return max((pair for pair in pairs if pair.in_both), key=lambda p: p.apart, default=None)
+    return [pair for pair in pairs if pair.in_both]
 
 
 def context_beyond_p(study: Study, contexts: TwoContexts) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -37,33 +36,50 @@ from coartic.estimates import (
     bootstrap_estimate,
 )
 from coartic.robot import Array
-from coartic.text import counted
 
-MOST_FOREIGN = 3
-"""Methods from files that a sentence names."""
 LONGEST = 36
 """Letters of a name in the figure."""
 
 
 @cached
-def main_gaps(study: Study) -> pd.DataFrame:
-    """Mean gap of each method over :func:`.scores.common_tasks`, nearest first.
+def gaps_on(study: Study, tasks: tuple[str, ...]) -> pd.DataFrame:
+    """Mean gap over some tasks of each method that solved every run on all of them, nearest first.
 
-    Of methods that solved every run on all of them. Columns as of
-    :func:`coartic.analysis.ranking`, ``method``, ``knows`` (its group) and ``algorithm``.
+    Columns as of :func:`coartic.analysis.ranking`, ``method``, ``knows`` (its group) and
+    ``algorithm``.
     """
-    tasks, frame = scores.common_tasks(study), scores.scores(study)
+    frame = scores.scores(study)
     frame = frame[frame.task.isin(tasks)]
     if not len(frame):
-        return pd.DataFrame(columns=["method", "knows", "gap", "gap_low", "gap_high", "runs"])
+        return pd.DataFrame(columns=["method", "knows", "gap", "gap_low", "gap_high", "tasks"])
     rows = frames.ranking(frame)
     rows = rows[rows.gap.notna() & (rows.failed == 0)].reset_index()
-    if len(tasks) == 1:  # the learner's conditions together are one of them
-        rows = rows[~rows.method.str.startswith(methods.TOGETHER)]
+    compared = scores.compared(study)
+    # The learner's conditions together are left out where one of them alone ran.
+    forms = [{compared[method][task].label for task in tasks} for method in rows.method]
+    together = rows.method.str.startswith(methods.TOGETHER)
+    rows = rows[~together | np.array([len(labels) > 1 for labels in forms], dtype=bool)]
     return rows.assign(
         knows=rows.method.map(scores.groups(study)),
         algorithm=list(map(methods.algorithm_of, rows.method)),
     )
+
+
+def main_gaps(study: Study) -> pd.DataFrame:
+    """:func:`gaps_on` the tasks that a mean is over, :func:`.scores.common_tasks`."""
+    return gaps_on(study, tuple(scores.common_tasks(study)))
+
+
+@cached
+def shown_gaps(study: Study) -> pd.DataFrame:
+    """:func:`main_gaps` with methods from files that lack some of these tasks: of each its gap on
+    the ``tasks`` that it solved."""
+    rows = main_gaps(study)
+    foreign = [method for method in scores.compared(study) if not methods.is_built_in(method)]
+    lacking = [method for method in foreign if method not in {*rows.method}]
+    parts = (gaps_on(study, scores.solved_tasks(study, m)) for m in lacking)
+    more = [part[part.method == m] for m, part in zip(lacking, parts, strict=True)]
+    return pd.concat([rows, *more], ignore_index=True).sort_values("gap", kind="stable")
 
 
 @table("task, method, runs, reward, learner, p_holm, least_p")
@@ -102,10 +118,14 @@ def list_against_learner(study: Study) -> Rows:
             yield f"{cell.task} {label}", row | runs_of(cell, learner)
 
 
-@table("method, gap[], knows, better, worse, on *, runs")
+@table("method, gap[], tasks, knows, better, worse, on *, runs")
 def list_ranking(study: Study) -> Rows:
-    """Gap over all tasks and on each, grouped by the use of the reward."""
-    over, tested = main_gaps(study).set_index("method"), list_against_learner(study)
+    """Gap over all tasks and on each, methods from files first.
+
+    ``gap`` is over the tasks of :func:`.scores.common_tasks`, of a method from a file that lacks
+    some of them over the ``tasks`` that it solved.
+    """
+    over, tested = shown_gaps(study).set_index("method"), list_against_learner(study)
     single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
     # Methods without a mean gap that solved every run on some task, by their gaps on the first.
     others = [
@@ -116,13 +136,14 @@ def list_ranking(study: Study) -> Rows:
         if (cell := cells.get(task)) is not None and len(cell.good) == len(cell.runs)
     ]
     others.sort(key=lambda other: other[:2])
-    for method in dict.fromkeys([*over.index, *(method for *_, method in others)]):
+    names = dict.fromkeys([*over.index, *(method for *_, method in others)])
+    for method in sorted(names, key=methods.is_built_in):
         cells = scores.compared(study)[method]
         row: Row = {"method": method, "knows": scores.groups(study)[method], "gap": math.nan}
         for t in single:
             row[f"on {t}"] = scores.cell_gap(study, cells[t]) if t in cells else math.nan
         if method in over.index:
-            row |= over.loc[method, ["gap", "gap_low", "gap_high"]].to_dict()
+            row |= over.loc[method, ["gap", "gap_low", "gap_high", "tasks"]].to_dict()
         tests = tested[tested.index.isin([f"{task} {cell.label}" for task, cell in cells.items()])]
         # With Holm's correction over its tasks: could any of its tests have told them apart?
         if tests.least_p.count() * tests.least_p.min() < LEVEL:
@@ -133,12 +154,13 @@ def list_ranking(study: Study) -> Rows:
         yield method, row
 
 
-def leaders(study: Study, group: str) -> pd.DataFrame:
-    """The best form of each algorithm of a group in :func:`main_gaps`, nearest first.
+def leaders(study: Study, group: str, rows: pd.DataFrame | None = None) -> pd.DataFrame:
+    """The best form of each algorithm of a group in :func:`main_gaps`, or in other rows of
+    :func:`gaps_on`, nearest first.
 
     The learner is there by the form that explores most.
     """
-    rows = main_gaps(study)
+    rows = main_gaps(study) if rows is None else rows
     rows = rows[rows.knows == group]
     learners = rows.method.map(methods.is_learner).astype(bool)
     most = learners & rows.method.str.contains("EC4")
@@ -218,11 +240,11 @@ def differences(study: Study) -> dict[str, dict[str, str]]:
     f"{style.COVERAGE} bootstrap interval over runs; to the best known reward where no optimum is "
     "proven, to the best of this folder where none is known. Means over all tasks where there are "
     "several. The axis is logarithmic from 0.1 % on. Methods that are run once have no interval. "
-    "Diamonds and bold names: the paper's learner.",
+    "Diamonds: the paper's learner. Bold names: the learner and methods from files.",
 )
 def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of every method, a mean over tasks, with its name beside it."""
-    rows = main_gaps(study)
+    rows, tasks = shown_gaps(study), scores.common_tasks(study)
     if not len(rows):
         return None
     percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
@@ -253,21 +275,22 @@ def draw_ranking(study: Study) -> Parts | None:
                 axes.plot([low, high], [line, line], "|-", markersize=6, linewidth=1, **look)
             mark = "D" if learner else "o"
             (dot,) = axes.plot(row["gap"], line, mark, markersize=2.6, markeredgewidth=0, **look)
-            name, gap = name_in(study, row["method"]), number(row["gap"], 1)
+            name, gap = scores.shown_name(study, row["method"]), number(row["gap"], 1)
             style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
             ends = across.transform([(low, 0), (high, 0)])[:, 0]
             right = ends[1] < 1 - ends[0]  # there is more room
             beside: Any = {"textcoords": "offset points", "va": "center_baseline"}
             beside |= {"ha": "left"} if right else {"ha": "right"}
-            beside |= {"weight": "bold"} if learner else {}
-            name = name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
+            foreign = not methods.is_built_in(row["method"])
+            beside |= {"weight": "bold"} if learner or foreign else {}
+            if len(name) > LONGEST:  # its end may say on how many tasks
+                name = f"{name[: LONGEST - 20]}…{name[-19:]}"
             text, place = (f"{gap}  {name}", (high, 6)) if right else (f"{name}  {gap}", (low, -6))
             axes.annotate(text, (place[0], line), (place[1], 0), **beside)
         line += 1.4
     axes.set_ylim(line - 0.8, -0.6)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
-    tasks = scores.common_tasks(study)
     to = scores.reference(study, tasks)
     where = "" if len(tasks) > 1 else f"{study.tasks[tasks[0]].label}: "
     short = to.removesuffix(" reward").replace("this ", "").replace("optimum", "the optimum")
@@ -278,7 +301,7 @@ def draw_ranking(study: Study) -> Parts | None:
 
 def nearest(study: Study) -> str:
     """The method with the smallest gap and whether surely so, the learner's place, the best
-    planner, methods from files, and failed runs: a sentence for each that there is."""
+    planner, and failed runs: a sentence for each that there is."""
     by_trial, by_formula, others = (leaders(study, group) for group in scores.GROUPS)
     learn = by_trial[~by_trial.method.map(methods.learns_nothing).astype(bool)]
     learn = learn.reset_index(drop=True)
@@ -324,7 +347,7 @@ def nearest(study: Study) -> str:
         if not test.least_p <= LEVEL:
             beside = f" (too few runs to tell it from {next_one})"
         text += beside
-    text += f"{declared(rows.method[0])}.{from_files(study)}"
+    text += f"{declared(rows.method[0])}."
     for place in behind:
         text += f" Gap of the learner: {gap(learn.iloc[place])}."
     learners = learn.gap[[named(method) == "the learner" for method in learn.method]]
@@ -342,59 +365,3 @@ def nearest(study: Study) -> str:
     cells = (cell for by_task in scores.compared(study).values() for cell in by_task.values())
     failed = scores.failed_runs(cells, ", which bars a method from the ranking")
     return text + failed
-
-
-def from_files(study: Study) -> str:
-    """Sentences about methods that are not built in, beside the learner where it ran."""
-    rows, text = list_ranking(study), ""
-    rows = rows[~rows.method.map(methods.is_built_in).astype(bool)]
-    usual = scores.reference(study, scores.common_tasks(study))
-    for row in rows.head(MOST_FOREIGN).to_dict("records"):
-        gap, away, on = row["gap"], "away", ""
-        if math.isnan(gap):  # the mean of the tasks on which it solved every run
-            there = {t: g for t in study.tasks if (g := row.get(f"on {t}", math.nan)) == g}
-            if not there:
-                continue
-            gap, to = float(np.mean([*there.values()])), scores.reference(study, there)
-            away = "away" if to == usual else f"from the {to}"
-            on = f" on {listed(marked(study.tasks[task]) for task in there)}"
-        text += f" {row['method']}, not of this project, ends {number(100 * gap, 1)} % {away}{on}"
-        text += f"{beside_learner(study, row)}."
-    more = len(rows) - MOST_FOREIGN
-    text += f" And {more} more in the ranking." if more > 0 else ""
-    for task, label in study.cells:
-        if not methods.is_built_in(label) and sum(other == task for other, _ in study.cells) == 1:
-            text += f" {label} is the only method on {marked(study.tasks[task])}: name others, too."
-    return text
-
-
-def beside_learner(study: Study, row: Mapping[Any, Any]) -> str:
-    """The part of a sentence on a method of the ranking beside the learner: its trials, where it
-    learns and the learner made another number of them, and whether it is better."""
-    text, cells = "", scores.compared(study)[row["method"]]
-    keys = [(task, methods.most_exploring(study.tasks[task])) for task in cells]
-    learners = [study.cells[key] for key in keys if key in study.cells]
-    own, others = (
-        max((made for each in of for made in each.runs.trials.dropna()), default=0)  # none: crashed
-        for of in (cells.values(), learners)
-    )
-    if row["knows"] == scores.BY_TRIAL and others not in (0, own):
-        text = f" with {number(own)} trials (the learner: {number(others)})"
-    tests = list_against_learner(study)
-    tests = tests[tests.method == row["method"]]
-    tasks, tested = len(tests), not math.isnan(row["better"])
-    if not tasks:
-        return text
-    if tasks == 1:
-        reward, learner, p = tests[["reward", "learner", "p_holm"]].iloc[0]
-        text += f"; its mean reward is {number(reward, 1)}, the learner's {number(learner, 1)}"
-        text += f" ({p_value(p)})" * tested
-    elif not tested:
-        higher = sum(tests.reward > tests.learner)
-        text += f"; its mean reward is higher than the learner's on {higher} of {tasks} tasks"
-    elif row["better"] or row["worse"]:
-        better, worse = counted(int(row["better"]), "task"), number(row["worse"])
-        text += f"; significantly better than the learner on {better} and worse on {worse}"
-    else:
-        text += f"; not significantly different from the learner on any of {tasks} tasks"
-    return text + " (the runs are too few, or too alike, for a test)" * (not tested)

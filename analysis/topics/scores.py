@@ -16,12 +16,13 @@ import pandas as pd
 from coartic.analysis import methods
 from coartic.analysis.methods import EC1, EC3, EC4, is_search, is_setting, name_of
 from coartic.analysis.optima import gap_share, locks_base
-from coartic.analysis.settings import compares_settings
+from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_run
 from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
 from coartic.analysis.words import marked, number, tally
 from coartic.estimates import standard_deviation
 from coartic.method import Information
+from coartic.text import counted
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward of each trial",
@@ -94,6 +95,30 @@ def common_tasks(study: Study) -> list[str]:
 
     tasks = max(ran_on.values(), key=pairs, default=set())
     return [task for task in study.tasks if task in tasks]
+
+
+@cached
+def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
+    """Return the tasks on which a method of :func:`compared` solved every run."""
+    cells = compared(study)[method].items()
+    return tuple(task for task, cell in cells if len(cell.good) == len(cell.runs) > 0)
+
+
+def coverage(study: Study, method: str) -> str:
+    """Return on how many of the compared tasks a method solved every run, as ``10 of 50 tasks``;
+    empty where it did on all."""
+    every = {task for cells in compared(study).values() for task in cells}
+    solved = len(solved_tasks(study, method))
+    return f"{solved} of {counted(len(every), 'task')}" if solved < len(every) else ""
+
+
+def shown_name(study: Study, method: str) -> str:
+    """Return the name of a method; of a method from a file that did not solve all of
+    :func:`common_tasks` with the number of its tasks."""
+    name = name_in(study, method)
+    if methods.is_built_in(method) or {*common_tasks(study)} <= {*solved_tasks(study, method)}:
+        return name
+    return f"{name} ({coverage(study, method)})"
 
 
 @cached

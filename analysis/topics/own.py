@@ -1,0 +1,160 @@
+"""Methods from files, which are not of this project: how they do on the tasks that they ran on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pandas as pd
+
+from coartic.analysis import methods
+from coartic.analysis.settings import name_in
+from coartic.analysis.study import Study
+from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.topics import ranking, scores
+from coartic.analysis.words import interval, listed, marked, number, p_value
+from coartic.estimates import standard_deviation
+from coartic.text import counted
+
+MOST_NAMED = 3
+"""Methods from files, and tasks, that a sentence names."""
+UNTESTED = " (the runs are too few, or too alike, for a test)"
+
+
+def own_methods(study: Study) -> list[str]:
+    """Return the methods from files that solved every run on a task, the smallest gap first."""
+    return [m for m in ranking.shown_gaps(study).method if not methods.is_built_in(m)]
+
+
+def nearest_others(study: Study, method: str) -> dict[str, float]:
+    """Return the gap of the nearest built-in method, and of the learner, on the tasks that a method
+    solved, by their names; of methods that use the reward as it does if there are any."""
+    rows = ranking.gaps_on(study, scores.solved_tasks(study, method))
+    group = scores.groups(study)[method]
+    rows = pd.concat([ranking.leaders(study, of, rows) for of in (group, *scores.GROUPS)])
+    rows = rows[rows.method.map(methods.is_built_in)].drop_duplicates("method")
+    is_learner = rows.method.map(methods.is_learner).astype(bool)
+    nearest = rows[~is_learner & ~rows.method.map(methods.learns_nothing).astype(bool)]
+    others = pd.concat([nearest.head(1), rows[is_learner].head(1)])
+    names = ["the learner" if methods.is_learner(m) else name_in(study, m) for m in others.method]
+    return dict(zip(names, others.gap, strict=True))
+
+
+@table("task, method, runs, solved, reward±, gap, nearest, nearest_gap, learner, p_holm")
+def list_own(study: Study) -> Rows:
+    """Return methods from files on each task, with the nearest built-in method and the learner."""
+    compared, tested = scores.compared(study), ranking.list_against_learner(study)
+    for task, title in ((name, marked(task)) for name, task in study.tasks.items()):
+        cells = {method: of[task] for method, of in compared.items() if task in of}
+        gaps = {
+            scores.cell_gap(study, cell): method
+            for method, cell in cells.items()
+            if methods.is_built_in(method) and len(cell.good)
+        }
+        for method, cell in cells.items():
+            if methods.is_built_in(method):
+                continue
+            row: Row = {
+                "task": title,
+                "method": method,
+                "runs": len(cell.runs),
+                "solved": len(cell.good),
+                "reward": cell.rewards.mean() if len(cell.good) else math.nan,
+                "reward_sd": standard_deviation(cell.rewards),
+                "gap": scores.cell_gap(study, cell),
+                "nearest": gaps[min(gaps)] if gaps else None,
+                "nearest_gap": min(gaps, default=math.nan),
+            }
+            if (name := f"{task} {method}") in tested.index:
+                row |= {column: tested[column][name] for column in ("learner", "p_holm")}
+            yield name, row | runs_of(cell)
+
+
+def own_in_words(study: Study) -> str:
+    """Say how methods from files do, the nearest first, on which tasks, and beside whom."""
+    names = own_methods(study)
+    lines = [card(study, method) for method in names[:1]]
+    lines += [details(study, method) for method in names[:MOST_NAMED]]
+    lines += [f"And {len(names) - MOST_NAMED} more in the table."] * (len(names) > MOST_NAMED)
+    foreign = [key for key in study.cells if not methods.is_built_in(key[1])]
+    for task, label in foreign:
+        if sum(other == task for other, _ in study.cells) == 1:
+            only = f"{label} is the only method on {marked(study.tasks[task])}: name others, too."
+            lines.append(only)
+    cells = [study.cells[key] for key in foreign]
+    lines.append(scores.failed_runs(cells, ", and these tasks do not count").strip())
+    return "\n".join(filter(None, lines))
+
+
+def card(study: Study, method: str) -> str:
+    """Return the gap of a method from a file in a line, on which tasks, and beside whom."""
+    row = standing(study, method)
+    text, beside = f"gap of {number(100 * row['gap'], 1)} %", ""
+    for other, gap in [*nearest_others(study, method).items()][:1]:
+        beside = f"{other} {number(100 * gap, 1)} %"
+    if covered := scores.coverage(study, method):
+        there = "task" if covered.startswith("1 of ") else "tasks"
+        on_the_same = f"; {beside} on the same {there}" * bool(beside)
+        return f"{name_in(study, method)} ran on {covered}: {text} there{on_the_same}."
+    if not math.isnan(row["better"]):
+        tasks = counted(len(beside_learner(study, method)), "task")
+        text += f", better than the learner on {row['better']:.0f} of {tasks}"
+    elif beside:
+        text += f" ({beside})"
+    return f"{name_in(study, method)}: {text}."
+
+
+def details(study: Study, method: str) -> str:
+    """Return the gap of a method from a file with its interval, and of others on the same tasks,
+    its trials where the learner made others, tests, and who says what it is told."""
+    row, tests = standing(study, method), beside_learner(study, method)
+    tasks, is_partial = scores.solved_tasks(study, method), bool(scores.coverage(study, method))
+    gap = f"Gap of {name_in(study, method)} to the {scores.reference(study, tasks)}"
+    if is_partial and len(tasks) <= MOST_NAMED:
+        gap += f" on {listed(marked(study.tasks[task]) for task in tasks)}"
+    gap += f": {interval(row, 'gap', scale=100, unit=' %')}"
+    for other, gap_of_other in nearest_others(study, method).items():
+        gap += f"; of {other}{' there' * is_partial}: {number(100 * gap_of_other, 1)} %"
+    sentences, untested = [gap, trials_beside(study, method)], math.isnan(row["better"])
+    if len(tests) == 1:
+        reward, learner, p = tests[["reward", "learner", "p_holm"]].iloc[0]
+        text = f"Its mean reward is {number(reward, 1)}, the learner's {number(learner, 1)}"
+        sentences.append(text + (UNTESTED if untested else f" ({p_value(p)})"))
+    elif len(tests) and untested:
+        higher = int((tests.reward > tests.learner).sum())
+        text = f"Its mean reward is higher than the learner's on {higher} of {len(tests)} tasks"
+        sentences.append(text + UNTESTED)
+    elif len(tests):
+        text = (
+            f"It is significantly better than the learner on {counted(int(row['better']), 'task')}"
+        )
+        sentences.append(f"{text} and worse on {row['worse']:.0f}")
+    sentences.append("What it is told is as its author declares")
+    return ". ".join(filter(None, sentences)) + "."
+
+
+def beside_learner(study: Study, method: str) -> pd.DataFrame:
+    """Return the rows of table ``against-learner`` of a method."""
+    rows = ranking.list_against_learner(study)
+    return rows[rows.method == method]
+
+
+def trials_beside(study: Study, method: str) -> str:
+    """Say how many trials a method that learns from them and the learner made at most; nothing
+    where these are the same, or one made none."""
+    cells = scores.compared(study)[method]
+    keys = [(task, methods.most_exploring(study.tasks[task])) for task in cells]
+    learners = [study.cells[key] for key in keys if key in study.cells]
+    made, learned = (
+        max((trials for each in of for trials in each.runs.trials.dropna()), default=0)
+        for of in (cells.values(), learners)
+    )
+    if scores.groups(study)[method] != scores.BY_TRIAL or learned in (0, made):
+        return ""
+    return f"It made {number(made)} trials (the learner: {number(learned)})"
+
+
+def standing(study: Study, method: str) -> dict[str, Any]:
+    """Return the row of a method in the ranking."""
+    (row,) = ranking.list_ranking(study).loc[[method]].to_dict("records")
+    return {str(name): value for name, value in row.items()}
