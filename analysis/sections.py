@@ -202,9 +202,9 @@ SECTIONS = (
         caption="Tasks with their initial and best possible rewards (ticks)",
         figure=tasks.draw_tasks,
         sentence=tasks.how_long,
-        note="Initial: the corrective process alone, with the task's initial hands. Best known: "
-        "the optimum where the proven bound equals it. Proven bound: a reward that no solution can "
-        "exceed.",
+        note="Initial, best hands: the corrective process alone, with the task's initial hands and "
+        "with the best of all hand sequences. Best known: the optimum where the proven bound "
+        "equals it. Proven bound: a reward that no solution can exceed.",
     ),
     Section(
         "methods",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -19,16 +20,19 @@ from coartic.analysis.words import marked, number, titled_apart
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
-@table("task, arms, base, initial, optimum, source, bound")
+@table("task, arms, base, initial, best_hands, optimum, source, bound")
 def list_tasks(study: Study) -> Rows:
-    """One row a task: initial and best possible reward."""
+    """One row a task: rewards of the corrective process alone, with the initial hands and with the
+    best, and the best known reward."""
     for name, task in one_by_one(study).items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
+        alone = study.sequences(name).reward.dropna()
         row: Row = {
             "task": marked(task),
             "arms": len(task.hands),
             "base": f"locked in {locked}" if locked else "free",
             "initial": initial_reward(task),
+            "best_hands": float(alone.max()) if len(alone) else math.nan,
             "optimum": best.reward if best else None,
             "source": best.source if best else None,
             "bound": best.bound if best else None,
@@ -38,16 +42,19 @@ def list_tasks(study: Study) -> Rows:
 
 
 def how_long(study: Study) -> str:
-    """Ticks of the corrective process alone and of the best known solutions."""
-    rows = list_tasks(study).dropna(subset=["initial", "optimum"])
+    """Ticks of the corrective process alone, with either hands, and of the best known solutions."""
+    rows = list_tasks(study).dropna(subset=["best_hands", "initial", "optimum"])
     if not len(rows):
         return ""
-    alone, best = (
+    alone, initial, best = (
         " to ".join(dict.fromkeys(number(end, 0) for end in (-values.max(), -values.min())))
-        for values in (rows.initial, rows.optimum.astype(float))
+        for values in (rows[name].astype(float) for name in ("best_hands", "initial", "optimum"))
     )
     proven = f"proven optimal on {number((rows.optimum == rows.bound).sum())} of {len(rows)}"
-    return f"The corrective process alone takes {alone} ticks, the best known {best} ({proven})."
+    return (
+        f"The corrective process alone takes {alone} ticks with its best hands, {initial} with the "
+        f"initial ones, the best known {best} ({proven})."
+    )
 
 
 @figure(
