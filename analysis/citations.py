@@ -14,7 +14,7 @@ from typing import Any
 from coartic import __version__
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.words import latex, slugs
-from coartic.runs.card import BUILT_IN, MethodCard
+from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.text import one_line
 
 THE_PAPER = "shah2013"
@@ -30,7 +30,7 @@ def references() -> Mapping[str, str]:
 
 
 def bibliography(
-    methods: Mapping[str, MethodCard],
+    methods: Mapping[str, MethodInfo],
     *,
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,

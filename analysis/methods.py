@@ -24,13 +24,13 @@ LEARNERS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in conditions.COND
 two, more exploration later."""
 TOGETHER = f"{LEARNER.rstrip('/')} ("
 """Beginning of the label of several conditions together, each on the tasks that it is for."""
-GUESSES = "guesses"
-"""The best of random guesses around the corrective process, which cannot coarticulate."""
-ALL_GUESSES = GUESSES, "guesses/hands"
+RANDOM_SEARCH = "random-search"
+"""The best of random targets around the corrective process, which cannot coarticulate."""
+RANDOM_SEARCHES = RANDOM_SEARCH, "random-search/hands"
 """The same with the best hands, and with every hand sequence."""
 INITIAL = "corrective-alone/given"
 """The corrective process with a task's initial hands: the initial solution."""
-BEST_HANDS = "corrective-alone/every"
+BEST_HANDS = "corrective-alone/best-hands"
 """The corrective process with the best of all hand sequences."""
 
 
@@ -71,9 +71,9 @@ def is_learner(label: str) -> bool:
 
 
 def learns_nothing(label: str) -> bool:
-    """Return whether a method makes trials without learning from them: guesses, and the corrective
-    process alone, which tries hand sequences."""
-    return label.partition(" ")[0] in (*ALL_GUESSES, INITIAL, BEST_HANDS)
+    """Return whether a method makes trials without learning from them: random search, and the
+    corrective process alone, which tries hand sequences."""
+    return label.partition(" ")[0] in (*RANDOM_SEARCHES, INITIAL, BEST_HANDS)
 
 
 def is_built_in(label: str) -> bool:

@@ -54,7 +54,7 @@ def fill_page(template: Path, **values: Any) -> str:
     Parameters
     ----------
     template : pathlib.Path
-        A template of Jinja. It has what is handed over, ``interval(row, column, digits, scale)``,
+        A template of Jinja. It has what is returned, ``interval(row, column, digits, scale)``,
         which writes ``7.8 [7.3, 8.1]``, ``expect(holds, what)``, the filters ``number``,
         ``p_value`` and ``listed``, and the templates beside it.
     **values

@@ -75,7 +75,7 @@ SECTIONS = (
         caption="Mean reward of each setting (ticks), the best of each task first",
         sentence=settings.best_settings,
         answer="Best",
-        note="Behind: ticks behind the best setting of the task. p is corrected for the settings "
+        note="Gap: ticks behind the best setting of the task. p is corrected for the settings "
         "of the task (Holm).",
         single=False,
     ),
@@ -88,7 +88,7 @@ SECTIONS = (
         figure=coarticulation.draw_postures,
         sentence=coarticulation.next_goal,
         answer="Coarticulation",
-        note="Postures are compared in length units and rad. Guesses learn "
+        note="Postures are compared in length units and rad. Random search learns "
         "nothing; the best of many is selected.",
     ),
     Section(
@@ -100,10 +100,10 @@ SECTIONS = (
         figure=rewards.draw_published,
         sentence=rewards.rewards_reproduced,
         note="EC1 to EC4 are the paper's exploration conditions. EC1 explores the right arm only, "
-        "EC2 both arms with the closest hand, EC3 the choice of hand as well but not the waiting "
-        "arm, EC4 all of these. LRLR means left, right, left, right hand. † marks tasks whose "
-        "goals the paper does not print: these rewards helped to choose ours, so their agreement "
-        "is no evidence. Only runs with as many trials as the paper's, 10 000, are judged.",
+        "EC2 both arms with the closest hand, EC3 the choice of hand as well but not the idle arm, "
+        "EC4 all of these. LRLR means left, right, left, right hand. † marks tasks whose goals the "
+        "paper does not publish: these rewards helped to choose ours, so their agreement is no "
+        "evidence. Only runs with as many trials as the paper's, 10 000, are judged.",
     ),
     Section(
         "claims",
@@ -114,10 +114,10 @@ SECTIONS = (
         sentence=judgements.claims_hold,
         answer="Paper",
         note="p is corrected for the number of claims (Holm). Some claims of the paper rest on "
-        "goals that it does not print: the third column says in how many of the sets of goals that "
-        "fit its text a claim holds. A claim that our goals support, but at most half of these "
-        "sets, depends on the goals. Version 1.1.0 judged the sets, without the comparison with "
-        "guesses. Rewards are those of the best trial of a run; a replay makes "
+        "goals that it does not publish: the third column says in how many of the sets of goals "
+        "that fit its text a claim holds. A claim that our goals support, but at most half of "
+        "these sets, depends on the goals. Version 1.1.0 judged the sets, without the comparison "
+        "with random search. Rewards are those of the best trial of a run; a replay makes "
         "what was learned once more, without noise and exploration.",
         single=False,
     ),
@@ -147,8 +147,8 @@ SECTIONS = (
         figure=costs.draw_runtimes,
         sentence=costs.what_it_costs,
         answer="Cost",
-        note="The figure shows methods that learn, guesses and the best planner. Kinematics: "
-        "number of forward-kinematics evaluations, a cost that is the same on every machine. ∞: "
+        note="The figure shows methods that learn, random search and the best planner. The number "
+        "of forward-kinematics evaluations is a cost that is the same on every machine. ∞: "
         "not reached within the budget of trials.",
     ),
     Section(
@@ -179,8 +179,8 @@ SECTIONS = (
         caption="Signatures of coarticulation, means over goals and runs",
         sentence=coarticulation.joints_or_hand,
         note="Ticks are compared with those of the corrective process with the same hands. A first "
-        "movement that gets slower while the whole task gets faster is sacrificed for it. Waiting "
-        "hand nearer: share of the way to its next goal that a hand covers while waiting.",
+        "movement that gets slower while the whole task gets faster is sacrificed for it. Idle "
+        "hand nearer: share of the path to its next goal that a hand covers while idle.",
         folded=True,
     ),
     Section(

@@ -6,7 +6,7 @@ default says its value. Elsewhere methods are compared as they are by default.
 
 from __future__ import annotations
 
-from coartic.analysis.methods import ALL_GUESSES, INITIAL, is_search, name_of
+from coartic.analysis.methods import INITIAL, RANDOM_SEARCHES, is_search, name_of
 from coartic.analysis.study import Study, cached
 
 
@@ -30,7 +30,7 @@ def compares_settings(study: Study) -> bool:
     several = [
         names
         for method, names in varied(study).items()
-        if method not in (INITIAL, *ALL_GUESSES) and not is_search(method)
+        if method not in (INITIAL, *RANDOM_SEARCHES) and not is_search(method)
     ]
     return bool(several) and all(several)
 

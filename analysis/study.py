@@ -231,7 +231,7 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Names as in :attr:`runs`; a setting stands after its method: ``"guesses
+            Names as in :attr:`runs`; a setting stands after its method: ``"random search
             half_width=0.5"``.
         replay : bool
             The noiseless trial after learning in place of the solution, of the runs that have one.

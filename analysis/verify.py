@@ -52,7 +52,7 @@ LEARNER_RULES = {
     "equal_distance": "random", "first_trial": "learns", "state": "previous-hand", "ties": "left",
     "unknown_target": "corrects",
 }  # fmt: skip
-SCHEMAS = "c8883613a85a0859", "bbb2474fc81c5a7d", "db22a3d1ca8477ef"  # of formats 1 to 3
+SCHEMAS = ("c66220d06e355337",)  # of format 4: see schema
 # Whatever a file says, it is checked in bounded time and memory.
 MOST_GOALS, LONGEST_TEXT = 100, 100_000  # of a task, and of what is stored of it in characters
 MOST_TRIALS, MOST_TICKS, MOST_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run, movement
@@ -301,7 +301,7 @@ def schema(db: sqlite3.Connection) -> list[list[str]]:
 
 def fixed(method: str) -> dict[str, Any]:
     """Parameters of a method that versions 1.0 and 1.1 stored, and that have one value now."""
-    if method.startswith("nullspace-qp/"):
+    if method.startswith("posture-qp/"):
         return {"modelling": "none"}
     return LEARNER_RULES if method.startswith("dual-process/") else {}
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 NONE = "–"
 """Shown where there is no value."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
-RECONSTRUCTED = "† The paper does not print the goals of this task; ours are a reconstruction."
+RECONSTRUCTED = "† The paper does not publish the goals of this task; ours are a reconstruction."
 _LATEX = str.maketrans(
     {
         **{sign: f"\\{sign}" for sign in "&%$#_"},

@@ -59,7 +59,7 @@ class Certificate(NamedTuple):
 
 
 def fastest_hand(task: Task, hand: Hand) -> float:
-    """Largest norm of the hand's Jacobian: its way per joint-space way, length unit.
+    """Largest norm of the hand's Jacobian: its path per joint-space path, length unit.
 
     The column of a joint is at right angles to its lever, which is no longer than the links beyond
     it; a base that moves has the unit vectors as its columns. The square of the norm is the largest
@@ -87,9 +87,9 @@ def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]])
         where, when = {hand: (start[hand], 0.0, 0) for hand in task.hands}, 0
         for hand, goal in zip(sequence, task.goals, strict=True):
             place, radius, ticks = where[hand]
-            way = math.dist(place, goal) - radius - task.radius - _TOLERANCE
-            if way > 0.0:
-                when = max(when, ticks + math.ceil(way / speed[hand]) + 1)
+            distance = math.dist(place, goal) - radius - task.radius - _TOLERANCE
+            if distance > 0.0:
+                when = max(when, ticks + math.ceil(distance / speed[hand]) + 1)
             where[hand] = np.array(goal), task.radius, when
         return when
 

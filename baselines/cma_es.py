@@ -37,7 +37,7 @@ from pydantic import Field
 from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Method, Result, Session
-from coartic.optimisers import TOLD, sequences_of
+from coartic.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import Array
 
 
@@ -97,7 +97,7 @@ class CMAES(Method):
         "P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
         "bandit problem. Machine Learning."
     )
-    told = TOLD
+    information = OPTIMISER_INFORMATION
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
@@ -139,7 +139,7 @@ class GoalByGoal(Method):
         "A. Auger, N. Hansen (2005). A restart CMA evolution strategy with increasing population "
         "size. IEEE Congress on Evolutionary Computation."
     )
-    told = TOLD
+    information = OPTIMISER_INFORMATION
     Parameters = GoalByGoalParameters
 
     def solve(self, session: Session) -> Result:

@@ -1,6 +1,6 @@
-"""The corrective process alone: with given hands, and with every hand sequence.
+"""The corrective process alone: with given hands, and with the best hands.
 
-Every sequence is the paper's exhaustive strategy (section *Exploration Condition 3*):
+The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*):
 try all 2^G hand sequences, each target from **A**, and no further exploration.
 """
 
@@ -21,7 +21,7 @@ class GivenHands(Method):
         "prostheses. IEEE Transactions on Man-Machine Systems; as used by Shah, Barto & Fagg "
         "(2013)."
     )
-    told = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+    information = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
     stochastic = False
 
     def solve(self, session: Session) -> Result:
@@ -34,13 +34,13 @@ class GivenHands(Method):
         return Result(execution.movements)
 
 
-class EverySequence(Method):
+class BestHands(Method):
     """The corrective process with every hand sequence; the best one is kept."""
 
-    name = "corrective-alone/every"
-    title = "Corrective process alone, every hand sequence"
+    name = "corrective-alone/best-hands"
+    title = "Corrective process alone, best hands"
     citation = GivenHands.citation
-    told = GivenHands.told
+    information = GivenHands.information
     stochastic = False
 
     def why_not(self, task: Outline) -> str | None:
@@ -63,4 +63,4 @@ class EverySequence(Method):
         return Result(min(completed, key=lambda entry: entry[:2])[2].movements)
 
 
-METHODS: tuple[type[Method], ...] = (GivenHands, EverySequence)
+METHODS: tuple[type[Method], ...] = (GivenHands, BestHands)

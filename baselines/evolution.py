@@ -1,4 +1,4 @@
-"""CMA-ES: an evolution strategy that is asked for points and told their costs.
+"""CMA-ES: an evolution strategy that is asked for points and given their costs.
 
 N. Hansen (2016), The CMA evolution strategy: a tutorial; with negative weights. Constants, stopping
 criteria and the order of operations are those of the package ``cma`` 4.5 with its defaults, so that
@@ -188,10 +188,10 @@ class EvolutionStrategy:
         """Whether neither best nor median has improved for long."""
         noted = len(self._noted_bests)
         recent = int(max(self._patience / 10, noted / 10))
-        told = self._generation * self.size
+        evaluated = self._generation * self.size
         if (
             self._generation <= len(self._mean) * (5 + 100 / self.size)
-            or (told - self._best_point) / self.size <= self._patience / 2
+            or (evaluated - self._best_point) / self.size <= self._patience / 2
             or noted <= max(100, 2 * recent)
         ):
             return False

@@ -23,7 +23,7 @@ from pydantic import Field
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
 from coartic.baselines.posture_graph import cheapest_chains
-from coartic.baselines.shortest_paths import KNOWS_REWARD, fewest_ticks, shortest_plans
+from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.tasks.task import letters_of
@@ -60,7 +60,7 @@ class Optimum(Method):
         "programs. Mathematical Programming; P. J. Goulart, Y. Chen (2024). Clarabel: an "
         "interior-point solver for conic programs with quadratic objectives."
     )
-    told = KNOWS_REWARD
+    information = REWARD_INFORMATION
     stochastic = False
     Parameters = OptimumParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_nodes": 100}
@@ -69,7 +69,7 @@ class Optimum(Method):
         """Search and prove; the solution has the fewest ticks found."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
-        task = with_locks(session.hand_over(*self.told), parameters.base)
+        task = with_locks(session.reveal(*self.information), parameters.base)
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
         with session.solving():

@@ -81,7 +81,7 @@ class PostureBased(Method):
         "motion planning: applications to grasping. Psychological Review 108(4), 709-734, "
         "doi:10.1037/0033-295X.108.4.709."
     )
-    told = frozenset(
+    information = frozenset(
         {
             Information.GOALS,
             Information.FORWARD_KINEMATICS,
@@ -141,7 +141,7 @@ class PosturePlanner:
         self.session = session
         self.rounds = parameters.rounds
         self.horizon = horizon
-        task = session.hand_over(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
+        task = session.reveal(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
         self.robot = task.robot
         self.goals = session.goals
         # ‖F(q) − x_g‖ of a target at most θ^g − θ^a: the movement hits before it arrives.

@@ -91,7 +91,7 @@ class PostureGraph:
     layers: dict[tuple[int, Hand], Array]
     """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
     spent: Counter[str] = field(default_factory=Counter)
-    """Kinematics evaluated while sampling."""
+    """Forward-kinematics evaluations while sampling."""
 
     @classmethod
     def sample(cls, task: Task, count: int, rng: np.random.Generator) -> PostureGraph:
@@ -161,8 +161,8 @@ class PostureGraph:
             came = np.empty((len(layer), came_from.shape[1]), dtype=np.int32)
             reached = np.empty(came.shape)
             for other in range(came.shape[1]):
-                ways = np.sqrt(base[other] + arm) if step is None else step
-                total = came_from[:, other, None] + ways
+                distances = np.sqrt(base[other] + arm) if step is None else step
+                total = came_from[:, other, None] + distances
                 came[:, other], reached[:, other] = total.argmin(axis=0), total.min(axis=0)
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 

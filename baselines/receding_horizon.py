@@ -28,7 +28,7 @@ from pydantic import Field
 from coartic import Movement
 from coartic.baselines.posture_graph import cheapest_chains
 from coartic.baselines.shortest_paths import (
-    KNOWS_REWARD,
+    REWARD_INFORMATION,
     ShortestPlans,
     fewest_ticks,
     shortest_plans,
@@ -65,14 +65,14 @@ class RecedingHorizon(Method):
         "predictive control: stability and optimality. Automatica; C. E. Garcia, D. M. Prett, "
         "M. Morari (1989). Model predictive control: theory and practice. Automatica."
     )
-    told = KNOWS_REWARD
+    information = REWARD_INFORMATION
     stochastic = False
     Parameters = RecedingHorizonParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
     def solve(self, session: Session) -> Result:
         """Plan, make a movement, and plan again, until the last goal is in view."""
-        task, parameters = session.hand_over(*self.told), self.parameters
+        task, parameters = session.reveal(*self.information), self.parameters
         rng = np.random.default_rng(0)  # the same graphs for all seeds
         windows: list[ShortestPlans] = []
         solution: list[Movement] = []

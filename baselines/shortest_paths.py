@@ -18,7 +18,7 @@ from coartic.baselines.trajectory_problem import MODEL_BASED, Instance, PathPlan
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
 
-KNOWS_REWARD = MODEL_BASED | {Information.REWARD_FORMULA}
+REWARD_INFORMATION = MODEL_BASED | {Information.REWARD_FORMULA}
 """Information of a method that starts from posture graphs and rounds to whole ticks."""
 
 

@@ -1,11 +1,10 @@
 """Trajectory optimisation: informed search with the whole objective written down.
 
 One method per cost. Path length is the task's own reward as a formula; the others are
-the smoothness objectives that informed accounts of coarticulation use: the sum of squared
-configuration changes (Jordan 1986, 1992), minimum acceleration, and minimum jerk (Flash &
-Hogan 1985), the last two over times that are free at a constant total. Each
-hand sequence is planned from the cheapest chain of a posture graph; the plan that is
-cheapest *by the method's own cost* is handed over.
+the smoothness objectives that informed accounts of coarticulation use: the sum of squared joint
+displacements (Jordan 1986, 1992), minimum acceleration, and minimum jerk (Flash & Hogan 1985), the
+last two over times that are free at a constant total. Each hand sequence is planned from the
+cheapest chain of a posture graph; the plan that is cheapest *by the method's own cost* is returned.
 """
 
 from __future__ import annotations
@@ -89,8 +88,8 @@ class TrajectoryOptimisation(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
-        """Plan every sequence, keep the cheapest, hand over its movements."""
-        task = session.hand_over(*self.told - {Information.SECONDARY_OBJECTIVES})
+        """Plan every sequence, keep the cheapest, return its movements."""
+        task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
         # A target so near to a goal's centre is sure to hit; rounded to whole control ticks, a plan
@@ -178,23 +177,23 @@ class PathLength(TrajectoryOptimisation):
         "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "
         "Journal of Guidance, Control, and Dynamics."
     )
-    told = MODEL_BASED | {Information.REWARD_FORMULA}
+    information = MODEL_BASED | {Information.REWARD_FORMULA}
     cost = "path-length"
 
 
-class SquaredChanges(TrajectoryOptimisation):
-    """The sum of squared changes of the joints from goal to goal."""
+class SquaredDisplacement(TrajectoryOptimisation):
+    """Minimum squared joint displacement: the sum over the movements from goal to goal."""
 
-    name = "trajectory-optimisation/squared-changes"
-    title = "Trajectory optimisation, squared configuration changes"
+    name = "trajectory-optimisation/squared-displacement"
+    title = "Trajectory optimisation, minimum squared joint displacement"
     citation = (
         "M. I. Jordan (1992). Constrained supervised learning. Journal of Mathematical "
         "Psychology; M. I. Jordan (1986). Serial order: a parallel distributed processing "
         "approach."
     )
-    told = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("sum of squared configuration changes",)
-    cost = "squared-changes"
+    information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
+    secondary = ("sum of squared joint displacements",)
+    cost = "squared-displacement"
 
 
 class Acceleration(TrajectoryOptimisation):
@@ -206,7 +205,7 @@ class Acceleration(TrajectoryOptimisation):
         "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
         "confirmed mathematical model. Journal of Neuroscience (there: jerk)."
     )
-    told = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
+    information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
     secondary = ("minimum joint acceleration",)
     cost: ClassVar[Cost] = "acceleration"
     Parameters = SmoothParameters
@@ -225,7 +224,7 @@ class Jerk(Acceleration):
     cost = "jerk"
 
 
-METHODS: tuple[type[Method], ...] = (PathLength, SquaredChanges, Acceleration, Jerk)
+METHODS: tuple[type[Method], ...] = (PathLength, SquaredDisplacement, Acceleration, Jerk)
 
 
 def path_movements(

@@ -10,7 +10,7 @@ position p of the chosen hand h_g, the nonlinear programme is::
 where f is one of the costs
 
     path length        Σ_g l_g  with  |Δ_g|² <= l_g²
-    squared changes    Σ_g |Δ_g|²
+    squared displacement Σ_g |Δ_g|²
     acceleration       ∫ |d²q/dt²|² dt,  from rest to rest, the goals hit at times t_g
     jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum, or equal
 
@@ -51,7 +51,7 @@ MODEL_BASED = frozenset(
 )
 """Information of a planner with a model of the kinematics, besides its cost."""
 
-Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
+Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk"]
 
 _ONE_AT_A_TIME = RLock()
 """Held while CasADi builds a programme and IPOPT solves it, as two threads cannot do so at once."""
@@ -178,7 +178,7 @@ class TrajectoryProblem:
             lower.append(0.0)
             upper.append(0.0)
         self._lower, self._upper = np.array(lower), np.array(upper)
-        self._evaluations = goals * len(hands)  # kinematics in one evaluation of the limits
+        self._evaluations = goals * len(hands)  # forward kinematics in one evaluation of the limits
         self._solver = casadi.nlpsol(
             "trajectory",
             "ipopt",
@@ -211,16 +211,16 @@ class TrajectoryProblem:
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
-        ways = np.sqrt((steps**2).sum(axis=1))
+        distances = np.sqrt((steps**2).sum(axis=1))
         at, shortest, longest = np.zeros((3, goals))
         if self.cost == "path-length":
-            at, longest = ways.copy(), np.full(goals, np.inf)
+            at, longest = distances.copy(), np.full(goals, np.inf)
             if lengths is not None:
                 given = ~np.isnan(lengths)
                 at[given] = shortest[given] = longest[given] = lengths[given]
         times, soonest, latest = np.ones((3, goals))
         if self._order:  # durations vary at a constant total
-            times = np.maximum(ways, 1e-3)
+            times = np.maximum(distances, 1e-3)
             times = np.maximum(times * (goals / times.sum()), 0.1)
             times *= goals / times.sum()
             soonest, latest = np.full(goals, _SHORTEST[self.cost]), np.full(goals, float(goals))
@@ -293,7 +293,7 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals
     are written out in the end states, so that nothing is discretised.
     """
-    if cost == "squared-changes":
+    if cost == "squared-displacement":
         return casadi.sumsqr(step)
     v0, v1 = rates[0]
     # End states relative to the straight line at constant speed, which costs nothing.

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from coartic.benchmarks.pool import Crew, Local
+from coartic.benchmarks.pool import Local, Workers
 from coartic.benchmarks.provenance import current_environment
 from coartic.benchmarks.registry import current_code
 from coartic.benchmarks.worker import Job, Outcome, fail
@@ -68,8 +68,8 @@ class Dask:
         except CoarticError:
             raise
         except (Exception, CancelledError) as error:
-            words = f"lost Dask scheduler {self.address}, or its workers cannot work"
-            raise CoarticError(f"{words} ({error_line(error)}). {_GOES_ON}") from None
+            text = f"lost Dask scheduler {self.address}, or its workers cannot work"
+            raise CoarticError(f"{text} ({error_line(error)}). {_GOES_ON}") from None
         finally:
             client.close(timeout=3)
 
@@ -84,10 +84,10 @@ class Dask:
         except ImportError:
             raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
         except Exception as error:  # Dask's, of many kinds: who finished may be anybody
-            words = (
+            text = (
                 f"no Dask scheduler at {self.address} ({error_line(error)}). Give the address that "
             )
-            raise CoarticError(f"{words}it prints, such as tcp://127.0.0.1:8786.") from None
+            raise CoarticError(f"{text}it prints, such as tcp://127.0.0.1:8786.") from None
 
     def _wait_for_workers(self, client: Any) -> None:
         for _ in range(2):
@@ -98,8 +98,8 @@ class Dask:
         try:
             client.wait_for_workers(1, timeout=WORKERS_S)
         except TimeoutError:
-            words = f"Dask scheduler {self.address} had no workers for {WORKERS_S:g} s"
-            raise CoarticError(f"{words}; start some. {_GOES_ON}") from None
+            text = f"Dask scheduler {self.address} had no workers for {WORKERS_S:g} s"
+            raise CoarticError(f"{text}; start some. {_GOES_ON}") from None
 
 
 _kept = threading.local()
@@ -112,13 +112,13 @@ def _remote(job: Job) -> list[Outcome]:
     method = job.method
     here = current_code(method.where, method.name)
     if here != method.code:
-        words = f"method {method.name!r} has code {here} on a Dask worker and {method.code} where "
-        raise CoarticError(f"{words}the suite was started; install the same version everywhere")
-    if not hasattr(_kept, "crew"):
-        _kept.crew = Crew(Local(1), stays=True)
+        text = f"method {method.name!r} has code {here} on a Dask worker and {method.code} where "
+        raise CoarticError(f"{text}the suite was started; install the same version everywhere")
+    if not hasattr(_kept, "workers"):
+        _kept.workers = Workers(Local(1), stays=True)
     try:
-        ((_, outcomes),) = _kept.crew.perform([job])
+        ((_, outcomes),) = _kept.workers.perform([job])
     except CoarticError:  # such as a folder that is gone
-        del _kept.crew
+        del _kept.workers
         raise
     return [replace(outcome, environment=current_environment()) for outcome in outcomes]

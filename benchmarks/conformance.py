@@ -25,7 +25,7 @@ from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.worker import Job
 from coartic.method import METERED
-from coartic.runs.card import MethodCard
+from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Specification
 from coartic.runs.run import Run
 from coartic.tasks.task import check_task
@@ -34,7 +34,7 @@ from coartic.text import counted
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0
 BUDGET = 7  # trials of the runs that are to keep to it
-_UNTOLD = ("does not declare", "own compiled", "outside its session")  # words of reasons
+_UNDECLARED = ("does not declare", "own compiled", "outside its session")  # words of reasons
 
 
 class Law(NamedTuple):
@@ -52,22 +52,24 @@ def law(name: str, problems: Iterable[str], finding: str) -> Law:
 
 
 def check_method(
-    card: MethodCard, tasks: Sequence[Task] | None = None, *, verbose: bool = False
+    info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
     """Every law of a method, in order, on the shipped tasks or on others; ``verbose`` shows what it
     prints and logs, and where it crashes."""
-    trials = {"trials": CHECK_TRIALS} if "trials" in card.defaults else {}
-    parameters = trials | card.rules()["quick"]
+    trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
+    parameters = trials | info.rules()["quick"]
 
     def applies(task: Task) -> bool:
-        return card.why_not(task, parameters) is None
+        return info.why_not(task, parameters) is None
 
     def job(task: Task, seed: int = 1, trial_budget: int | None = None) -> Job:
-        complete = card.complete(parameters)
-        specification = Specification(task, card.name, card.code, card.told, complete, trial_budget)
-        return Job(specification, card, seed, (0,), CHECK_LIMIT_S)
+        complete = info.complete(parameters)
+        specification = Specification(
+            task, info.name, info.code, info.information, complete, trial_budget
+        )
+        return Job(specification, info, seed, (0,), CHECK_LIMIT_S)
 
-    laws = laws_of_declaration(card)
+    laws = laws_of_declaration(info)
     tasks = list(filter(applies, tasks or map(load_task, builtin_tasks())))
     if not tasks:
         problem = "it applies to none of the shipped tasks, so nothing can be checked"
@@ -86,11 +88,11 @@ def check_method(
             yield from (f"{how.format(name)}: {each}" for each in compare_runs(first[name], run))
 
     of_another_seed = changes(other, "declared not to be stochastic, but another seed on {}")
-    seed = "the same" if card.stochastic else "any"
+    seed = "the same" if info.stochastic else "any"
     rewards = ", ".join(f"{name} {run.reward}" for name, run in first.items())
     values = ", ".join(f"{key}={value}" for key, value in parameters.items())
     used = {name for run in first.values() for name in run.used}
-    unused = {item.value for item in METERED if item.value in card.told} - used
+    unused = {item.value for item in METERED if item.value in info.information} - used
     ends = [f"gives {run.status}: {run.reason}" for run in hopeless]
     return [
         *laws,
@@ -104,7 +106,7 @@ def check_method(
             chain(
                 changes(again, "same seed on {}, same process"),
                 changes(elsewhere, "same seed on {}, another process"),
-                () if card.stochastic else of_another_seed,
+                () if info.stochastic else of_another_seed,
             ),
             f"the same result under {seed} seed, in one process and in another",
         ),
@@ -129,7 +131,7 @@ def check_method(
                 *(
                     f"on {name}: {run.reason}"
                     for name, run in first.items()
-                    if any(words in run.reason for words in _UNTOLD)
+                    if any(words in run.reason for words in _UNDECLARED)
                 ),
                 *[f"declared but never used: {', '.join(sorted(unused))}"] * bool(unused),
             ],
@@ -150,12 +152,12 @@ def check_method(
     ]
 
 
-def laws_of_declaration(card: MethodCard) -> list[Law]:
+def laws_of_declaration(info: MethodInfo) -> list[Law]:
     """Title and citation are there; the parameters survive JSON, are checked and cannot be
     changed."""
-    empty = [name for name in ("title", "citation") if not getattr(card, name).strip()]
-    parameters, config = card.complete({}), card.rules()["config"]
-    again, problems = card.complete(parameters), []
+    empty = [name for name in ("title", "citation") if not getattr(info, name).strip()]
+    parameters, config = info.complete({}), info.rules()["config"]
+    again, problems = info.complete(parameters), []
     if again != parameters:
         problems.append(f"written as JSON and read back, {parameters} became {again}")
     if config["extra"] != "forbid":
@@ -167,7 +169,7 @@ def laws_of_declaration(card: MethodCard) -> list[Law]:
         law(
             "declaration",
             (f"{name} is empty" for name in empty),
-            f"{card.title}; told: {', '.join(card.told) or 'nothing'}",
+            f"{info.title}; information: {', '.join(info.information) or 'none'}",
         ),
         law("parameters", problems, values or "none"),
     ]
@@ -208,7 +210,7 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
             unsolved = [f"initial hands {hands}: {execution.reason}"]
     except (NotApplicableError, TaskError) as error:
         unsolved = [str(error)]
-    methods = [name for name, card in registered.items() if card.why_not(task) is None]
+    methods = [name for name, info in registered.items() if info.why_not(task) is None]
     return [
         Law("valid", True, f"{task.name}, {counted(len(task.goals), 'goal')}"),
         law(

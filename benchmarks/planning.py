@@ -114,7 +114,7 @@ def plan_suite(
         name, method = cell.task.name, cell.method
         if name not in by_name:
             by_name[name] = check_task(cell.task)
-        elif by_name[name] != cell.task:  # results are told apart by names
+        elif by_name[name] != cell.task:  # results are distinguished by names
             raise CoarticError(f"two different tasks are called {name!r}: give one another name")
         takes_trials = trials is not None and "trials" in method.defaults
         complete = method.complete(({"trials": trials} if takes_trials else {}) | cell.parameters)

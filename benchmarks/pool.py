@@ -44,7 +44,7 @@ _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
 _LEAST_MEMORY = 2**30  # bytes of a process, four times what this project's methods take
 _LARGEST_FILE = 2**28  # bytes of an answer, or of what a job prints
 _ROOM = 2**20  # bytes that are free where answers are kept
-_LAST_WORDS = 3  # lines of what a process that died has printed
+_LAST_LINES = 3  # lines of what a process that died has printed
 _PRINTED = 4000  # bytes that are read of it
 _STARTS = 5  # processes in a row that may end before they begin a job
 _UNKEPT = 74  # exit code of a process that could not write its answer
@@ -59,13 +59,13 @@ class Local:
     """Processes on this machine; ``jobs`` of them at once, or one a core.
 
     A job is ended after its limit of CPU time, a day where it has none; where it uses less, after
-    three times as much wall time and ``patience_s``. With ``verbose``, what methods print and log,
+    three times as much wall time and ``timeout_s``. With ``verbose``, what methods print and log,
     and their tracebacks, are shown.
     """
 
-    def __init__(self, jobs: int = -1, *, patience_s: float = 60.0, verbose: bool = False) -> None:
+    def __init__(self, jobs: int = -1, *, timeout_s: float = 60.0, verbose: bool = False) -> None:
         self.workers = threads_for(jobs)
-        self.patience_s = patience_s
+        self.timeout_s = timeout_s
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
@@ -74,11 +74,11 @@ class Local:
         Raises CoarticError where one process after another ends before it begins a job, and where
         their answers have no place.
         """
-        with closing(Crew(self)) as crew:
-            yield from crew.perform(jobs)
+        with closing(Workers(self)) as workers:
+            yield from workers.perform(jobs)
 
 
-class Crew:
+class Workers:
     """Worker processes and the folder of their answers, until it is closed. If it ``stays``, a
     process that is done waits for more jobs of its method."""
 
@@ -98,26 +98,26 @@ class Crew:
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.method.key].append(job)
-        workers = self.local.workers
+        most = self.local.workers
         waiting = deque(
-            of_method[first::workers]  # each has some of every cell
+            of_method[first::most]  # each has some of every cell
             for of_method in by_method.values()
-            for first in range(min(workers, len(of_method)))
+            for first in range(min(most, len(of_method)))
         )
-        crew, lost, repeated = list[Worker](), 0, set[int]()
+        workers, lost, repeated = list[Worker](), 0, set[int]()
         try:
-            while waiting or crew:
-                while waiting and len(crew) < workers:
-                    crew.append(self.worker_for(waiting[0]))
-                    crew[-1].give(waiting.popleft())
-                sentinels = [w.process.sentinel for w in crew if w.process.pid is not None]
+            while waiting or workers:
+                while waiting and len(workers) < most:
+                    workers.append(self.worker_for(waiting[0]))
+                    workers[-1].give(waiting.popleft())
+                sentinels = [w.process.sentinel for w in workers if w.process.pid is not None]
                 connection.wait(sentinels, _POLL_S)
-                for worker in tuple(crew):
+                for worker in tuple(workers):
                     exit_code = worker.exit_code  # first: after the end comes no answer
                     yield from worker.answers()
                     if exit_code is None and worker.jobs and not worker.is_late:
                         continue
-                    crew.remove(worker)
+                    workers.remove(worker)
                     if exit_code is None and not worker.jobs and self.stays:
                         self._idle = worker
                         continue
@@ -130,7 +130,7 @@ class Crew:
                     lost = 0 if begun else lost + 1
                     if lost == _STARTS:
                         raise CoarticError(
-                            f"processes cannot begin {worker.last_words}; finished runs are kept"
+                            f"processes cannot begin {worker.last_output}; finished runs are kept"
                         )
                     if lost:
                         time.sleep(_POLL_S)  # a server that was killed may yet be there
@@ -149,7 +149,7 @@ class Crew:
                 "Finished runs are kept: repeat the command, with a TMPDIR that has room"
             ) from None
         finally:
-            for worker in crew:
+            for worker in workers:
                 worker.end()
 
     def worker_for(self, jobs: Sequence[Job]) -> Worker:
@@ -175,12 +175,12 @@ class Worker:
 
     def __init__(self, folder: str, method: tuple[str, str, str], local: Local) -> None:
         self.method = method
-        """:attr:`MethodCard.key` of the method."""
+        """:attr:`MethodInfo.key` of the method."""
         self.jobs = deque[Job]()
         """Jobs that are not answered yet."""
         self.since_s = math.inf
         """Clock when it began the first of these."""
-        self._patience_s = local.patience_s
+        self._timeout_s = local.timeout_s
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
         theirs, self._ours = multiprocessing.Pipe(duplex=False)
@@ -201,7 +201,7 @@ class Worker:
         except (OSError, EOFError) as error:
             (self._folder / _SAID).write_text(error_line(error), encoding="utf-8")
             return
-        # While it compiles kernels: what it hands over is executed here.
+        # While it compiles kernels: what it returns is executed here.
         with contextlib.suppress(Exception):  # the process says the same
             warm_up(self.jobs[0].specification.task, "trials")
 
@@ -218,7 +218,7 @@ class Worker:
     @property
     def wall_limit_s(self) -> float:
         """Wall time after which its job is ended."""
-        return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._patience_s
+        return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
         """The jobs that it has answered since, with their outcomes."""
@@ -232,14 +232,14 @@ class Worker:
             answer.unlink()
 
     @property
-    def last_words(self) -> str:
+    def last_output(self) -> str:
         """How it has ended, and the last lines that it has printed."""
-        words, code = b"", self.exit_code or 0
+        text, code = b"", self.exit_code or 0
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
-            words = file.read()
-        lines = words.decode(errors="replace").strip().splitlines()
-        last = "\n".join(line[:300] for line in lines[-_LAST_WORDS:])
+            text = file.read()
+        lines = text.decode(errors="replace").strip().splitlines()
+        last = "\n".join(line[:300] for line in lines[-_LAST_LINES:])
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
@@ -253,7 +253,7 @@ class Worker:
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
             return fail(job, "crashed", "its answer could not be written: its folder was removed")
-        return fail(job, "crashed", f"the worker process ended {self.last_words}")
+        return fail(job, "crashed", f"the worker process ended {self.last_output}")
 
     def end(self) -> None:
         """End it, with the processes that it has started."""

@@ -21,7 +21,7 @@ from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.pool import CONTEXT, start_process
 from coartic.errors import CoarticError
 from coartic.method import Information, Method
-from coartic.runs.card import MethodCard, answer, card_of, load_file, methods_in
+from coartic.runs.method_info import MethodInfo, answer, load_file, method_info, methods_in
 from coartic.text import LONGEST_LINE, error_line, plain
 from coartic.threads import begin_worker, end_group
 
@@ -75,15 +75,15 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
             return
         try:
             content: Any
-            if question == "cards":
+            if question == "methods":
                 try:
                     module = load_file(Path(path))
                 except BaseException as error:
                     why = f"{shown}: cannot be imported: {error_line(error)}"
                     raise CoarticError(why) from None
                 methods = {method.name: method for method in methods_in(module)}
-                cards = cards_of_module(module, methods.values(), shown, path)
-                content = [asdict(card) for card in cards]
+                infos = methods_of_module(module, methods.values(), shown, path)
+                content = [asdict(info) for info in infos]
             else:
                 content = answer(methods[name], question, *arguments)
             text = json.dumps({"answer": content})
@@ -94,9 +94,9 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
         pipe.send_bytes(text.encode())
 
 
-def cards_of_module(
+def methods_of_module(
     module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
-) -> Iterator[MethodCard]:
+) -> Iterator[MethodInfo]:
     """Methods of a module with their code. Raises CoarticError where there is none."""
     methods = list(methods)
     for method in methods:
@@ -114,7 +114,7 @@ def cards_of_module(
             raise CoarticError(
                 f"{origin}: it imports what is no Python: {error_line(error)}"
             ) from None
-        yield card_of(method, origin, where, code)
+        yield method_info(method, origin, where, code)
     if not methods:
         unfinished = [
             f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"
@@ -140,9 +140,13 @@ def check_declaration(method: type[Method], origin: str) -> None:
             f"{where}: the name {method.name!r} must begin with a letter or digit and have only "
             "letters, digits, '.', '_', '+', '/' and '-'"
         )
-    told = getattr(method, "told", None)
-    if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):
-        raise CoarticError(f"{where}: told must be a set of Information, not {told!r}")
+    information = getattr(method, "information", None)
+    if not isinstance(information, frozenset | set) or not all(
+        isinstance(i, Information) for i in information
+    ):
+        raise CoarticError(
+            f"{where}: information must be a set of Information, not {information!r}"
+        )
 
 
 METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")

@@ -19,12 +19,12 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from coartic.benchmarks.code_identity import code_of
-from coartic.benchmarks.reader import begin_reader, cards_of_module
+from coartic.benchmarks.reader import begin_reader, methods_of_module
 from coartic.errors import CoarticError
 from coartic.inputs import check_file
 from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
 from coartic.method import Method
-from coartic.runs.card import BUILT_IN, READERS, MethodCard, card_of, methods_in
+from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info, methods_in
 from coartic.runs.plan import SEARCH
 from coartic.text import LONGEST_LINE, error_line, plain
 
@@ -37,8 +37,9 @@ MODULES = (
     "coartic.learner.method",
     "coartic.baselines.corrective_alone",
     "coartic.baselines.random_search",
+    "coartic.baselines.hill_climbing",
     "coartic.baselines.cma_es",
-    "coartic.baselines.nullspace_qp",
+    "coartic.baselines.posture_qp",
     "coartic.baselines.posture_based",
     "coartic.baselines.trajectory_optimisation",
     "coartic.baselines.receding_horizon",
@@ -47,39 +48,41 @@ MODULES = (
 """Where this project's methods are, each in its module's ``METHODS``."""
 
 
-Registry = Mapping[str, MethodCard]
-_CARDS = TypeAdapter(list[MethodCard])
+Registry = Mapping[str, MethodInfo]
+_INFOS = TypeAdapter(list[MethodInfo])
 
 
-def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodCard]:
+def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     """Every known method by id.
 
     A plug-in that cannot be loaded is a warning. Raises CoarticError for a file that
     cannot be loaded, holds no method, or takes an id that is reserved or already there.
     """
-    cards = dict(built_in())
+    infos = dict(built_in())
     for point in metadata.entry_points(group=ENTRY_POINTS):
         origin = f"plug-in {point.dist.name if point.dist else point.value}"
         try:  # a broken plug-in must not take the others with it
-            add_cards(cards, cards_of_plugin(point, origin))
+            add_methods(infos, methods_of_plugin(point, origin))
         except CoarticError as error:
             warnings.warn(
                 f"{origin}: entry point {point.name!r} cannot be used: {error}", stacklevel=2
             )
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
-        add_cards(cards, cards_of_file(path))
-    return cards
+        add_methods(infos, methods_of_file(path))
+    return infos
 
 
 @cache
-def built_in() -> Mapping[str, MethodCard]:
+def built_in() -> Mapping[str, MethodInfo]:
     """This project's methods by id."""
-    cards: dict[str, MethodCard] = {}
+    infos: dict[str, MethodInfo] = {}
     for name in MODULES:
         module = importlib.import_module(name)
         code = code_of(Path(inspect.getfile(module)))
-        cards |= {method.name: card_of(method, BUILT_IN, name, code) for method in module.METHODS}
-    return cards
+        infos |= {
+            method.name: method_info(method, BUILT_IN, name, code) for method in module.METHODS
+        }
+    return infos
 
 
 _parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
@@ -90,31 +93,31 @@ def current_code(where: str, name: str) -> str:
     with _parsing:
         if where.endswith(".py"):
             if where not in READERS:  # which reads the file anew whenever it is asked
-                list(cards_of_file(Path(where)))
-            cards = READERS[where]("", "cards")
-            return next((card["code"] for card in cards if card["name"] == name), "none")
+                list(methods_of_file(Path(where)))
+            infos = READERS[where]("", "methods")
+            return next((info["code"] for info in infos if info["name"] == name), "none")
         return code_of(Path(inspect.getfile(importlib.import_module(where))))
 
 
-def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) -> None:
+def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) -> None:
     """Add methods by id. Raises CoarticError for an id that is reserved or taken, and for
     one that differs from a name here in large and small letters alone."""
-    for card in cards:
+    for info in infos:
         names = (*registered, *CONDITIONS, *ABLATIONS, *NAMES)
         why = ""
-        if card.name.startswith(RESERVED):
+        if info.name.startswith(RESERVED):
             ours = " or ".join(map(repr, RESERVED))
             why = f"is reserved: ids that begin with {ours} are this project's"
-        elif card.name in registered:
-            why = f"is already taken ({registered[card.name].origin})"
-        elif card.name.casefold() in map(str.casefold, names):
+        elif info.name in registered:
+            why = f"is already taken ({registered[info.name].origin})"
+        elif info.name.casefold() in map(str.casefold, names):
             why = "is a name of a method here: choose another"
         if why:
-            raise CoarticError(f"{card.origin}: method id {card.name!r} {why}")
-        registered[card.name] = card
+            raise CoarticError(f"{info.origin}: method id {info.name!r} {why}")
+        registered[info.name] = info
 
 
-def cards_of_file(path: Path) -> Iterator[MethodCard]:
+def methods_of_file(path: Path) -> Iterator[MethodInfo]:
     """The methods of a file, which a process of its own imports: what it does there changes
     nothing here. Raises CoarticError where there is none that can be used."""
     shown = plain(str(path), LONGEST_LINE)
@@ -122,21 +125,21 @@ def cards_of_file(path: Path) -> Iterator[MethodCard]:
     if path.suffix != ".py":
         raise CoarticError(f"{shown}: the name of a method file ends in .py")
     ask = begin_reader(path, shown)
-    for card in _CARDS.validate_python(ask("", "cards")):
+    for info in _INFOS.validate_python(ask("", "methods")):
         READERS[str(path)] = ask
-        yield replace(card, origin=shown, where=str(path))
+        yield replace(info, origin=shown, where=str(path))
 
 
-def cards_of_plugin(point: metadata.EntryPoint, origin: str) -> Iterator[MethodCard]:
+def methods_of_plugin(point: metadata.EntryPoint, origin: str) -> Iterator[MethodInfo]:
     """The methods of an installed plug-in. Raises CoarticError."""
     try:
         target = point.load()
     except (Exception, SystemExit) as error:
         raise CoarticError(f"cannot be imported: {error_line(error)}") from None
     if not inspect.isclass(target):
-        yield from cards_of_module(target, methods_in(target), origin, target.__name__)
+        yield from methods_of_module(target, methods_in(target), origin, target.__name__)
     elif issubclass(target, Method):
         module = sys.modules[target.__module__]
-        yield from cards_of_module(module, [target], origin, module.__name__)
+        yield from methods_of_module(module, [target], origin, module.__name__)
     else:
         raise CoarticError(f"{target!r} is not a subclass of coartic.method.Method")

@@ -83,7 +83,7 @@ def perform_again(run: Run, registered: Registry) -> Run:
         raise CoarticError(
             f"run {run.id} cannot be performed here: {error}. Version {version} of coartic made it."
         ) from None
-    specification = replace(run.specification, code=method.code, told=method.told)
+    specification = replace(run.specification, code=method.code, information=method.information)
     job = Job(specification, method, run.suite_seed, (run.number,), run.time_limit_s)
     return next(perform_in_order([job]))
 
@@ -113,8 +113,8 @@ def perform_some_again(
 
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Differences of the results of two runs in words, without times and surroundings."""
-    if a.is_thin or b.is_thin:
-        a, b = a.thin(), b.thin()
+    if a.is_downsampled or b.is_downsampled:
+        a, b = a.downsample(), b.downsample()
     first, second = a.to_row(), b.to_row()
     changes = [
         f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"

@@ -1,4 +1,4 @@
-"""Execute and score the solutions that workers hand over, in a process that no method has been
+"""Execute and score the solutions that workers return, in a process that no method has been
 in."""
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Results that are shipped: ``shipped/SUITE.sqlite.xz``, each a results folder of one file.
 
 ``python -m coartic.benchmarks.shipped FOLDER`` makes one of a results folder whose runs have the
-results that are shipped already. The rewards of trials are thinned
-(:meth:`coartic.runs.run.Run.thin`), which takes it from 30 to 2 MB.
+results that are shipped already. The rewards of trials are downsampled
+(:meth:`coartic.runs.run.Run.downsample`): 2 MB in place of 30.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ def differences(folder: Path) -> Iterator[str]:
     from coartic.benchmarks.reproduce import compare_runs
 
     with open_store(folder) as made:
-        for name, card in made.plan().methods.items():
-            if name not in built_in() or built_in()[name].code != card.code:
+        for name, info in made.plan().methods.items():
+            if name not in built_in() or built_in()[name].code != info.code:
                 raise CoarticError(f"{folder}: other code of {name} made it: run the suite again")
         if (suite := made.plan().suite) not in shipped_hashes():
             return
@@ -77,13 +77,13 @@ def differences(folder: Path) -> Iterator[str]:
 
 
 def pack(folder: Path, out: Path) -> None:
-    """Write the results of a folder, thinned, and their hash to where they are shipped."""
+    """Write the results of a folder, downsampled, and their hash to where they are shipped."""
     with open_store(folder) as source, tempfile.TemporaryDirectory() as made:
         plan, made_with = source.plan(), source.made_with()
         ran, date = made_with.pop("command"), made_with.pop("date")
         with writing(Path(made)) as target:
             target.replace_plan(plan, made_with, ran, date)
-            target.write(source.run(run_id).thin() for run_id in source.runs().run_id)
+            target.write(source.run(run_id).downsample() for run_id in source.runs().run_id)
         content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
     (out / f"{plan.suite}{_ENDING}").write_bytes(content)
     packed = sorted(out.glob(f"*{_ENDING}"))

@@ -24,5 +24,6 @@ class Mine(Optimiser):
                 x, best = points[costs.argmin()], costs.min()
 
 
-# It is told the corrective process and the reward of its trials. A method that needs more, such as
-# the goals or a Jacobian, says so and has a `solve`: see "Make a method of your own" in the docs.
+# It uses the corrective process and the reward of its trials. A method that needs more, such as
+# the goals or a Jacobian, declares this information and has a `solve`: see "Make a method of your
+# own" in the docs.

@@ -1,7 +1,7 @@
 """Let a method solve a task in a worker process, and state the outcome as plain data.
 
 It may run code that nobody here has read, so its word is no more than that: it answers in plain
-data, and what it hands over as a solution is executed and scored in the parent process, where
+data, and what it returns as a solution is executed and scored in the parent process, where
 method files are not imported.
 """
 
@@ -33,7 +33,7 @@ from coartic.method import (
 )
 from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
-from coartic.runs.card import MethodCard
+from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import SEARCH, Specification, run_seed
 from coartic.runs.run import PARTS, Times
 from coartic.text import error_line
@@ -46,7 +46,7 @@ class Job:
     """A batch of runs of one cell, which are performed side by side."""
 
     specification: Specification
-    method: MethodCard
+    method: MethodInfo
     suite_seed: int
     numbers: tuple[int, ...]
     """Numbers of the runs within their cell."""
@@ -146,7 +146,8 @@ def perform_job(job: Job) -> list[Outcome]:
         Session(
             specification.task,
             run_seed(job.suite_seed, specification.task.name, number),
-            map(Information, specification.told),  # as declared, whatever became of the class since
+            # as declared, whatever became of the class since
+            map(Information, specification.information),
             trial_budget=specification.trial_budget,
             trusted=job.method.is_ours,
             of_run=True,
@@ -170,8 +171,8 @@ def perform_job(job: Job) -> list[Outcome]:
             results = method.solve_together(sessions)
         made = trials_outside() - made
         if made and not job.method.is_ours:
-            words = f"the method made {made} trials outside its session, which are not counted"
-            raise UndeclaredError(f"{words}: by coartic.objective, learn or execute")
+            text = f"the method made {made} trials outside its session, which are not counted"
+            raise UndeclaredError(f"{text}: by coartic.objective, learn or execute")
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -185,7 +186,7 @@ _seen: set[str] = set()
 """Methods that this process has run."""
 
 
-def outcome_of(method: MethodCard, result: Any, session: Session, times: Times) -> Outcome:
+def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
     """A result as plain data, or how the run failed."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
@@ -209,7 +210,7 @@ def outcome_of(method: MethodCard, result: Any, session: Session, times: Times) 
         return Outcome("crashed", place_of(error, method) + error_line(error), **spent)
 
 
-def place_of(error: BaseException, method: MethodCard) -> str:
+def place_of(error: BaseException, method: MethodInfo) -> str:
     """The line of a user's method in which it crashed, as ``mine.py, line 12: ``; empty where its
     file had no part in it."""
     if method.is_ours:

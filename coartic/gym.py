@@ -31,10 +31,10 @@ from coartic.inputs import MOST_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, Session
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.initial import initial_reward
-from coartic.motion.lanes import LANES, lanes_for, runs_for
-from coartic.motion.setup import setup_for
+from coartic.motion.robot_parameters import robot_parameters_for
+from coartic.motion.slots import SLOTS, runs_for, slots_for
 from coartic.motion.solution import execute
-from coartic.motion.steps import Fleet, look, step_robots
+from coartic.motion.steps import VectorState, look, step_robots
 from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.families import LOCKED, instance_names, shipped_families
@@ -119,7 +119,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     An action has an entry for the hand, where the robot has two, and one for each joint. The box is
     from -1 to 1; what is beyond is clipped. Up to 0.5 the hand is the one that the corrective
-    process brings to the goal by the shorter way in joint space, above 0.5 the other one. The
+    process brings to the goal by the shorter path in joint space, above 0.5 the other one. The
     target is where the corrective process would bring it, plus :data:`REACH` times the entries of
     the joints: zeros do what the corrective process does. Where it would fail, the present posture
     takes the place of its result. Entries of joints that a robot does not have do nothing.
@@ -176,7 +176,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._rngs: list[Any] = [None] * num_envs
-        self.fleet = Fleet(
+        self.state = VectorState(
             task=np.zeros(num_envs, np.int64),
             goal=np.zeros(num_envs, np.int64),
             q=np.zeros((num_envs, widest.dof)),
@@ -184,7 +184,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
             actions=np.zeros((num_envs, entries)),
             rewards=np.zeros(num_envs),
             seen=np.zeros((num_envs, len(high)), np.float32),
-            setups=setup_for(widest)[:0],
+            robot_parameters=robot_parameters_for(widest)[:0],
             kinds=np.full(number, -1),
             goals=np.zeros((number, goals, 2)),
             counts=np.zeros(number, np.int64),
@@ -194,33 +194,35 @@ class TaskVectorEnv(Recorded, VectorEnv):
             ahead=ahead,
             reach=REACH,
             failed=-float(FAILED),
-            runs=runs_for(len(hands) * LANES, widest).reshape(len(hands), LANES),
-            lanes=lanes_for(widest),
-            members=np.zeros(LANES, np.int64),
+            runs=runs_for(len(hands) * SLOTS, widest).reshape(len(hands), SLOTS),
+            slots=slots_for(widest),
+            indices=np.zeros(SLOTS, np.int64),
         )
 
     def task_at(self, number: int) -> Task:
         """A task by its number; it is loaded when it is first asked for."""
-        task, fleet = as_task(self.tasks[number]), self.fleet
-        if fleet.kinds[number] < 0:
+        task, state = as_task(self.tasks[number]), self.state
+        if state.kinds[number] < 0:
             check_model(self.model, radius=task.radius)
             self.tasks[number], places = task, self.places_of(task.robot)
             self.starts[number, places] = task.q0
             locked = ["xy".index(axis) for axis in task.locked_base]
-            fleet.movable[number] = np.isin(fleet.joints, np.setdiff1d(places, locked))
-            fleet.goals[number, : len(task.goals)] = task.goal_array
-            fleet.counts[number] = len(task.goals)
+            state.movable[number] = np.isin(state.joints, np.setdiff1d(places, locked))
+            state.goals[number, : len(task.goals)] = task.goal_array
+            state.counts[number] = len(task.goals)
             kind = task.robot, float(task.radius), task.locked_base
             if kind not in self.kind_of:
-                self.kind_of[kind] = len(fleet.setups)
-                setup = setup_for(
+                self.kind_of[kind] = len(state.robot_parameters)
+                robot_parameters = robot_parameters_for(
                     self.widest, task.radius, locked_base=task.locked_base, model=self.model
                 ).copy()
-                for hand, arm in zip(HANDS, setup["arms"][0], strict=True):
+                for hand, arm in zip(HANDS, robot_parameters["arms"][0], strict=True):
                     _, links, arm["shoulder_x"], arm["shoulder_y"] = task.robot.arm(hand)
                     arm["links"] = np.pad(links, (0, len(arm["links"]) - len(links)))
-                self.fleet = fleet._replace(setups=np.concatenate([fleet.setups, setup]))
-            fleet.kinds[number] = self.kind_of[kind]
+                self.state = state._replace(
+                    robot_parameters=np.concatenate([state.robot_parameters, robot_parameters])
+                )
+            state.kinds[number] = self.kind_of[kind]
         return task
 
     def places_of(self, robot: Robot) -> NDArray[np.int64]:
@@ -230,12 +232,12 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def begin(self, rows: Rows, numbers: ArrayLike) -> None:
         """Put robots at the start of the tasks of these numbers."""
-        fleet = self.fleet
-        fleet.task[rows], fleet.goal[rows], fleet.going[rows] = numbers, 0, True
-        for number in {*fleet.task[rows].tolist()}:
+        state = self.state
+        state.task[rows], state.goal[rows], state.going[rows] = numbers, 0, True
+        for number in {*state.task[rows].tolist()}:
             self.task_at(number)
-        fleet.q[rows] = self.starts[fleet.task[rows]]
-        look(self.fleet)
+        state.q[rows] = self.starts[state.task[rows]]
+        look(self.state)
 
     def move(self, actions: ArrayLike, rows: Rows = slice(None)) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
@@ -243,19 +245,19 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
         Raises ValueError for actions of another shape, or with NaN.
         """
-        chosen, shape = real_array("actions", actions), self.fleet.actions[rows].shape
+        chosen, shape = real_array("actions", actions), self.state.actions[rows].shape
         if chosen.shape != shape:
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
-        self.fleet.actions[rows] = chosen
-        refused = step_robots(self.fleet)
+        self.state.actions[rows] = chosen
+        refused = step_robots(self.state)
         if refused >= 0:
             which = f" of robot {refused}" if self.num_envs > 1 else ""
             raise ValueError(f"the action{which} has NaN; it must be numbers")
 
     def infos(self) -> dict[str, Any]:
         """Names of tasks, and whether all goals are hit."""
-        task = self.fleet.task
-        return {"task": self.names[task], "is_success": self.fleet.goal == self.fleet.counts[task]}
+        task = self.state.task
+        return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
     def reset(
         self,
@@ -276,26 +278,26 @@ class TaskVectorEnv(Recorded, VectorEnv):
             if each is not None or self._rngs[row] is None:
                 self._rngs[row] = seeding.np_random(each)[0]
         self._begin_anew(np.ones(self.num_envs, np.bool_))
-        return self.fleet.seen.copy(), self._masked_infos()
+        return self.state.seen.copy(), self._masked_infos()
 
     def step(
         self, actions: ArrayLike
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Reach for the next goal of each trial, and begin anew those that have ended."""
-        fleet = self.fleet
-        if not fleet.going.all():
+        state = self.state
+        if not state.going.all():
             raise ResetNeeded("no trial goes on: reset first")
         self.move(actions)
-        final, ended = {}, ~fleet.going
+        final, ended = {}, ~state.going
         if ended.any():
             last = np.full(self.num_envs, None, dtype=object)
             for row in np.flatnonzero(ended).tolist():
-                last[row] = fleet.seen[row].copy()
+                last[row] = state.seen[row].copy()
             final = {"final_obs": last, "final_info": self._masked_infos(ended)}
             final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
             self._begin_anew(ended)
         infos = self._masked_infos() | final
-        return fleet.seen.copy(), fleet.rewards.copy(), ended, np.zeros_like(ended), infos
+        return state.seen.copy(), state.rewards.copy(), ended, np.zeros_like(ended), infos
 
     def _begin_anew(self, ended: NDArray[np.bool_]) -> None:
         number, rows = len(self.tasks), np.flatnonzero(ended)
@@ -333,17 +335,17 @@ class TaskEnv(Recorded, gymnasium.Env):
         super().reset(seed=whole_seed(seed))
         check_no_options(options)
         self.robots.begin(slice(None), self.np_random.integers(len(self.robots.tasks), size=1))
-        return self.robots.fleet.seen[0].copy(), self._info()
+        return self.robots.state.seen[0].copy(), self._info()
 
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Reach for the next goal. Raises ResetNeeded where the trial has ended."""
-        fleet = self.robots.fleet
-        if not fleet.going[0]:
+        state = self.robots.state
+        if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
         self.robots.move(np.asarray(action)[None])
-        return fleet.seen[0].copy(), fleet.rewards.item(), not fleet.going[0], False, self._info()
+        return state.seen[0].copy(), state.rewards.item(), not state.going[0], False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """The robot and its goals as a picture ``(400, 600, 3)``; goals that are hit are filled."""
@@ -354,14 +356,14 @@ class TaskEnv(Recorded, gymnasium.Env):
 
         from coartic.drawing import box, draw_goals, draw_robot, fill_goals
 
-        robots, fleet = self.robots, self.robots.fleet
-        task = robots.task_at(fleet.task.item())
+        robots, state = self.robots, self.robots.state
+        task = robots.task_at(state.task.item())
         (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
         figure = Figure(figsize=(6, 4))
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-        draw_robot(axes, task, fleet.q[0, robots.places_of(task.robot)], weight=1.5)
-        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < fleet.goal[0])
+        draw_robot(axes, task, state.q[0, robots.places_of(task.robot)], weight=1.5)
+        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
@@ -485,9 +487,9 @@ def score(
         robots, totals = TaskVectorEnv(len(rows), **given), np.zeros(len(rows))
         robots.begin(rows, rows // trials)
         while len(rows):
-            robots.move(act(robots.fleet.seen[rows]), rows)
-            totals[rows] += robots.fleet.rewards[rows]
-            rows = np.flatnonzero(robots.fleet.going)
+            robots.move(act(robots.state.seen[rows]), rows)
+            totals[rows] += robots.state.rewards[rows]
+            rows = np.flatnonzero(robots.state.going)
         return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
 
     def column(values: Iterable[float | None]) -> Array:
@@ -541,10 +543,11 @@ def options_of(env: Any) -> dict[str, Any]:
 def reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
     """Reward of a method's solution of a task; None where it has none.
 
-    Methods of this project are trusted, as in a suite; any other is told what it declares.
+    Methods of this project are trusted, as in a suite; any other gets the information that it
+    declares.
     """
     trusted = type(method).__module__.startswith(("coartic.baselines.", "coartic.learner."))
-    session = Session(task, seed, method.told, model=model, trusted=trusted)
+    session = Session(task, seed, method.information, model=model, trusted=trusted)
     with suppress(MethodError, NotApplicableError):
         solution = method.solve(session).solution
         session.check_solution(solution)

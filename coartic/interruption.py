@@ -61,7 +61,7 @@ def end_if_interrupted() -> None:
 
 @contextmanager
 def blocked_signals() -> Iterator[None]:
-    """A process that begins meanwhile is not told to end: Ctrl-C tells all that a terminal has."""
+    """A process that begins meanwhile is not asked to end: Ctrl-C asks all that a terminal has."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -1,10 +1,10 @@
 """The base of methods, and the session through which a method works.
 
-A learner, planner or controller is a :class:`Method`. It states its citation, its
-parameters and what it is **told**. Given a :class:`Session` (one task, one seed, one
-meter) it returns a solution. The session is the only way to the robot: every call is
-counted, and a call that the method's declaration does not cover is refused. The
-harness executes, scores and verifies the solution itself.
+A learner, planner or controller is a :class:`Method`. It states its citation, its parameters and
+the **information** that it uses. Given a :class:`Session` (one task, one seed, one meter) it
+returns a solution. The session is the only way to the robot: every call is counted, and a call that
+the method's declaration does not cover is refused. The harness executes, scores and verifies the
+solution itself.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands, too_many_sequences
 from coartic.motion.outside import inside, note_trials
-from coartic.motion.reach import Bench, bench_of, reach_all
+from coartic.motion.reach import CompiledTask, compiled_task, reach_all
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.motion.trials import HandSequences, Trials, check_targets, hand_codes, trials_on
 from coartic.robot import Array, Hand, Robot
@@ -38,7 +38,7 @@ from coartic.tasks.task import INITIAL_POLICIES, Task
 
 
 class Information(StrEnum):
-    """What a method can be told, beyond the start, the hands and the number of goals."""
+    """Information that a method can use, beyond the start, the hands and the number of goals."""
 
     GOALS = "goals"
     """Where the goals are, and their radius."""
@@ -47,7 +47,7 @@ class Information(StrEnum):
     JACOBIAN = "Jacobian"
     """How a hand moves with the joints, in a configuration."""
     CORRECTIVE_PROCESS = "corrective process"
-    """A configuration that hits a goal, found by **A**; **A** knows goal and Jacobian."""
+    """A configuration that hits a goal, found by **A**; **A** uses goal and Jacobian."""
     REWARD_BY_TRIAL = "reward by trial"
     """The total reward of a trial, after making it."""
     REWARD_BY_SUBTASK = "reward by subtask"
@@ -167,7 +167,7 @@ def pack_rewards(rewards: Iterable[int | None]) -> array[int]:
 
 @dataclass(frozen=True)
 class Result:
-    """A solution, with what else a method hands over."""
+    """A solution, with what else a method returns."""
 
     solution: tuple[Movement, ...]
     details: dict[str, Any] = field(default_factory=dict)
@@ -222,7 +222,7 @@ class Session:
         self,
         task: Task,
         seed: int,
-        told: Iterable[Information],
+        information: Iterable[Information],
         *,
         model: MotionModel = PAPER,
         trial_budget: int | None = None,
@@ -230,7 +230,7 @@ class Session:
         of_run: bool = False,
     ) -> None:
         self._task = task
-        self._told = frozenset(told)
+        self._information = frozenset(information)
         self._used: set[Information] = set()
         self.seed = seed
         self.rng = np.random.default_rng(seed)
@@ -330,10 +330,11 @@ class Session:
         for item in information:
             if item in self._used:
                 continue
-            if item not in self._told:
-                told = ", ".join(sorted(self._told)) or "nothing"
+            if item not in self._information:
+                declared = ", ".join(sorted(self._information)) or "nothing"
                 raise UndeclaredError(
-                    f"the method used {item.value!r}, which it does not declare (told: {told})"
+                    f"the method used {item.value!r}, which it does not declare (declared: "
+                    f"{declared})"
                 )
             self._used.add(item)
 
@@ -386,7 +387,7 @@ class Session:
         with self.lock:
             self._affordable(1)
             with inside(self._of_run):
-                (execution,) = execute_many(self._bench, [solution])
+                (execution,) = execute_many(self._compiled, [solution])
             if isinstance(execution, Exception):
                 raise execution
             self._count(
@@ -396,7 +397,7 @@ class Session:
                 execution.iterations,
                 execution.evaluations,
             )
-        if Information.CORRECTIVE_PROCESS in self._told:
+        if Information.CORRECTIVE_PROCESS in self._information:
             return execution
         return replace(
             execution, movements=tuple(solution), configurations=execution.configurations[:0]
@@ -428,7 +429,7 @@ class Session:
         with self.lock:
             left = self._affordable(len(given))
             trials = self.unchecked_trials(codes[:left], given[:left], until=until)
-        if Information.CORRECTIVE_PROCESS in self._told:
+        if Information.CORRECTIVE_PROCESS in self._information:
             return trials
         return trials._replace(
             corrections=trials.corrections[:0],
@@ -446,11 +447,11 @@ class Session:
             raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
         return min(count, left)
 
-    # The same for an objective, which hands over what fits the task and the budget.
+    # The same for an objective, which returns what fits the task and the budget.
 
     @cached_property
-    def _bench(self) -> Bench:
-        return bench_of(self._task, self.model)
+    def _compiled(self) -> CompiledTask:
+        return compiled_task(self._task, self.model)
 
     def hand_codes(self, hands: HandSequences, count: int) -> NDArray[np.int64]:
         """Hands of trials as indices into HANDS, shape ``(count, G)``; ValueError where they do
@@ -463,7 +464,7 @@ class Session:
         """:meth:`trials` with hands ``(N, G)`` as indices into HANDS and with ``targets`` that are
         its own: joints without one are filled in."""
         note_trials(0 if self._of_run else len(targets))
-        trials = trials_on(self._bench, codes, targets)
+        trials = trials_on(self._compiled, codes, targets)
         if until is not None:
             better = trials.rewards > np.asarray(until)[: len(targets)]
             if better.any():
@@ -476,7 +477,7 @@ class Session:
     def unchecked_trial(self, codes: NDArray[np.int64], targets: Array) -> int | None:
         """The reward of one trial, None where it fails; as :meth:`unchecked_trials` for N = 1."""
         note_trials(0 if self._of_run else 1)
-        reached = reach_all(self._bench, codes, targets[:, :, None])
+        reached = reach_all(self._compiled, codes, targets[:, :, None])
         completed = bool(reached.hit[0, -1])
         ticks = sum(reached.ticks[0].tolist())
         reward = -ticks if completed else None
@@ -576,15 +577,15 @@ class Session:
 
     # The back door of this project's compiled methods.
 
-    def hand_over(self, *information: Information) -> Task:
+    def reveal(self, *information: Information) -> Task:
         """The task itself, for compiled methods of this project that count by themselves.
 
         Marks ``information`` as used. The method adds its counts with :meth:`spend`.
         Raises UndeclaredError for any other method.
         """
-        self._needs_trust("hand_over")
+        self._needs_trust("reveal")
         if not information:
-            raise UndeclaredError("hand_over without saying what is used of the task")
+            raise UndeclaredError("reveal without saying what is used of the task")
         self._use(*information)
         return self._task
 
@@ -607,7 +608,7 @@ class Method(ABC):
     """Id, such as ``"dual-process"``; another form of it adds ``/form``."""
     title: ClassVar[str]
     citation: ClassVar[str]
-    told: ClassVar[frozenset[Information]]
+    information: ClassVar[frozenset[Information]]
     secondary: ClassVar[tuple[str, ...]] = ()
     """Its secondary objectives, in words."""
     stochastic: ClassVar[bool] = True

@@ -17,19 +17,19 @@ class MotionModel(NamedTuple):
 
     step: float = 0.01
     """m: length of one movement step in joint space, in which a length unit of the base counts as
-    much as a rad of a joint (printed)."""
+    much as a rad of a joint (published)."""
 
     arrival_tolerance: float = 0.01
     """θ^a: distance at which a hand has arrived, length unit (inferred; the
-    extracted text prints 0.1, which does not give the published rewards)."""
+    extracted text has 0.1, which does not give the published rewards)."""
 
     gain: float = 0.05
-    """α: step size of the corrective process, ``q += α Jᵀ e`` (printed). For the base it has no
+    """α: step size of the corrective process, ``q += α Jᵀ e`` (published). For the base it has no
     unit; for the joints it is rad per squared length unit, which cancels the unit of ``Jᵀ e``."""
 
     correction_tolerance: float = 0.01
     """Distance to the goal's centre at which the corrective process ends, length
-    unit (inferred to be θ^a; the caption of Figure 2 prints θ^g)."""
+    unit (inferred to be θ^a; the caption of Figure 2 has θ^g)."""
 
     max_iterations: int = 20_000
     """Corrective iterations after which a trial has failed (our bound)."""

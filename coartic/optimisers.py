@@ -32,7 +32,7 @@ from coartic.method import (
 from coartic.model import PAPER, MotionModel
 from coartic.motion.initial import corrective_trial, sequences_with, too_many_sequences
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.motion.reach import bench_of
+from coartic.motion.reach import compiled_task
 from coartic.motion.solution import Movement
 from coartic.motion.trials import HandSequences, movements_of, trials_on
 from coartic.robot import HANDS, Array
@@ -44,8 +44,8 @@ from coartic.text import counted
 if TYPE_CHECKING:  # workers do without pandas
     import pandas as pd
 
-TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
-"""What a method that minimises an :class:`Objective` is told."""
+OPTIMISER_INFORMATION = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+"""Information that a method which minimises an :class:`Objective` uses."""
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
@@ -184,9 +184,9 @@ class Objective:
 
     @property
     def task(self) -> Task:
-        """The task. Raises UndeclaredError in a method, which is not told."""
+        """The task. Raises UndeclaredError in a method, which cannot see it."""
         if self._task is None:
-            raise UndeclaredError("a method is not told its task, nor what is known of it")
+            raise UndeclaredError("a method cannot see its task, nor what is known of the task")
         return self._task
 
     @property
@@ -286,7 +286,7 @@ class Objective:
         chosen = self.hands if hands is None else hands
         codes, targets = self._trials_of(point[None], self._session.hand_codes(chosen, 1))
         given = ~np.isnan(targets[0]).all(axis=1)
-        trials_on(bench_of(task, self._session.model), codes, targets)  # fills in joints
+        trials_on(compiled_task(task, self._session.model), codes, targets)  # fills in joints
         after = np.isnan(targets[0]) & given[:, None]  # goals after one where the trial failed
         return movements_of(chosen, np.where(after, task.q0, targets[0]))
 
@@ -295,7 +295,7 @@ class Objective:
 
         Raises UndeclaredError in a method.
         """
-        session = Session(self.task, 0, TOLD, model=self._session.model)
+        session = Session(self.task, 0, OPTIMISER_INFORMATION, model=self._session.model)
         return Objective(session, task=self.task, **self._asked)
 
     # Evaluation.
@@ -487,7 +487,7 @@ def objective(
     reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
     if hands is None and reason:
         raise MethodError("infeasible", f"{reason}; say which hands")
-    session = Session(chosen, 0, TOLD, model=model)
+    session = Session(chosen, 0, OPTIMISER_INFORMATION, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
 
 
@@ -553,7 +553,7 @@ class Optimiser(Method):
     A subclass has a name, a title, a citation and :meth:`optimise`.
     """
 
-    told = TOLD
+    information = OPTIMISER_INFORMATION
     Parameters = OptimiserParameters
 
     def solve(self, session: Session) -> Result:

@@ -90,7 +90,7 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
 class Robot:
     """Geometry of a two-armed planar robot, and its kinematics; the default is the paper's.
 
-    Four unit links an arm on a box 1 wide and 0.2 high are printed (Figure 1).
+    Four unit links an arm on a box 1 wide and 0.2 high are published (Figure 1).
     Shoulders on the top corners of the box are inferred: only a height of +0.1
     gives the published initial rewards of the one-armed tasks (docs/model.md).
 

@@ -50,7 +50,7 @@ class RobotEnvs(VecEnv):
 
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
         """Make the next subtask of all trials."""
-        costs = np.array([self._cost(task) for task in self._envs.fleet.task.tolist()])
+        costs = np.array([self._cost(task) for task in self._envs.state.task.tolist()])
         observations, rewards, ended, _, seen = self._envs.step(self._actions)
         self._lost += rewards
         self._steps += 1

@@ -80,11 +80,11 @@ def claim(name: str, suite: str = "") -> Row:
     return Row(claims(suite).loc[name])
 
 
-def verdicts(suite: str = "", *, others: bool = False, printed: bool = False) -> dict[str, int]:
+def verdicts(suite: str = "", *, others: bool = False, published: bool = False) -> dict[str, int]:
     """How many claims have each verdict; ``others``: without the three that carry the paper's
-    point; ``printed``: that rest on printed goals alone."""
+    point; ``printed``: that rest on published goals alone."""
     judged = claims(suite)
-    if printed:
+    if published:
         judged = judged[~judged.statement.str.contains("†")]
     if others:
         judged = judged[[not CLAIMS[name].short for name in judged.index]]
@@ -102,9 +102,9 @@ def seen(evidence: str, words: str, which: int = 0) -> str:
     return str(re.findall(number_behind, evidence, re.IGNORECASE)[which])
 
 
-def p_of_shares(values: Row, printed_runs: int) -> float:
-    """p of Fisher's exact test that runs learn a hand sequence as often as printed ones."""
-    counts = (values.published_runs, printed_runs), (values.runs, values.of_runs)
+def p_of_shares(values: Row, published_runs: int) -> float:
+    """p of Fisher's exact test that runs learn a hand sequence as often as published ones."""
+    counts = (values.published_runs, published_runs), (values.runs, values.of_runs)
     return float(stats.fisher_exact([[n, of - n] for n, of in counts]).pvalue)
 
 
@@ -122,7 +122,7 @@ def filled_pages() -> dict[str, str]:
     values = {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "seen": seen,
         "name_of": name_of, "p_of_shares": p_of_shares, "p_above": p_above,
-        "printed": tomllib.loads(published.read_text("utf-8"))["general"],
+        "published": tomllib.loads(published.read_text("utf-8"))["general"],
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
         "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),

@@ -46,7 +46,7 @@ def claims() -> Iterator[str]:
     def goals(claim: Any) -> str:
         if claim in CLAIMS_ON_FAMILIES:
             return "random tasks"
-        return "reconstructed †" if claim.fitted else "printed"
+        return "reconstructed †" if claim.fitted else "published"
 
     rows = (
         (

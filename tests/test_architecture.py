@@ -29,7 +29,7 @@ ALLOWED = {
 COMMAND_LINE = ("coartic/cli/", "coartic/__main__.py")
 BY_NAME = {
     "coartic/__init__.py": "the API, whose names are at home in coartic (the test below)",
-    "coartic/runs/card.py": "the code of a method, which can be anybody's",
+    "coartic/runs/method_info.py": "the code of a method, which can be anybody's",
 }
 """Modules of ``coartic`` that import by a name that only running shows, and what."""
 
@@ -74,7 +74,7 @@ def test_imports_point_one_way():
 
 
 def test_coartic_imports_nothing_above_by_name():
-    """Nor by a function that imports what it is told."""
+    """Nor by a function that imports what its caller names."""
     by_name = re.compile(r"import_module|__import__|importlib\.util|^def __getattr__", re.MULTILINE)
     found = {
         path.relative_to(ROOT).as_posix()
@@ -124,7 +124,7 @@ import sys
 import coartic
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
 assert {*coartic.__all__} <= {*dir(coartic)}, "not shown before it is imported"
-from coartic.runs.card import load_method
+from coartic.runs.method_info import load_method
 import coartic.benchmarks.pool
 assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
 assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.run"} & set(sys.modules)
@@ -247,7 +247,7 @@ def without_posix(out):
     from coartic.benchmarks.run import perform, plan_suite
     from tests.support.suites import InProcess
 
-    methods = ["EC1", "random-search/climbing", "nullspace-qp/next-goal"]
+    methods = ["EC1", "hill-climbing", "posture-qp/goals-ahead"]
     plan = plan_suite("quick", runs=2, trials=5, tasks=["ascending"], methods=methods)
     assert perform(plan, out, executor=InProcess()).failed == 0
     runs = load(out).runs

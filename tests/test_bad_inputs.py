@@ -48,7 +48,7 @@ from coartic.method import Method
 class A(Method):
     name = "a"
     title = citation = "x"
-    told = frozenset()
+    information = frozenset()
     def solve(self, session): ...
 """
 
@@ -117,7 +117,7 @@ METHODS = [
     (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
     (method('"a"', '"CMA-ES"'), "'CMA-ES' is a name of a method here"),
     (method('"a"', '"ec4"'), "'ec4' is a name of a method here"),
-    (method("frozenset()", '"goals"'), "told must be a set of Information"),
+    (method("frozenset()", '"goals"'), "information must be a set of Information"),
     (METHOD + "    files = ('w.npy',)", "w.npy"),
 ]
 
@@ -243,7 +243,7 @@ def test_a_folder_that_cannot_be(name):
     [
         ("the learner EC1", "dual-process/EC1"),
         ("CMA-ES", "cma-es/bandit"),
-        ("nullspace", "nullspace-qp/none"),
+        ("posture qp", "posture-qp/goals-ahead"),
         ("Posture based: two goals", "posture-based/two-goals"),
         ("two armed 2", "two-armed-2"),
         ("DESCENDING", "descending"),

@@ -119,7 +119,9 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
     page = opened(reduced_motion="reduce")
     shared = shared_goal(traced)
     said = page.locator(".play .beside")
-    said.get_by_text(f"{shared.spreads:.1f} standard deviations apart").first.wait_for()
+    said.get_by_text(
+        f"{shared.standardised_posture_difference:.1f} standard deviations"
+    ).first.wait_for()
     page.get_by_text("Try more").click()
     tasks = {task.label: name for name, task in traced.tasks.items()}
     options = part(page, "preset").locator("option").all_inner_texts()
@@ -152,9 +154,9 @@ def test_a_cell_of_the_ranking_opens_its_film(opened):
     page = opened()
     cells = page.locator("#table-ranking .film-of")
     assert cells.count() > 5
-    row = page.locator("#table-ranking tr", has=page.get_by_title("row random-search/climbing"))
+    row = page.locator("#table-ranking tr", has=page.get_by_title("row hill-climbing"))
     row.locator(".film-of").click()
-    assert part(page, "stored").input_value() == "random-search/climbing"
+    assert part(page, "stored").input_value() == "hill-climbing"
     assert part(page, "preset").locator("option:checked").text_content() == "Two-armed 1 †"
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")

@@ -262,7 +262,7 @@ def on_a_circle(start, angles):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_takes_fewer_ticks_than_the_distances_say(seed):
-    """All hand sequences, and the waiting arm anywhere between where it was and will be."""
+    """All hand sequences, and the idle arm anywhere between where it was and will be."""
     rng = np.random.default_rng(seed)
     angles, start = rng.uniform(-1, 1, 3), rng.uniform(-1, 1)
     task, ratios = on_a_circle(start, angles), []

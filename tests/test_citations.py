@@ -19,7 +19,7 @@ from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.reader import METHOD_NAME
 from coartic.benchmarks.registry import NAMES, built_in, registry
 from coartic.benchmarks.suites import Cell
-from coartic.runs.card import MethodCard
+from coartic.runs.method_info import MethodInfo
 from coartic.runs.store import RUNS_FILE
 from tests.support.suites import BROKEN, run_and_write
 
@@ -81,7 +81,7 @@ def test_every_method_has_a_row_and_every_entry_is_used():
 
 
 def declared(title, citation, origin="built in"):
-    return MethodCard(title, title, citation, (), (), True, {}, origin, "")
+    return MethodInfo(title, title, citation, (), (), True, {}, origin, "")
 
 
 def test_each_work_once_with_the_methods_that_rest_on_it():

@@ -35,7 +35,7 @@ from tests.support.suites import KNOWN, InProcess, run_and_write
 NAN = float("nan")
 ONE_ARMED = ("ascending", "descending")
 T1, T2 = "two-armed-1", "two-armed-2"
-GUESSES = "guesses"
+RANDOM_SEARCH = "random-search"
 COUNTED = Path(__file__).parent.parent / "docs" / "stored" / "reconstruction" / "sets.csv"
 
 
@@ -219,7 +219,7 @@ def on_2(condition, rewards, hands, **more):
          + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "supported"),
         ("multilevel-search", on_1("EC1", LOW) + on_1("EC3", MIDDLE)
          + on_2("EC1", BETTER, "RRRR") + on_2("EC3", WORSE, "RRRR"), "not supported"),
-        # About half. A tenth is too few, but not told from 9 of 20 by so few runs.
+        # About half. A tenth is too few, but so few runs do not distinguish it from 9 of 20.
         ("ec2-sequences", on_1("EC2", MIDDLE * 5, ["RRLR", "LRLR"] * 20), "supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, "RRRR"), "not supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR", "RRRR"] * 20), "supported"),
@@ -369,7 +369,7 @@ def test_the_corrective_process_is_near_the_shortest_way():
 
 
 BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
-PLANS = ("path-length", "squared-changes", "acceleration", "jerk")
+PLANS = ("path-length", "squared-displacement", "acceleration", "jerk")
 
 
 SPREAD = (-1, 0, 1, 0, -1, 1)
@@ -386,7 +386,7 @@ def beside_plans(reward, plan, *, spread=SPREAD):
     return rows
 
 
-JUST = {"squared-changes": -302}
+JUST = {"squared-displacement": -302}
 """One plan a little worse than the learner: p of its test is 0.049, too much times six."""
 
 
@@ -396,7 +396,7 @@ JUST = {"squared-changes": -302}
         (beside_plans(-300, -310), "supported"),
         (beside_plans(-310, -300), "not supported"),
         (beside_plans(-300, -300), "undecided"),
-        (beside_plans(-300, {"squared-changes": -310}), "supported"),
+        (beside_plans(-300, {"squared-displacement": -310}), "supported"),
         (beside_plans(-300, JUST, spread=(-3, -2, 3, 2, -1, 2)), "undecided"),
     ],
 )
@@ -440,11 +440,11 @@ def test_resemblance_is_half_the_initial_distance(share, verdict):
     for task in ONE_ARMED:
         initial = corrective_trial(load_task(task), "RRR").configurations
         planned = initial + 0.1
-        solutions[task, "trajectory-optimisation/squared-changes"] = [at(planned)]
+        solutions[task, "trajectory-optimisation/squared-displacement"] = [at(planned)]
         solutions[task, "dual-process/EC1"] = [
             at(planned + (share + 0.01 * k) * (initial - planned)) for k in range(-4, 5)
         ]
-    judged = verdict_of("resembles-squared-changes", plant(solutions))
+    judged = verdict_of("resembles-squared-displacement", plant(solutions))
     assert judged.verdict == verdict
     assert judged.evidence.count(f"{1 - share:.3f} [".replace("-", "−")) == 2
 
@@ -454,23 +454,26 @@ SLOWER = ["LLRR"] * 8 + ["LRLR"] * 31 + ["RRRR"]
 
 
 @pytest.mark.parametrize(
-    ("hands", "guessed", "verdict"),
+    ("hands", "of_random_search", "verdict"),
     [
         ({"EC2": "LLRR", "EC3": "LRLR"}, "LRLR", "supported"),  # left is slower for goal 2
         ({"EC2": "RRRR", "EC3": "LRLR"}, "LRLR", "not supported"),  # slower, but as initially
         ({"EC2": "LRLR", "EC3": "LRLR"}, "LRLR", "not supported"),
         ({"EC2": "LRLL", "EC3": "LRLR"}, "LRLR", "not supported"),  # slower, but nothing follows
-        ({"EC2": "LLRR", "EC3": "LRLR"}, "LLRR", "undecided"),  # guesses do so as well
+        ({"EC2": "LLRR", "EC3": "LRLR"}, "LLRR", "undecided"),  # random search does so as well
         ({"EC2": "few LLRR", "EC3": "LRLR"}, "LRLR", "undecided"),  # more than it, but few
     ],
 )
-def test_hands_that_serve_other_goals(hands, guessed, verdict):
+def test_hands_that_serve_other_goals(hands, of_random_search, verdict):
     """Of two-armed task 1: left first and right second are the quicker hands, initially RRRR."""
     task = load_task(T1)
     quick = {h: corrective_trial(task, h).ticks_by_goal() for h in ("LLLL", "RRRR", "LRRR")}
     assert quick["LLLL"][0] < quick["RRRR"][0]
     assert quick["LRRR"][1] < corrective_trial(task, "LLRR").ticks_by_goal()[1]
-    of = {**{f"dual-process/{condition}": h for condition, h in hands.items()}, GUESSES: guessed}
+    of = {
+        **{f"dual-process/{condition}": h for condition, h in hands.items()},
+        RANDOM_SEARCH: of_random_search,
+    }
     runs = {h: corrective_trial(task, h) for h in {"LRLL", *SLOWER}}
     assert runs["LRLR"].ticks_by_goal()[3] < runs["LRLL"].ticks_by_goal()[3]
     solutions = {
@@ -484,8 +487,8 @@ def test_hands_that_serve_other_goals(hands, guessed, verdict):
         assert f"40 of 40 runs, slower for these goals by {ticks} ticks" in judged.evidence
 
 
-def waiting(task, part):
-    """At goal 2 the waiting left arm goes part of its way to the posture of goal 3."""
+def idle(task, part):
+    """At goal 2 the idle left arm goes part of its path to the posture of goal 3."""
     task = load_task(task)
     q = corrective_trial(task, "LRLR").configurations.copy()
     left = task.robot.joints("left")
@@ -521,7 +524,7 @@ OFF = np.array([-3, -2, -1, 1, 2, 3, -1, 1])
 SEEN = {
     "first-movement-sacrificed": (timed, ONE_ARMED, ("EC1",), 6, 1),
     "arm-coarticulation": (hit_early, (T1, T2), ("EC3", "EC4"), 0.3, 0.02),
-    "other-arm-coarticulation": (waiting, (T1,), ("EC4",), 0.3, 0.01),
+    "other-arm-coarticulation": (idle, (T1,), ("EC4",), 0.3, 0.01),
     "context": (elsewhere, ONE_ARMED, ("EC1",), 1.0, 0.02),
 }
 """Claims with the runs that show it, the cells, how much is shown, and by what runs differ."""
@@ -529,18 +532,18 @@ SEEN = {
 
 @pytest.mark.parametrize("claim", SEEN)
 @pytest.mark.parametrize(
-    ("learned", "guesses", "subtask", "verdict"),
+    ("learned", "random_search", "subtask", "verdict"),
     [
         (1, 0, 0, "supported"),
-        (1, 1, 0, "undecided"),  # what guessing shows
+        (1, 1, 0, "undecided"),  # what random search shows
         (1, 0, 1, "undecided"),  # what a reward by subtask shows
         (1, 2, 0, "not supported"),
         (1, 0, 2, "not supported"),
-        (-1, -2, -2, "not supported"),  # though guesses show less
+        (-1, -2, -2, "not supported"),  # though random search shows less
     ],
 )
-def test_coarticulation_is_more_than_guesses_and_subtasks_show(
-    claim, learned, guesses, subtask, verdict
+def test_coarticulation_is_more_than_random_search_and_subtasks_show(
+    claim, learned, random_search, subtask, verdict
 ):
     run, tasks, conditions, size, step = SEEN[claim]
 
@@ -553,7 +556,7 @@ def test_coarticulation_is_more_than_guesses_and_subtasks_show(
         for task in tasks
         for label, much in (
             *((f"dual-process/{condition}", learned) for condition in conditions),
-            (GUESSES, guesses),
+            (RANDOM_SEARCH, random_search),
             (last, subtask),
         )
     }
@@ -607,10 +610,12 @@ def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict):
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """The paper's cells as far as its claims need them, beside guesses."""
+    """The paper's cells as far as its claims need them, with random search."""
     cells = [(task, f"dual-process/{condition}") for task, condition, _ in CELLS]
     cells += [
-        (task, method) for task in ONE_ARMED for method in (GUESSES, "dual-process/EC1-subtask")
+        (task, method)
+        for task in ONE_ARMED
+        for method in (RANDOM_SEARCH, "dual-process/EC1-subtask")
     ]
     planned = [Cell(load_task(task), KNOWN[method]) for task, method in cells]
     folder = tmp_path_factory.mktemp("claims")
@@ -623,13 +628,13 @@ def test_the_register_on_runs(study):
     entries = judgements(study)
     assert list(entries.index) == [claim.id for claim in CLAIMS_OF_THE_PAPER]
     sacrificed = entries.loc["first-movement-sacrificed"]
-    assert "(guesses)" in sacrificed.evidence
+    assert "(random search)" in sacrificed.evidence
     assert len(sacrificed.run_ids.split()) == 24
     for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):  # it was not run
         assert entries.verdict[name] == "undecided"
         assert "this folder has no runs of" in entries.evidence[name]
     assert TABLES["claims"](study).verdict.tolist() == entries.verdict.tolist()
-    # Claims on printed tasks alone do not rest on goals that were chosen for results like theirs.
+    # Claims on published tasks alone do not rest on goals that were chosen for results like theirs.
     task_of = dict(zip(study.runs.run_id, study.runs.task, strict=True))
     read = {name: {task_of[run] for run in runs.split()} for name, runs in entries.run_ids.items()}
     assert sum(map(bool, read.values())) > 10
@@ -660,14 +665,14 @@ def test_the_rail_makes_the_sequence(free, verdict):
 
 def test_every_sentence_is_accounted_for():
     path = Path(__file__).parent.parent / "docs" / "sentences.toml"
-    printed = tomllib.loads(path.read_text(encoding="utf-8"))["sentence"]
-    for each in printed:
+    published = tomllib.loads(path.read_text(encoding="utf-8"))["sentence"]
+    for each in published:
         assert len({"claims", "held", "open"} & set(each)) == 1, each["quote"]
         assert set(each.get("claims", ())) <= set(CLAIMS), each["quote"]
-    accounted = {name for each in printed for name in each.get("claims", ())}
+    accounted = {name for each in published for name in each.get("claims", ())}
     lacking = {claim.id for claim in CLAIMS.values() if claim.place} - accounted
     assert not lacking, f"in no sentence of sentences.toml: {lacking}"
-    files = re.findall(r"(?:coartic|tests)/[\w/]+(?:\.py)?", str(printed))
+    files = re.findall(r"(?:coartic|tests)/[\w/]+(?:\.py)?", str(published))
     assert [file for file in files if not (Path(__file__).parent.parent / file).exists()] == []
 
 

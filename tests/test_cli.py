@@ -81,7 +81,7 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
     progress = Progress(Path("results"), 63, done=18, waiting=Counter(x=37, y=20), workers=2)
     progress.timed["x"], progress.took["x"] = 6, 600.0  # 100 s a run, by two workers
     specification = planned(
-        [Cell(load_task("two-armed-2"), KNOWN["nullspace-qp/next-goal"])]
+        [Cell(load_task("two-armed-2"), KNOWN["posture-qp/goals-ahead"])]
     ).specifications[0]
     with Display() as display:
         display.update(progress, specification)  # too early to tell
@@ -90,7 +90,7 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
         progress.done, progress.waiting = 63, Counter()
         display.update(progress, specification)
     shown = capsys.readouterr().err.replace("\r", "\n").split("\n")
-    name = "Two-armed 2, null-space control, next goal"
+    name = "Two-armed 2, posture QP, goals ahead"
     lines = ["63/63    0 failed"]
     if is_terminal:
         lines = [

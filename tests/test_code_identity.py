@@ -19,7 +19,7 @@ from coartic.motion.sources import PACKAGE
 FILES = {name.split(".")[-1]: Path(inspect.getfile(importlib.import_module(name)))
          for name in MODULES}  # fmt: skip
 LEARNER, PLANNERS = "method", {"trajectory_optimisation", "receding_horizon", "optimum"}
-WITH_TRIALS = {LEARNER, "random_search", "cma_es"}
+WITH_TRIALS = {LEARNER, "hill_climbing", "random_search", "cma_es"}
 """Methods that take the number of trials from the learner."""
 
 

@@ -81,16 +81,16 @@ def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
     assert apart(lever, tmp_path) == (6.0, 0)
 
 
-LANES = """
+SLOTS = """
 from coartic import Robot
 from coartic.motion.compiled import entry, inner
-from coartic.motion.lanes import lanes_for
+from coartic.motion.slots import slots_for
 
 @inner
 def add_links(at):
     for k in range(len(at.length)):
-        for lane in range(72):
-            at.x[k + 1, lane] = at.x[k, lane] + at.length[k, lane]
+        for slot in range(72):
+            at.x[k + 1, slot] = at.x[k, slot] + at.length[k, slot]
 
 @entry
 def length(at):
@@ -98,7 +98,7 @@ def length(at):
     return at[0]["x"][-1, 0]
 
 def reach_of(links):
-    at = lanes_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).at
+    at = slots_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).at
     at["length"][:] = 1.0
     return length(at)
 """
@@ -110,7 +110,7 @@ def reaches(folder, numbers):
     forget("coartic")
     numba.config.CACHE_DIR = str(folder)
     sys.path.insert(0, str(folder))
-    from lanes import length, reach_of
+    from slots import length, reach_of
 
     return [reach_of(links) for links in numbers], sum(length.dispatcher.stats.cache_hits.values())
 
@@ -118,7 +118,7 @@ def reaches(folder, numbers):
 def test_machine_code_of_several_processes_goes_together(tmp_path):
     """Each compiles for a number of links; one that loads all of it knows all robots. Up to four
     links share the code of four, up to eight the code of eight."""
-    (tmp_path / "lanes.py").write_text(LANES, encoding="utf-8")
+    (tmp_path / "slots.py").write_text(SLOTS, encoding="utf-8")
     for links in (8, 4):
         assert apart(reaches, tmp_path, [links]) == ([links], 0)
     assert apart(reaches, tmp_path, [4, 8]) == ([4, 8], 2)

@@ -55,7 +55,7 @@ TASKS = {
     "optimum/": ONE_GOAL,
     "receding-horizon": TWO_GOALS,
     "cma-es/bandit": FEW_TASKS,  # of both hands, as it chooses among hand sequences
-    "nullspace-qp/": SHORT_TASKS,
+    "posture-qp/": SHORT_TASKS,
     "posture-based/": SHORT_TASKS,
     "trajectory-optimisation/path-length": TWO_GOALS,
     "trajectory-optimisation/": ONE_GOAL,  # the same programme for other costs
@@ -106,9 +106,9 @@ def test_methods_that_keep_every_law(methods, name):
 
 
 def test_what_a_session_shows_cannot_be_written(methods):
-    card = methods["test/forger"]
-    asked = Specification(load_task("ascending"), card.name, card.code, card.told, {}, None)
-    (outcome,) = perform_job(Job(asked, card, 0, (0,)))
+    info = methods["test/forger"]
+    asked = Specification(load_task("ascending"), info.name, info.code, info.information, {}, None)
+    (outcome,) = perform_job(Job(asked, info, 0, (0,)))
     assert outcome.meter.trials == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
@@ -117,10 +117,10 @@ def test_what_a_session_shows_cannot_be_written(methods):
 @pytest.mark.parametrize("means", ["objective", "learn", "execute"])
 def test_trials_outside_the_session_are_noticed(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
-    card, task = methods["test/outsider"], load_task("ascending")
-    asked = Specification(task, card.name, card.code, card.told, {"means": means}, None)
+    info, task = methods["test/outsider"], load_task("ascending")
+    asked = Specification(task, info.name, info.code, info.information, {"means": means}, None)
     for _ in range(2):
-        (outcome,) = perform_job(Job(asked, card, 0, (0,)))
+        (outcome,) = perform_job(Job(asked, info, 0, (0,)))
         assert outcome.status == "crashed"
         assert "trials outside its session" in outcome.reason
 
@@ -135,7 +135,7 @@ CASES = [
     ("test/spendthrift", "limits", "BudgetError: all 7 trials of the budget"),
     ("test/peeks", "information", "the method used 'Jacobian', which it does not declare"),
     ("test/overdeclares", "information", "declared but never used: Jacobian"),
-    ("test/taker", "information", "hand_over is for this project's own compiled methods"),
+    ("test/taker", "information", "reveal is for this project's own compiled methods"),
     ("test/freeloader", "information", "used 'corrective process', which it does not declare"),
     ("test/lucky", "determinism", "declared not to be stochastic, but another seed"),
     ("test/unhelpful", "failure", "ZeroDivisionError: no goal is that far"),

@@ -21,7 +21,7 @@ from coartic import (
     load_task,
     objective,
 )
-from coartic.baselines.corrective_alone import EverySequence
+from coartic.baselines.corrective_alone import BestHands
 from coartic.method import MethodError, Session
 from coartic.motion.compiled import entry, joint_lever
 from coartic.motion.movement import largest_square
@@ -109,8 +109,8 @@ def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     ],
 )
 def test_every_hand_sequence_alone(task, budget, hands, trials):
-    session = Session(task, 0, EverySequence.told, trial_budget=budget)
-    assert execute(task, EverySequence().solve(session).solution).hands == hands
+    session = Session(task, 0, BestHands.information, trial_budget=budget)
+    assert execute(task, BestHands().solve(session).solution).hands == hands
     assert session.meter.trials == trials
 
 

@@ -46,7 +46,7 @@ from coartic.motion.solution import Movement
 class Mine(Method):
     name = "mine"
     title = citation = "x"
-    told = frozenset({Information.CORRECTIVE_PROCESS})
+    information = frozenset({Information.CORRECTIVE_PROCESS})
     def solve(self, session):
         movements = [Movement(n, "right", "corrective") for n in range(1, session.goals_count + 1)]
         return Result(tuple(movements), {"process": os.getpid()})
@@ -109,7 +109,7 @@ def test_what_is_no_executor(tmp_path, executor):
 
 def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
     """What was finished before is kept."""
-    monkeypatch.setattr(cluster_module, "Crew", lambda *_, **__: InProcess())
+    monkeypatch.setattr(cluster_module, "Workers", lambda *_, **__: InProcess())
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
     with cluster:
         executor = Dask(cluster.scheduler_address)

@@ -21,10 +21,10 @@ from coartic import (
 )
 from coartic.analysis import verify as checker
 from coartic.method import Meter, MethodError, Session
-from coartic.motion.lanes import LANES
-from coartic.motion.reach import bench_of
+from coartic.motion.reach import compiled_task
+from coartic.motion.slots import SLOTS
 from coartic.motion.solution import execute_many, other_arm_travel
-from coartic.optimisers import FAILED, TOLD, explored_joints
+from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, explored_joints
 from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import PAPER_CELLS, make_trials, sample, tiny_task, uneven_task
@@ -66,7 +66,7 @@ def cases(name):
     task, model, rng = TASKS[name], MODELS[name], np.random.default_rng(3)
     noise = rng.choice([0.03, LIMITS[name][1]], (20, 1, 1))
     hands, targets = sample(task, 20, noise, seed=1)
-    session = Session(task, 0, TOLD)
+    session = Session(task, 0, OPTIMISER_INFORMATION)
     for n, sequence in enumerate(hands):
         if n % 2 == 0:
             targets[n][~explored_joints(session, sequence)] = np.nan
@@ -94,11 +94,11 @@ def by_execute(task, model, cases):
 
 def by_execute_many(task, model, cases):
     solutions = [case.solution for case in cases]
-    return [facts(execution) for execution in execute_many(bench_of(task, model), solutions)]
+    return [facts(execution) for execution in execute_many(compiled_task(task, model), solutions)]
 
 
 def by_trial(task, model, cases):
-    session = Session(task, 0, TOLD, model=model)
+    session = Session(task, 0, OPTIMISER_INFORMATION, model=model)
     found = [facts(session.trial(case.solution)) for case in cases]
     assert session.rewards == [each["reward"] for each in found]
     return found
@@ -118,7 +118,7 @@ def rows_of(trials):
 
 
 def by_trials(task, model, cases):
-    session = Session(task, 0, TOLD, model=model)
+    session = Session(task, 0, OPTIMISER_INFORMATION, model=model)
     trials = session.trials([case.hands for case in cases], np.array([c.targets for c in cases]))
     found = [*rows_of(trials)]
     assert session.rewards == [each["reward"] for each in found]
@@ -310,7 +310,7 @@ def test_learned_solutions_take_what_they_took(name, condition):
 def test_a_trial_does_not_notice_its_neighbours(name):
     """To the last bit, whatever their number and order; nor does an execution."""
     task, model = TASKS[name], MODELS[name]
-    hands, targets = sample(task, LANES + 30)
+    hands, targets = sample(task, SLOTS + 30)
     targets[::7, 1] = np.nan
     hands = np.array(hands)
     together = make_trials(task, [*hands], targets, model=model)
@@ -320,7 +320,7 @@ def test_a_trial_does_not_notice_its_neighbours(name):
             np.testing.assert_array_equal(field[chosen], same)
     kinds = [case.solution for case in rich_cases("two-armed-1", 0)]
     broken = [kinds[0][:-1], [*kinds[0], "nonsense"], 5, kinds[0][::-1]]
-    many = execute_many(bench_of(TASKS["two-armed-1"], OTHERS[0]), [*broken, *kinds])
+    many = execute_many(compiled_task(TASKS["two-armed-1"], OTHERS[0]), [*broken, *kinds])
     for solution, execution in zip([*broken, *kinds], many, strict=True):
         if isinstance(execution, Exception):  # one movement less may still be a solution
             with pytest.raises(type(execution), match=re.escape(str(execution))):
@@ -333,7 +333,7 @@ def test_a_trial_does_not_notice_its_neighbours(name):
 
 def test_a_batch_counts_as_so_many_trials():
     task, model = TASKS["two-armed-1"], MODELS["two-armed-1"]
-    batch, single = (Session(task, 0, TOLD, model=model) for _ in range(2))
+    batch, single = (Session(task, 0, OPTIMISER_INFORMATION, model=model) for _ in range(2))
     some = cases("two-armed-1")
     batch.trials([case.hands for case in some], np.array([case.targets for case in some]))
     for case in some:

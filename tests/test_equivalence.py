@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from coartic.analysis.statistics.hypotheses import difference_to_printed, equivalence
+from coartic.analysis.statistics.hypotheses import difference_to_published, equivalence
 from coartic.estimates import Estimate
 
 
 def test_interval_against_an_exact_value_is_students():
     ours = np.random.default_rng(14).normal(-484, 4, 12)
-    interval = difference_to_printed(ours, -484, None, 20)
-    one_run = difference_to_printed(ours, -484, 3.0, 1)  # has no spread
+    interval = difference_to_published(ours, -484, None, 20)
+    one_run = difference_to_published(ours, -484, 3.0, 1)  # has no spread
     assert repr(one_run) == repr(interval)  # NaN, too
     expected = stats.ttest_1samp(ours, -484).confidence_interval(0.95)
     assert (interval.low, interval.high) == pytest.approx((expected.low + 484, expected.high + 484))
@@ -40,12 +40,12 @@ def test_interval_of_two_samples_is_welchs():
     rng = np.random.default_rng(15)
     ours, theirs = rng.normal(-503, 5, 20), rng.normal(-502, 3, 15)
     expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
-    printed = difference_to_printed(ours, theirs.mean(), theirs.std(ddof=1), 15)
-    assert printed.n == (20, 15)
-    assert (printed.low, printed.high) == pytest.approx((expected.low, expected.high))
+    published = difference_to_published(ours, theirs.mean(), theirs.std(ddof=1), 15)
+    assert published.n == (20, 15)
+    assert (published.low, published.high) == pytest.approx((expected.low, expected.high))
 
 
 def test_degenerate_samples():
-    assert math.isnan(difference_to_printed([1.0], 2.0, 1.0, 3).low)
-    point = difference_to_printed([1.0] * 4, 3.0, 0.0, 4)
+    assert math.isnan(difference_to_published([1.0], 2.0, 1.0, 3).low)
+    point = difference_to_published([1.0] * 4, 3.0, 0.0, 4)
     assert (point.low, point.high) == (-2.0, -2.0)

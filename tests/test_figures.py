@@ -32,7 +32,7 @@ def test_every_figure_that_runs_allow(traced):
     drawn = {name: draw(traced) for name, draw in FIGURES.items()}
     figures = {name: plot for name, plot in drawn.items() if plot}
     assert {"tasks", "postures"} <= set(figures)
-    assert "published" not in figures  # printed means are of 10,000 trials, these runs of 150
+    assert "published" not in figures  # published means are of 10,000 trials, these runs of 150
     for name, plot in figures.items():
         assert plot.id == name
         assert plot.alt
@@ -87,7 +87,7 @@ def test_names_and_looks_tell_methods_apart():
     assert len(set(map(str, looks(drawn).values()))) == len(drawn)
     learner = "dual-process/EC4"
     assert looks(["mine", learner])[learner] == looks([learner])[learner]
-    both = looks(["mine", "theirs", "random-search/climbing"])
+    both = looks(["mine", "theirs", "hill-climbing"])
     assert len(set(map(str, both.values()))) == 3
     built_in = {look["color"] for look in looks(drawn).values()}
     assert not built_in & {both[name]["color"] for name in ("mine", "theirs")}

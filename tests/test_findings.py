@@ -83,12 +83,12 @@ def test_the_page_of_files_has_every_key_with_what_holds_without_it():
     check_keys(Family, *read_example(family), name="mine/v1")
     check_keys(Suite, *read_example(suite), name="mine")
     used = set()
-    for name, card in built_in().items():
+    for name, info in built_in().items():
         of = {key: at for key, at in tomllib.loads(methods).items() if fnmatchcase(name, key)}
         used |= {*of}
         shown = {key: value for at in of.values() for key, value in at.items() if key != "hands"}
-        assert shown == card.load().Parameters().model_dump(exclude={"hands"}), name
-        assert "hands" not in card.load().Parameters.model_fields or "hands" in of[name]
+        assert shown == info.load().Parameters().model_dump(exclude={"hands"}), name
+        assert "hands" not in info.load().Parameters.model_fields or "hands" in of[name]
     assert used == {*tomllib.loads(methods)}
 
 

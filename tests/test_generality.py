@@ -10,13 +10,13 @@ from coartic import load_task
 from coartic.analysis.claims import judging, reader
 from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, INITIAL
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, RANDOM_SEARCH
 from coartic.analysis.report import about
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.study import one_by_one
 from coartic.analysis.topics import random_tasks
-from coartic.analysis.topics.guesses import signature_of
 from coartic.analysis.topics.instances import best_of_instances, solved
+from coartic.analysis.topics.random_search import signature_of
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import made, row, study_of
@@ -58,7 +58,7 @@ def rewarded(centres, *, families=FEW, split="i", count=COUNT):
             tasks.append(load_task(name))
             best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():
-                if (label == EC1) == (family in ONE) or label in (INITIAL, GUESSES):
+                if (label == EC1) == (family in ONE) or label in (INITIAL, RANDOM_SEARCH):
                     value = centre(number) if callable(centre) else centre
                     noise = (0,) if label == INITIAL else NOISE
                     rows += runs_of(name, label, value, noise=noise)
@@ -96,11 +96,11 @@ def test_more_than_eight_instances_are_not_shown_singly():
         assert len(one_by_one(rewarded(RISING, families=ONE, count=count))) == shown
 
 
-def made_up_signatures(study, hand=1.0, waiting=0.3, guessed=0.5):
-    """Signatures of the learner, and of guesses: that share of them, more by a little."""
+def made_up_signatures(study, hand=1.0, idle=0.3, of_random_search=0.5):
+    """Signatures of the learner, and of random search: that share of them, more by a little."""
     by_cell = {}
     for name in study.tasks:
-        for label in (EC1, EC2, EC3, EC4, GUESSES):
+        for label in (EC1, EC2, EC3, EC4, RANDOM_SEARCH):
             if (name, label) in study.cells:
                 number = int(name[-3:])
                 values = {
@@ -110,10 +110,10 @@ def made_up_signatures(study, hand=1.0, waiting=0.3, guessed=0.5):
                 }
                 if len(study.tasks[name].hands) > 1:
                     values["hand"] = np.array([hand, hand, hand - 0.1 * (number == 0)])
-                    values["other arm"] = np.array([waiting + 0.01 * number])
-                if label == GUESSES:
+                    values["other arm"] = np.array([idle + 0.01 * number])
+                if label == RANDOM_SEARCH:
                     off = 0.001 * (number - 2)
-                    values = {name: guessed * of + off for name, of in values.items()}
+                    values = {name: of_random_search * of + off for name, of in values.items()}
                 by_cell[name, label] = values
     return by_cell
 
@@ -130,7 +130,7 @@ def with_signatures(study, **values):
 def test_claims_of_generality(monkeypatch):
     alone = SimpleNamespace(reward=ALONE)
     monkeypatch.setattr(reader, "initial_solution", lambda task: alone)
-    centres = {**RISING, EC4: lambda n: -540 - n, GUESSES: -580}
+    centres = {**RISING, EC4: lambda n: -540 - n, RANDOM_SEARCH: -580}
     study = with_signatures(rewarded(centres, families=ONE + TWO, count=12))
     entries = judgements(study)
     assert list(entries.index) == [claim.id for claim in CLAIMS_ON_FAMILIES]
@@ -143,11 +143,11 @@ def test_claims_of_generality(monkeypatch):
         entry = entries.loc[f"{name}-in-general"]
         assert entry.verdict == "supported", entry.evidence
         assert entry.p_holm < 0.05
-    guessed = with_signatures(rewarded(centres, families=ONE + TWO), guessed=1.0)
+    of_random_search = with_signatures(rewarded(centres, families=ONE + TWO), of_random_search=1.0)
     of_signatures = [CLAIMS[f"{name}-in-general"] for name in ("other-arm-coarticulation",
                                                           "arm-coarticulation")]  # fmt: skip
-    # No more than guessing shows:
-    assert set(judge_claims(guessed, of_signatures).verdict) == {"undecided"}
+    # No more than random search shows:
+    assert set(judge_claims(of_random_search, of_signatures).verdict) == {"undecided"}
     assert entries.verdict["corrective-ensures-in-general"] == "supported"
     jerk = entries.loc["beats-inaccurate-in-general"]
     assert jerk.verdict == "undecided"
@@ -157,7 +157,7 @@ def test_claims_of_generality(monkeypatch):
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
     study = with_signatures(
-        rewarded(RISING | {GUESSES: -580}, families=ONE + TWO, count=8), guessed=0.1
+        rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8), of_random_search=0.1
     )
 
     def verdict(more):
@@ -199,7 +199,7 @@ def test_development_instances_are_not_judged():
     [("two-armed/v1/i000", "best known reward"), ("two-armed/v1/2030-000", "best of this folder")],
 )
 def test_what_only_a_folder_says_is_not_called_known(name, to):
-    runs = (runs_of(name, label, 9 * ALONE, commit="") for label in (EC4, GUESSES))
+    runs = (runs_of(name, label, 9 * ALONE, commit="") for label in (EC4, RANDOM_SEARCH))
     seen = study_of([run for of_label in runs for run in of_label])
     assert random_tasks.on_random_tasks(seen).startswith(f"Nearest to the {to}: ")
     assert len(about.limits(seen)["own"]) == (to == "best of this folder")

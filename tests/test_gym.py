@@ -365,12 +365,12 @@ class Peeping(coartic_method.Method):
 
     name = "test/peeping"
     title, citation = "Peeping", "None."
-    told = frozenset({coartic_method.Information.CORRECTIVE_PROCESS})
+    information = frozenset({coartic_method.Information.CORRECTIVE_PROCESS})
     peeps = True
 
     def solve(self, session):
         if self.peeps:
-            session.hand_over(*self.told)
+            session.reveal(*self.information)
         movements = [Movement(n + 1, "right", "corrective") for n in range(session.goals_count)]
         return coartic_method.Result(tuple(movements))
 
@@ -380,7 +380,7 @@ class Honest(Peeping):
 
 
 class Untold(Honest):
-    told = frozenset()
+    information = frozenset()
 
 
 def test_methods_of_others_are_told_what_they_declare():
@@ -388,7 +388,7 @@ def test_methods_of_others_are_told_what_they_declare():
         with pytest.raises(coartic_method.UndeclaredError):
             coartic.gym.score("coartic/Ascending-v2", method)
     assert coartic.gym.score("coartic/Ascending-v2", Honest()).reward["policy"] == -319
-    learner = LEARNERS[0](LEARNERS[0].Parameters(trials=20))  # which the task is handed over to
+    learner = LEARNERS[0](LEARNERS[0].Parameters(trials=20))  # which the task is returned to
     assert coartic.gym.score("coartic/Ascending-v2", learner).reward["policy"] >= -319
 
 

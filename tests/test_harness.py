@@ -81,7 +81,7 @@ def test_suite_ablations_frees_the_base():
 
 
 def test_long_runs_begin_first(tmp_path):
-    begun, planner = [], "nullspace-qp/none"
+    begun, planner = [], "posture-qp/current-goal"
 
     class Watched(InProcess):
         def perform(self, jobs):
@@ -189,7 +189,7 @@ def test_grid_and_fixed_parameters(tmp_path):
     assert (runs.trials == 40).all()
 
 
-def test_cells_are_told_apart_by_their_parameters(tmp_path):
+def test_cells_are_distinguished_by_their_parameters(tmp_path):
     """Different parameters are different cells, compared with the paper only as it had them."""
     ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
     asked = suite_of(
@@ -221,7 +221,7 @@ def test_a_cell_has_one_number_of_runs(tmp_path):
     with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
         plan_suite(tmp_path / "own.toml")
     assert [cell.runs for cell in planned(cells, runs=2).cells] == [2]
-    once = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
+    once = paper_cells(methods=["corrective-alone/best-hands"], tasks=["two-armed-1"])
     assert planned(once, runs=20).size == 1
     task = tmp_path / "mine.toml"
     task.write_text(GOOD, encoding="utf-8")
@@ -247,8 +247,8 @@ def test_every_method_makes_the_trials_that_it_is_told(tmp_path, goals, policy, 
     """The search for the first hands is counted apart, by the methods that need it. There are more
     sequences of 13 hands than are tried one by one."""
     task = tiny_task(initial_hands=policy, goals=[[5.0, 1.0 + 0.2 * g] for g in range(goals)])
-    begin_there = ["dual-process/EC4", "random-search/climbing", "cma-es/goal-by-goal"]
-    try_all = ["guesses", "guesses/hands", "cma-es/bandit", "differential-evolution"]
+    begin_there = ["dual-process/EC4", "hill-climbing", "cma-es/goal-by-goal"]
+    try_all = ["random-search", "random-search/hands", "cma-es/bandit", "differential-evolution"]
     methods = registry([EXAMPLES / "differential_evolution.py"])
     cells = [Cell(task, methods[name]) for name in (*begin_there, *try_all)]
     runs = run_and_write(tmp_path, cells, runs=1, trials=20, trial_budget=budget).runs
@@ -274,20 +274,20 @@ def test_a_session_counts_per_configuration():
 
 def test_the_runs_of_a_batch_are_scored():
     """Solutions are the corrective process, 319 ticks; the second run lacks a tenth."""
-    task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
+    task, info = load_task("ascending"), KNOWN["dual-process/EC1"]
     movements = list(corrective_trial(task, "RRR").movements)
-    specification = Specification(task, card.name, card.code, card.told, {}, None)
+    specification = Specification(task, info.name, info.code, info.information, {}, None)
     times = Times(wall_s=2.0, cpu_s=1.0, warm=True, together=4)
     corrections = [3, *range(20, 10, -1)]  # of trial 0, then by tenths
-    told = {"parts": {"solution": movements}, "times": times}
+    information = {"parts": {"solution": movements}, "times": times}
     outcomes = [
         Outcome("ok", details={"corrections": corrections}, rewards=[None, -330, -319, -319],
-                meter=Meter(trials=4), bound=-300, **told),
-        Outcome("ok", details={"corrections": corrections[:-1]}, **told),
+                meter=Meter(trials=4), bound=-300, **information),
+        Outcome("ok", details={"corrections": corrections[:-1]}, **information),
         Outcome("ok", times=times),
         Outcome("ok", parts={"solution": movements, "replay": movements[:1]}, bound=-300),
     ]  # fmt: skip
-    job = Job(specification, card, 5, (0, 1, 2, 3), 60.0)
+    job = Job(specification, info, 5, (0, 1, 2, 3), 60.0)
     runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]
     columns = ["run", "status", "reward", "hands", "best_trial",
                "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
@@ -305,16 +305,16 @@ def test_the_runs_of_a_batch_are_scored():
     assert "movements for goals [1], wanted [1, 2, 3]" in runs[3].reason
     assert runs[3].scores == {}
     better = replace(runs[0], rewards=[None, -310, -319, -319])  # than the solution
-    assert better.thin().rewards == [None, -310, -319, None]
+    assert better.downsample().rewards == [None, -310, -319, None]
 
 
 def test_the_runs_of_a_batch_share_its_time():
-    task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
+    task, info = load_task("ascending"), KNOWN["dual-process/EC1"]
     specification = Specification(
-        task, card.name, card.code, card.told, card.complete({"trials": 50}), None
+        task, info.name, info.code, info.information, info.complete({"trials": 50}), None
     )
     begun = time.perf_counter(), time.process_time()
-    outcomes = perform_job(Job(specification, card, 0, tuple(range(8))))
+    outcomes = perform_job(Job(specification, info, 0, tuple(range(8))))
     wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
     assert 0 < sum(each.times.wall_s for each in outcomes) <= wall
     assert 0 < sum(each.times.cpu_s for each in outcomes) <= cpu
@@ -326,9 +326,9 @@ def test_a_solution_that_misses_a_goal_is_infeasible():
         name="stuck", locked_base=["x", "y"], hands=["right"],
         goals=[[2.5, 0.1]], initial_hands="R",
     )  # fmt: skip
-    card = KNOWN["corrective-alone/given"]
-    specification = Specification(stuck, card.name, card.code, card.told, {}, None)
-    job = Job(specification, card, 0, (0,), 60.0)
+    info = KNOWN["corrective-alone/given"]
+    specification = Specification(stuck, info.name, info.code, info.information, {}, None)
+    job = Job(specification, info, 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.status, run.scores) == ("infeasible", {})
 
@@ -363,7 +363,7 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
         cells = select_cells(paper, KNOWN, tasks=[str(path)], **selection)
         return [cell.method.name for cell in cells]
 
-    baseline = ["corrective-alone/every"]
+    baseline = ["corrective-alone/best-hands"]
     assert methods(path, methods=baseline) == baseline
     assert methods(path) == [f"dual-process/EC{k}" for k in (1, 2, 3, 4)]
     assert methods(other) == ["dual-process/EC1"]
@@ -381,7 +381,7 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
 
 
 def test_ablations_of_the_learner_are_methods_of_their_own():
-    """Known by their short names, and told what they use."""
+    """Known by their short names, with the information that they use."""
     cells = paper_cells(methods=["EC1-subtask"], tasks=["ascending"])
     assert [cell.label for cell in cells] == ["dual-process/EC1-subtask"]
     for name, entry in KNOWN.items():
@@ -389,9 +389,10 @@ def test_ablations_of_the_learner_are_methods_of_their_own():
             condition = (CONDITIONS | ABLATIONS)[name.partition("/")[2]]
             for key, value in entry.complete({"trials": 1}).items():
                 assert key == "trials" or getattr(condition, key) == value
-            assert ("reward by subtask" in entry.told) == name.endswith("-subtask")
+            assert ("reward by subtask" in entry.information) == name.endswith("-subtask")
     with pytest.raises(CoarticError, match="discount is an unknown key"):
-        KNOWN["dual-process/EC4"].complete({"discount": 0.1})  # told would no longer be right
+        # the information would no longer be right
+        KNOWN["dual-process/EC4"].complete({"discount": 0.1})
 
 
 def test_a_suite_can_move_one_goal(tmp_path):

@@ -26,7 +26,7 @@ from coartic import (
 from coartic.learner import learning
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
-from coartic.motion.lanes import LANES
+from coartic.motion.slots import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
 from tests.support.strategies import (
@@ -241,15 +241,15 @@ def test_what_a_policy_spends_is_counted():
     content = {**load_task("two-armed-1").model_dump(mode="json"), "initial_hands": "best-of-all"}
     run = learn(parse_task(content, "x"), "EC3", seed=0, trials=1)
     assert run.first_hands == "LRLR"
-    told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-    session = Session(parse_task(content, "x"), 0, told)
+    information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
+    session = Session(parse_task(content, "x"), 0, information)
     assert session.find_initial_hands() == "LRLR"
     meter = session.meter
     assert (meter.trials, meter.initial_trials, meter.failed_trials) == (0, 16, 0)
     assert session.meter.movement_ticks > 16 * 532
     assert session.meter.corrections == 64
     assert session.meter.jacobians == session.meter.corrective_iterations > 0
-    named = Session(load_task("two-armed-1"), 0, told)
+    named = Session(load_task("two-armed-1"), 0, information)
     assert (named.find_initial_hands(), named.meter.initial_trials) == ("RRRR", 0)
 
 
@@ -336,14 +336,16 @@ def test_a_copy_that_is_no_task_is_refused(update, message):
 
 
 def test_methods_of_the_learner():
-    """Who looks for the closest hand is told where things are; long runs go in small batches."""
-    told = {method.name for method in METHODS if Information.GOALS in method.told}
-    assert told == {"dual-process/EC2"}
+    """The condition that takes the closest hand uses the goals; long runs go in small batches."""
+    information = {method.name for method in METHODS if Information.GOALS in method.information}
+    assert information == {"dual-process/EC2"}
     method, parameters = METHODS[0], METHODS[0].Parameters
     sizes = [method(parameters(trials=n)).most_together() for n in (1000, 10**6, 10**7)]
-    assert sizes == [LANES, 4, 1]
+    assert sizes == [SLOTS, 4, 1]
     for budget, trials in ((50, 20), (10, 10)):
-        session = Session(load_task("ascending"), 0, method.told, trial_budget=budget, trusted=True)
+        session = Session(
+            load_task("ascending"), 0, method.information, trial_budget=budget, trusted=True
+        )
         method(parameters(trials=20)).solve(session)
         assert session.meter.trials == trials
 

@@ -18,7 +18,7 @@ from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session
 from coartic.motion.trials import movements_of
-from coartic.optimisers import FAILED, TOLD, Objective
+from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
 from tests.support.strategies import tiny_task
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -130,7 +130,7 @@ def test_threads_share_a_budget():
 
 def test_a_session_is_shared_by_threads():
     task = load_task("ascending")
-    session = Session(task, 0, TOLD, trial_budget=100)
+    session = Session(task, 0, OPTIMISER_INFORMATION, trial_budget=100)
     solution = corrective_trial(task, "RRR").movements
 
     def work(n):
@@ -213,7 +213,7 @@ def test_what_would_change_nothing_cannot_be_set(name):
     ("budget", "trials", "before"), [(30, None, 0), (None, 30, 0), (30, 50, 0), (40, 30, 2)]
 )
 def test_the_objective_ends_with_the_trials(budget, trials, before):
-    session = Session(load_task("two-armed-2"), 0, TOLD, trial_budget=budget)
+    session = Session(load_task("two-armed-2"), 0, OPTIMISER_INFORMATION, trial_budget=budget)
     session.trials("RRRR", np.full((before, 4, 10), np.nan))
     cost = Objective(session, trials=trials)
     points = np.tile(cost.x0, (10, 1))
@@ -240,7 +240,9 @@ def test_the_examples_are_methods(path, in_this_process):
     entry = registry([path])[name]
     laws = check_method(entry, tasks=[load_task("ascending")])
     assert [law for law in laws if not law.passed] == []
-    session = Session(load_task("ascending"), 0, map(Information, entry.told), trial_budget=300)
+    session = Session(
+        load_task("ascending"), 0, map(Information, entry.information), trial_budget=300
+    )
     solution = entry.configure({}).solve(session).solution
     assert session.meter.trials == len(session.rewards) == 300
     reward = execute(load_task("ascending"), solution).reward
@@ -251,7 +253,7 @@ def test_hands_are_chosen_by_a_method():
     """It comes nearer to the optimum than any point with the hands that are chosen by default."""
     task, name = load_task("two-armed-2"), "halving"
     entry = registry([EXAMPLES / f"{name}.py"])[name]
-    session = Session(task, 0, map(Information, entry.told))
+    session = Session(task, 0, map(Information, entry.information))
     reward = execute(task, entry.configure({}).solve(session).solution).reward
     assert reward == max(filter(None, session.rewards)) > -340
     assert session.meter.trials == 10_000
@@ -259,7 +261,7 @@ def test_hands_are_chosen_by_a_method():
 
 def test_a_method_is_told_which_hands_there_are():
     for name in ("ascending", "two-armed-2"):
-        cost = Objective(Session(load_task(name), 0, TOLD))
+        cost = Objective(Session(load_task(name), 0, OPTIMISER_INFORMATION))
         assert cost.hand_sequences == coartic.hand_sequences(name)
     task = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
     with pytest.raises(coartic.NotApplicableError, match="8192 hand sequences"):

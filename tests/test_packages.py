@@ -33,11 +33,11 @@ def do(*command, cwd):
 
 
 def test_shipped_results_are_of_this_code():
-    """Otherwise nobody's runs of a built-in method go beside them."""
-    now = {name: card.code for name, card in built_in().items()}
+    """Otherwise no runs of a built-in method can include them."""
+    now = {name: info.code for name, info in built_in().items()}
     for suite in shipped_hashes():
         with open_shipped(suite) as store:
-            shipped = {name: card.code for name, card in store.plan().methods.items()}
+            shipped = {name: info.code for name, info in store.plan().methods.items()}
         other = {name for name, code in shipped.items() if now.get(name) != code}
         assert not other, f"shipped runs of suite {suite} are of other code: make shipped"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coartic import MotionModel, Movement, execute, learn, load_task, trajectory
-from coartic.baselines.random_search import Guesses
+from coartic.baselines.random_search import RandomSearch
 from coartic.motion.initial import hand_sequences, initial_hands
 from coartic.play.page import FOLDER
 from tests.support.strategies import (
@@ -218,7 +218,7 @@ RANDOM_SEARCH = """(task, seeds, trials) => {
 def test_random_search_draws_and_keeps_what_the_packages_does(name):
     task, seeds, trials = load_task(name), [0, 5], 2000
     for seed, run in zip(seeds, node(RANDOM_SEARCH, content(task), seeds, trials), strict=True):
-        result, _, session = solve(Guesses, task, seed, trials=trials)
+        result, _, session = solve(RandomSearch, task, seed, trials=trials)
         solution = execute(task, result.solution)
         best_so_far = np.maximum.accumulate(session.rewards)
         assert run["rewards"] == best_so_far[run["first"] :].tolist()

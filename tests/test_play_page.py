@@ -8,8 +8,8 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from coartic import Movement, Task, corrective_trial, execute, learn, load_task
-from coartic.analysis.signatures.context_tests import context_dependence
-from coartic.baselines.random_search import Guesses
+from coartic.analysis.signatures.context_tests import standardised_posture_difference
+from coartic.baselines.random_search import RandomSearch
 from coartic.motion.initial import hand_sequences, initial_hands
 from coartic.play import page as pages
 from tests.support.strategies import changed, solve
@@ -100,7 +100,7 @@ def median_run(runs):
 
 def random_search(task, seeds, trials):
     """Best trials of random search, as executed."""
-    runs = [solve(Guesses, task, seed, trials=trials)[0] for seed in seeds]
+    runs = [solve(RandomSearch, task, seed, trials=trials)[0] for seed in seeds]
     return [execute(task, run.solution) for run in runs]
 
 
@@ -117,9 +117,15 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
         postures.append(np.array([run.execute().configurations[0] for run in runs]))
         best = random_search(load_task(name), range(5), trials)
         by_chance.append(np.array([run.configurations[0] for run in best]))
-    learned, random = context_dependence(*postures), context_dependence(*by_chance)
+    learned, random = (
+        standardised_posture_difference(*postures),
+        standardised_posture_difference(*by_chance),
+    )
     assert learned > 2
-    words = f"lie {learned:.1f} standard deviations apart (random search: {random:.1f})."
+    words = (
+        f"the posture difference is {learned:.1f} standard deviations (random search: "
+        f"{random:.1f})."
+    )
     assert words in text(page, "finding")
     assert "(5 runs each)" in text(page, "meaning")
     # Earlier, by the slider, there was less of it.
@@ -220,7 +226,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
 
 def test_the_link_holds_the_whole_state(opened, address):
     page = settled(opened())
-    assert "apart" in text(page, "finding")
+    assert "posture difference" in text(page, "finding")
     page.get_by_role("radio", name="each movement").check()
     assert "alike" in text(settled(page), "finding")  # no coarticulation by such a reward
     page.get_by_label("Task").select_option("3")

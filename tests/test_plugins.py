@@ -51,7 +51,7 @@ def test_a_package_brings_a_method(coartic, tmp_path):
     assert code == 0, error
     (run,) = load(tmp_path / "out").runs.to_dict("records")
     assert (run["method"], run["task"], run["status"]) == ("nearest-hand", "shelf", "ok")
-    assert run["told"] == "corrective process, forward kinematics, goals"
+    assert run["information"] == "corrective process, forward kinematics, goals"
     assert json.loads(run["parameters"]) == {"reluctance": 0.0}
     assert run["forward_kinematics"] > run["jacobians"] > 0
 

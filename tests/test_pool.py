@@ -48,7 +48,7 @@ class What(Parameters):
 class Does(Method):
     name = "test/does"
     title = citation = "x"
-    told = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+    information = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
     stochastic = False
     Parameters = What
     def solve(self, session):
@@ -146,12 +146,12 @@ def folder(tmp_path_factory):
         does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
         hangs, *others = [Cell(task, does, {"what": name}) for name in HANDLED]
         others += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
-        for name, cells, patience_s, limit_s in (
+        for name, cells, timeout_s, limit_s in (
             ("hangs", [hangs], 0.5, 0.3),
             ("others", others, 600.0, 0.5),
         ):
             run_and_write(
-                folder / name, cells, executor=Local(2, patience_s=patience_s), runs=1,
+                folder / name, cells, executor=Local(2, timeout_s=timeout_s), runs=1,
                 time_limit_s=limit_s, trial_budget=3,
             )  # fmt: skip
 

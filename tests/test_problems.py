@@ -7,7 +7,7 @@ import coartic
 from coartic import BudgetError, CoarticError, UndeclaredError, execute, load_task
 from coartic.method import Session
 from coartic.motion.trials import movements_of
-from coartic.optimisers import TOLD, Objective
+from coartic.optimisers import OPTIMISER_INFORMATION, Objective
 from tests.support.strategies import shipped_optima
 
 FOUR = load_task("two-armed-2")
@@ -87,11 +87,11 @@ def test_instances_of_a_family():
         coartic.problems("one-armed/v1", count=0)
 
 
-def test_a_method_is_not_told_its_task():
-    told = Objective(Session(FOUR, 0, TOLD))
+def test_a_method_cannot_see_its_task():
+    information = Objective(Session(FOUR, 0, OPTIMISER_INFORMATION))
     for ask in ("task", "best_known", "proven"):
-        with pytest.raises(UndeclaredError, match="not told its task"):
-            getattr(told, ask)
+        with pytest.raises(UndeclaredError, match="cannot see its task"):
+            getattr(information, ask)
     with pytest.raises(UndeclaredError):
-        told.fresh()
-    assert "best known" not in repr(told)
+        information.fresh()
+    assert "best known" not in repr(information)

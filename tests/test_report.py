@@ -213,13 +213,16 @@ def test_answers_name_failed_runs_behind_them(traced):
     runs.loc[late, "status"], runs.loc[late, "reward"] = "timeout", pd.NA
     runs.loc[late, "reason"] = "CPU time limit of 600 s exceeded"
     spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
-    told = {
+    information = {
         section.answer: " ".join(text).partition(" failed") for section, text in answers(spoiled)
     }
     of = len(spoiled.cells["two-armed-1", learner].runs)
-    assert not told["Coarticulation"][1]  # the learner's on one-armed tasks
-    assert told["Nearest"][0].endswith(f" 2 of {of + 1} runs of {name_of(planner)} and learner EC4")
-    assert told["Cost"][0].endswith(f" 1 of {of} runs of learner EC4")  # a planner makes no trials
+    assert not information["Coarticulation"][1]  # the learner's on one-armed tasks
+    assert information["Nearest"][0].endswith(
+        f" 2 of {of + 1} runs of {name_of(planner)} and learner EC4"
+    )
+    # a planner makes no trials
+    assert information["Cost"][0].endswith(f" 1 of {of} runs of learner EC4")
     for study in (traced, spoiled):
         assert len(answers(study)) == 4
         for _, (card, *_) in answers(study):  # the first line stands on the first screen
@@ -268,7 +271,9 @@ grid = { noise_sd = [0.02, 0.05, 0.1] }
     for task, of_task in rows.groupby("task"):
         assert of_task.reward.iloc[0] == max(means[task.lower()])
         assert list(of_task.reward) == sorted(of_task.reward, reverse=True)
-        assert list(of_task.behind) == pytest.approx(list(of_task.reward.iloc[0] - of_task.reward))
+        assert list(of_task.gap_ticks) == pytest.approx(
+            list(of_task.reward.iloc[0] - of_task.reward)
+        )
     for name in ("settings", "ranking", "runtimes", "learning", "signatures"):
         assert set(TABLES[name](study).method) == labels, name
     for name in ("ranking", "runtimes", "learning-curves"):

@@ -9,7 +9,7 @@ from coartic import CoarticError
 from coartic.analysis import runtimes
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
-ONE, TWO, LEARNER, PLAN = "ascending", "two-armed-1", "dual-process/EC4", "nullspace-qp/none"
+ONE, TWO, LEARNER, PLAN = "ascending", "two-armed-1", "dual-process/EC4", "posture-qp/current-goal"
 LIMITS = {ONE: (-319, -292), TWO: (-675, -465)}  # initial solution, optimum
 TRIALS = {
     (ONE, "own"): [[-330, -319, -310, -300], [-319, -319, -292, -310]],

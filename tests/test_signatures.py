@@ -10,7 +10,7 @@ import pytest
 from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task
-from coartic.analysis.methods import EC1, GUESSES
+from coartic.analysis.methods import EC1, RANDOM_SEARCH
 from coartic.analysis.sections import TABLES
 from coartic.analysis.signatures import context_tests, measures
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
@@ -22,7 +22,7 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.topics import coarticulation, guesses
+from coartic.analysis.topics import coarticulation, random_search
 from coartic.robot import HANDS
 from tests.support.made_up import made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
@@ -58,16 +58,18 @@ def posed(task, method, q, ticks=(0, 0, 0)):
     return Solutions(task, method, tuple(runs))
 
 
-# Context dependence
+# Posture difference between contexts
 
 
-def test_context_dependence_by_hand():
+def test_standardised_posture_difference_by_hand():
     first = np.array([[0.0, 0.0], [2.0, 0.0]])  # mean (1, 0), squares 2
     second = np.array([[4.0, 3.0], [4.0, 5.0]])  # mean (4, 4), squares 2
     assert distance_of_means(first, second) == 5.0
-    assert context_tests.context_dependence(first, second) == pytest.approx(5.0 / math.sqrt(4 / 2))
-    assert math.isnan(context_tests.context_dependence(first[:1], second[:1]))
-    assert math.isnan(context_tests.context_dependence(first[[0, 0]], second[[1, 1]]))
+    assert context_tests.standardised_posture_difference(first, second) == pytest.approx(
+        5.0 / math.sqrt(4 / 2)
+    )
+    assert math.isnan(context_tests.standardised_posture_difference(first[:1], second[:1]))
+    assert math.isnan(context_tests.standardised_posture_difference(first[[0, 0]], second[[1, 1]]))
 
 
 def test_the_smallest_p_is_that_of_the_clearest_case():
@@ -118,11 +120,11 @@ def test_drawn_tests_count_what_was_seen():
     assert context_tests.beyond_p(far, near, rng(), resamples=19) == 2 / 20
     assert context_tests.beyond_p(near, far, rng(), resamples=19) == 1.0
     assert math.isnan(context_tests.beyond_p((far[0][:1], far[1]), near, rng()))
-    assert context_tests.dependence_below(*near, 50.0, rng(), resamples=9) == 0.1
-    assert math.isnan(context_tests.dependence_below(near[0][:1], near[1], 1.0, rng()))
+    assert context_tests.posture_difference_below(*near, 50.0, rng(), resamples=9) == 0.1
+    assert math.isnan(context_tests.posture_difference_below(near[0][:1], near[1], 1.0, rng()))
 
 
-def test_dependence_below_a_bound_by_brute_force():
+def test_posture_difference_below_a_bound_by_brute_force():
     """Every bootstrap sample of three runs and of two, counted one by one."""
     first, second = rng(12).standard_normal((3, 2)), rng(13).standard_normal((2, 2)) + 1.5
     reached = [
@@ -132,7 +134,7 @@ def test_dependence_below_a_bound_by_brute_force():
         for b in itertools.product(second, repeat=2)
         for a, b in [(np.array(a), np.array(b))]
     ]  # fmt: skip
-    p = context_tests.dependence_below(first, second, 2.0, rng())
+    p = context_tests.posture_difference_below(first, second, 2.0, rng())
     assert 0.1 < p < 0.9
     assert p == pytest.approx(np.mean(reached), abs=0.02)
 
@@ -142,8 +144,8 @@ def test_pairs_of_contexts():
     assert context_pairs(tasks) == [("ascending", "descending", 1)]
     moved = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
     other = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.5]], initial_hands="RRR")
-    apart = tiny_task(goals=[[5.0, 1.5], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
-    assert context_pairs({"a": moved, "b": other, "c": moved, "d": apart}) == [
+    posture_difference = tiny_task(goals=[[5.0, 1.5], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
+    assert context_pairs({"a": moved, "b": other, "c": moved, "d": posture_difference}) == [
         ("a", "b", 2),
         ("b", "c", 2),
     ]
@@ -204,7 +206,7 @@ def test_parts_of_two_contexts():
     assert contexts.parts[0] == pytest.approx(0.02 / 2, rel=1e-3)  # of four dimensions
     assert contexts.parts[1] < 5e-4
     assert contexts.n == 12
-    assert contexts.apart == pytest.approx(0.02)
+    assert contexts.posture_difference == pytest.approx(0.02)
 
 
 # Subtasks and hands
@@ -255,7 +257,7 @@ def test_what_a_posture_serves():
 
 
 def test_signs_are_one_number_a_run():
-    """A learner's first movement is slower, the whole faster, than with the same hands."""
+    """A learner's first movement is slower, the whole task faster, than with the same hands."""
     task = load_task("two-armed-1")
     learned = [learn(task, "EC4", seed=seed, trials=400).execute() for seed in (1, 2)]
     cell = Solutions(task, "", tuple(learned))
@@ -349,105 +351,127 @@ def study_with(*cells):
     return study_of(rows, [cell.task for cell in cells], executed=made(executed))
 
 
-def beside_guesses(apart, of_guesses=0.5, *, runs=12, guesses_runs=12, guesses_trials=10):
-    """The learner's bases lie ``apart`` at goal 1 by the next goal, and those of guesses."""
+def beside_random_search(
+    posture_difference,
+    of_random_search=0.5,
+    *,
+    runs=12,
+    random_search_runs=12,
+    random_search_trials=10,
+):
+    """The learner's bases differ so much at goal 1 by the next goal, and those of random search."""
     cells = []
-    for label, shift, count in ((EC1, apart, runs), (GUESSES, of_guesses, guesses_runs)):
+    for label, shift, count in (
+        (EC1, posture_difference, runs),
+        (RANDOM_SEARCH, of_random_search, random_search_runs),
+    ):
         noise = 0.1 * rng(2).standard_normal(count)
         for task, x in ((load_task("ascending"), 0.0), (load_task("descending"), shift)):
             cells.append(posed(task, label, [posture(each) for each in noise + x]))
     study = study_with(*cells)
-    study.runs.loc[study.runs.method == GUESSES, "trials"] = guesses_trials
+    study.runs.loc[study.runs.method == RANDOM_SEARCH, "trials"] = random_search_trials
     return study
 
 
 @pytest.mark.parametrize(
     ("made_up", "answer"),
     [
-        ({"apart": 2.0}, "Yes. The learner hits the same goal"),
-        ({"apart": 0.5}, "Not shown:"),
-        ({"apart": 0.5, "of_guesses": 2.0}, "Not shown:"),
-        ({"apart": 0.0}, "No significant difference:"),
-        ({"apart": 2.0, "runs": 2}, "Too few runs"),
-        ({"apart": 2.0, "guesses_runs": 0}, "Undecided:"),
-        ({"apart": 2.0, "guesses_trials": 9}, "Undecided:"),  # fewer than the learner's
-        ({"apart": 2.0, "guesses_runs": 1}, "Undecided:"),
+        ({"posture_difference": 2.0}, "Yes. The learner hits the same goal"),
+        ({"posture_difference": 0.5}, "Not shown:"),
+        ({"posture_difference": 0.5, "of_random_search": 2.0}, "Not shown:"),
+        ({"posture_difference": 0.0}, "No significant difference:"),
+        ({"posture_difference": 2.0, "runs": 2}, "Too few runs"),
+        ({"posture_difference": 2.0, "random_search_runs": 0}, "Undecided:"),
+        # fewer than the learner's
+        ({"posture_difference": 2.0, "random_search_trials": 9}, "Undecided:"),
+        ({"posture_difference": 2.0, "random_search_runs": 1}, "Undecided:"),
     ],
 )
-def test_a_method_that_selects_has_to_exceed_guesses(made_up, answer):
-    study = beside_guesses(**made_up)
+def test_a_method_that_selects_has_to_exceed_random_search(made_up, answer):
+    study = beside_random_search(**made_up)
     contexts = coarticulation.shared_goal(study)
     assert contexts.method == EC1
-    assert contexts.apart == pytest.approx(made_up["apart"])
+    assert contexts.posture_difference == pytest.approx(made_up["posture_difference"])
     assert coarticulation.next_goal(study).startswith(answer)
-    compared = guesses.guesses_beside(study, contexts)
+    compared = random_search.random_search_for(study, contexts)
     if compared is not None:
-        assert compared.apart == pytest.approx(made_up.get("of_guesses", 0.5))
-        beyond = guesses.context_beyond_p(study, contexts)
-        assert (beyond < 0.05) == (made_up["apart"] == 2.0 and len(compared.configurations[0]) > 1)
-        assert math.isnan(guesses.context_beyond_p(study, compared))  # it is not tested itself
+        assert compared.posture_difference == pytest.approx(made_up.get("of_random_search", 0.5))
+        beyond = random_search.context_beyond_p(study, contexts)
+        assert (beyond < 0.05) == (
+            made_up["posture_difference"] == 2.0 and len(compared.configurations[0]) > 1
+        )
+        # it is not tested itself
+        assert math.isnan(random_search.context_beyond_p(study, compared))
 
 
-def test_the_guesses_that_show_most_of_a_signature_count():
-    tasks, drawn = [load_task("ascending"), load_task("descending")], "guesses/hands"
+def test_the_random_search_that_shows_most_of_a_signature_counts():
+    tasks, drawn = [load_task("ascending"), load_task("descending")], "random-search/hands"
     alone = {task.name: corrective_trial(task, "RRR").ticks_by_goal() for task in tasks}
     study = study_with(*(
         posed(task, label, [posture(shift * number + noise) for noise in (0.0, 0.1, 0.2)],
               np.add(alone[task.name], [slower, 0, 0]))
-        for label, shift, slower in ((EC1, 1.0, 5), (GUESSES, 0.8, 1), (drawn, 0.3, 2))
+        for label, shift, slower in ((EC1, 1.0, 5), (RANDOM_SEARCH, 0.8, 1), (drawn, 0.3, 2))
         for number, task in enumerate(tasks)
     ))  # fmt: skip
-    assert guesses.guesses_on(study, "ascending") == [GUESSES, drawn]
-    assert guesses.guesses_beside(study, coarticulation.shared_goal(study)).method == GUESSES
-    assert list(guesses.most_guessed(study, "first", "ascending")) == [2, 2, 2]
-    assert not guesses.selects(study, drawn)
+    assert random_search.random_search_on(study, "ascending") == [RANDOM_SEARCH, drawn]
+    assert (
+        random_search.random_search_for(study, coarticulation.shared_goal(study)).method
+        == RANDOM_SEARCH
+    )
+    assert list(random_search.most_of_random_search(study, "first", "ascending")) == [2, 2, 2]
+    assert not random_search.selects(study, drawn)
 
 
 def test_of_a_family_one_width_counts():
     """That of the highest mean: 3 ticks and 3 against 9 and -7, though 9 is the most of one."""
-    drawn = "guesses/hands"
+    drawn = "random-search/hands"
     cells = [
         posed(task, label, [posture()], np.add(corrective_trial(task, "RRR").ticks_by_goal(), more))
         for number, task in enumerate(map(load_task, ("one-armed/v1/i001", "one-armed/v1/i002")))
-        for label, slower in ((GUESSES, (9, -7)), (drawn, (3, 3)))
+        for label, slower in ((RANDOM_SEARCH, (9, -7)), (drawn, (3, 3)))
         for more in [[slower[number]] + [0] * (len(task.goals) - 1)]
     ]
     study = study_with(*cells)
     for name in study.tasks:
-        assert guesses.most_guessed(study, "first", name).tolist() == [3]
+        assert random_search.most_of_random_search(study, "first", name).tolist() == [3]
 
 
 def test_p_of_shared_goals_is_corrected_by_method():
     """Of eight runs in two places 2 of 70 divisions are as far apart. Two tasks share two goals:
-    the learner, on three tasks, has six of them, and guesses, on two, have two."""
+    the learner, on three tasks, has six of them, and random search, on two, has two."""
     tasks = [
         tiny_task(name=name, goals=[[5.0, 1.0], [5.0, 2.0], [5.0, y]], initial_hands="RRR")
         for name, y in (("a", 3.0), ("b", 3.5), ("c", 4.0))
     ]
     cells = [
         posed(task, label, [posture(place + 0.01 * run) for run in range(4)])
-        for label, count in ((EC1, 3), (GUESSES, 2))
+        for label, count in ((EC1, 3), (RANDOM_SEARCH, 2))
         for place, task in enumerate(tasks[:count])
     ]
     table = TABLES["contexts"](study_with(*cells)).set_index("method")
     assert table.p_holm[EC1].tolist() == pytest.approx([6 * 2 / 70] * 6)
-    assert table.p_holm[GUESSES].tolist() == pytest.approx([2 * 2 / 70] * 2)
+    assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 70] * 2)
 
 
 def test_a_signature_stands_beside_random_search():
-    study = beside_guesses(2.0)
+    study = beside_random_search(2.0)
     contexts = coarticulation.shared_goal(study)
-    (of_guesses,) = guesses.every_guess_beside(study, contexts)
+    (of_random_search,) = random_search.every_random_search_for(study, contexts)
     first, _, _ = coarticulation.next_goal(study).partition("\n")
-    assert f"{contexts.spreads:.1f} SD apart; random search: {of_guesses.spreads:.1f})" in first
+    assert (
+        f"{contexts.standardised_posture_difference:.1f} SD; random search: "
+        f"{of_random_search.standardised_posture_difference:.1f})" in first
+    )
 
 
-def beside_corrective(method, apart, *, stochastic, runs):
-    """A method whose base lies ``apart`` at goal 1 by the next goal, and the corrective process."""
+def beside_corrective(method, posture_difference, *, stochastic, runs):
+    """A method whose base differs so much at goal 1 by the next goal, and the corrective
+    process."""
     cells = [
         posed(load_task(name), label, [posture(shift + 0.01 * run) for run in range(count)])
         for label, shifts, count in (
-            ("corrective-alone/every", (0.0, 0.0), 1), (method, (0.0, apart), runs)
+            ("corrective-alone/best-hands", (0.0, 0.0), 1),
+            (method, (0.0, posture_difference), runs),
         )
         for name, shift in zip(("ascending", "descending"), shifts, strict=True)
     ]  # fmt: skip
@@ -460,17 +484,26 @@ def beside_corrective(method, apart, *, stochastic, runs):
 @pytest.mark.parametrize(
     ("made_up", "answer"),
     [
-        ({"apart": 0.0, "stochastic": False, "runs": 1}, "No. mine hits the same goal in the same"),
-        ({"apart": 0.5, "stochastic": False, "runs": 1}, "Yes. mine hits the same goal in diff"),
-        ({"apart": 0.5, "stochastic": True, "runs": 1}, "Too few runs"),
-        ({"apart": 0.5, "stochastic": True, "runs": 9}, "Yes. mine hits the same goal in clearly"),
-        ({"apart": 0.0, "stochastic": True, "runs": 9}, "No significant difference:"),
+        (
+            {"posture_difference": 0.0, "stochastic": False, "runs": 1},
+            "No. mine hits the same goal in the same",
+        ),
+        (
+            {"posture_difference": 0.5, "stochastic": False, "runs": 1},
+            "Yes. mine hits the same goal in diff",
+        ),
+        ({"posture_difference": 0.5, "stochastic": True, "runs": 1}, "Too few runs"),
+        (
+            {"posture_difference": 0.5, "stochastic": True, "runs": 9},
+            "Yes. mine hits the same goal in clearly",
+        ),
+        ({"posture_difference": 0.0, "stochastic": True, "runs": 9}, "No significant difference:"),
     ],
 )
 def test_no_difference_is_significant_or_not_without_a_test(made_up, answer):
     """A method that draws nothing takes none, and one run a context allows none."""
     study = beside_corrective("mine", **made_up)
-    assert not guesses.selects(study, "mine")
+    assert not random_search.selects(study, "mine")
     assert coarticulation.next_goal(study).startswith(answer)
 
 

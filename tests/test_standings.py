@@ -137,21 +137,22 @@ def test_the_learners_place_is_said():
 
 def alike(**better):
     """Methods by their beginnings, with -300 and so many ticks more on ascending."""
-    names = {"learner": "dual-process/EC1", "cma": "cma-es/bandit", "guesses": "guesses",
-             "climbing": "random-search/climbing", "alone": "corrective-alone/given"}  # fmt: skip
+    names = {"learner": "dual-process/EC1", "cma": "cma-es/bandit",
+             "random_search": "random-search", "climbing": "hill-climbing",
+             "alone": "corrective-alone/given"}  # fmt: skip
     rewards = {("ascending", names[name]): [-300 + more] * 3 for name, more in better.items()}
     return ranking.nearest(study(rewards))
 
 
 def test_ties_are_said():
-    text = alike(learner=0, cma=0, guesses=0)
+    text = alike(learner=0, cma=0, random_search=0)
     assert text.startswith("The learner and CMA-ES have the same gap to the optimum (2.7 %).")
-    assert "Gap of guesses: 2.7 %, the same as the learner's." in text
+    assert "Gap of random search: 2.7 %, the same as the learner's." in text
     text = alike(learner=0, cma=0, climbing=-1)
     assert "have the same gap to the optimum (2.7 %), the smallest of the three that learn" in text
-    text = alike(learner=0, cma=0, climbing=1, guesses=1)
+    text = alike(learner=0, cma=0, climbing=1, random_search=1)
     assert "the learner is number 2 (2.7 %)" in text
-    assert "Gap of guesses: 2.4 %, smaller than the learner's." in text
+    assert "Gap of random search: 2.4 %, smaller than the learner's." in text
 
 
 def test_who_tries_hands_alone_does_not_learn():
@@ -167,7 +168,8 @@ def test_the_learner_stands_by_the_form_that_explores_most():
 
 
 def test_a_method_that_makes_one_trial_does_not_use_its_reward():
-    """The corrective process alone is told of its only trial, and of every hand sequence."""
+    """The corrective process alone uses the reward of its only trial, and of every hand
+    sequence."""
     alone = study({("ascending", "corrective-alone/given"): [-319]} | LEARNER)
     assert scores.groups(alone)["corrective-alone/given"] == BY_TRIAL  # of ten trials
     alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
@@ -406,7 +408,7 @@ def test_on_one_task_a_method_stands_beside_the_learners_reward():
 
 def test_a_method_from_a_file_stands_with_its_parameters():
     """In ranking, tests and headline; a setting of a built-in method is not compared."""
-    rewards = TEN | strangers(("mine", 2), ("random-search/climbing", 5), runs=10)
+    rewards = TEN | strangers(("mine", 2), ("hill-climbing", 5), runs=10)
     seen = study(rewards)
     learns = seen.runs.method.str.contains("/EC")
     runs = seen.runs.assign(setting=np.where(learns, "", "width=0.2"))

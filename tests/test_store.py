@@ -44,7 +44,7 @@ STUCK = tiny_task(
 NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
 CELLS = [
     Cell(STUCK, KNOWN["dual-process/EC4"], {"epsilon": 0.5}),
-    Cell(NEAR, KNOWN["nullspace-qp/none"]),
+    Cell(NEAR, KNOWN["posture-qp/current-goal"]),
 ]
 ONE = paper_cells(tasks=["ascending"])
 FEW = {"runs": 9, "trials": 20}
@@ -52,7 +52,7 @@ FEW = {"runs": 9, "trials": 20}
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Runs as they were handed over, and a study of them."""
+    """Runs as they were returned, and a study of them."""
     handed, write_runs = {}, Store.write
 
     def write(store, runs):
@@ -349,6 +349,10 @@ def journal_of_several(path):
             "this version.*reads.*update coartic",
         ),
         (
+            sql("PRAGMA user_version = 2"),
+            "format 2, which version 2.0.0 reads; this version.*another --out",
+        ),
+        (
             sql("PRAGMA user_version = 0"),
             "this version.*reads.*another --out",
         ),
@@ -409,7 +413,7 @@ def read_all(folder):
         "results SET run_id = randomblob(9), seed = 'x'",
         "tasks SET definition = '{'",
         "tasks SET definition = json_set(definition, '$.radius', 0.2)",
-        "methods SET told = '[1]'",
+        "methods SET information = '[1]'",
         "methods SET name = 'other'",
         "environments SET content = json_set(content, '$.packages', 1)",
         "suite SET date = NULL",

@@ -51,10 +51,11 @@ def study():
             best = int(np.nanmax(rewards[run_id]))
             rows.append(row(method, best, task=task, run=run, run_id=run_id, trials=trials,
                             seed=run, forward_kinematics=1_000 * trials))  # fmt: skip
-    told = "kinematic model, reward as a formula"
+    information = "kinematic model, reward as a formula"
     for task, reward, ticks in ((ONE, -296, 0), (TWO, -500, 100)):
-        rows.append(row(PLAN, reward, task=task, run_id=f"{task}-plan", trials=0, told=told,
-                        forward_kinematics=500, movement_ticks=ticks, seed=0))  # fmt: skip
+        rows.append(row(PLAN, reward, task=task, run_id=f"{task}-plan", trials=0,
+                        information=information, forward_kinematics=500, movement_ticks=ticks,
+                        seed=0))  # fmt: skip
     return study_of(rows, optima=made_up_optima(ONE, TWO), rewards=lambda: iter(rewards.items()))
 
 
@@ -85,8 +86,8 @@ def test_ranking(study):
         EC4: (BY_TRIAL, {TWO: LEARNED[TWO]}, 3),
     }
     same(table.loc[list(named)], {
-        name: {"method": name, "knows": knows, **gap_columns(gaps), "runs": runs}
-        for name, (knows, gaps, runs) in named.items()
+        name: {"method": name, "information": information, **gap_columns(gaps), "runs": runs}
+        for name, (information, gaps, runs) in named.items()
     })  # fmt: skip
     assert table.index.tolist()[:3] == [CMA, BOTH, PLAN]
     assert table.gap_low[CMA] == table.gap_high[CMA] == table.gap[CMA]
@@ -129,8 +130,8 @@ def test_runtimes(study):
     """
     names = ["reached", "trials_to_quarter", "trials_to_quarter_low", "trials_to_quarter_high",
              "trials_to_half", "trials_to_half_low", "trials_to_half_high",
-             "kinematics_to_half", "kinematics_to_half_low", "kinematics_to_half_high",
-             "seconds_to_half", "seconds_to_half_low",
+             "forward_kinematics_to_half", "forward_kinematics_to_half_low",
+             "forward_kinematics_to_half_high", "seconds_to_half", "seconds_to_half_low",
              f"half on {ONE}", f"half on {TWO}"]  # fmt: skip
     # The first run is cold: the time of the other two, which are too few for an interval.
     cells = {
@@ -151,7 +152,8 @@ def test_runtimes(study):
 def test_learning(study):
     """Half of the gain of the three runs is there at trial 500, 101 and 20."""
     names = ["runs", "initial", "after_100", "after_1000", "after_10000",
-             "half_gain", "half_gain_low", "half_gain_high"]  # fmt: skip
+             "trials_to_half_gain", "trials_to_half_gain_low",
+             "trials_to_half_gain_high"]  # fmt: skip
     cells = {
         f"{ONE} {EC1}": (3, -319.0, -312.0, -302.0, NONE, 101.0, 20.0, 500.0),
         f"{TWO} {EC4}": (3, -675.0, -675.0, -480.0, NONE, 200.0, 200.0, 200.0),

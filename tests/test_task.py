@@ -164,7 +164,7 @@ def test_inner_reach():
 
 
 def test_initial_hand_policies():
-    """The printed policies give the printed hands: both tasks start with RRRR."""
+    """The published policies give the published hands: both tasks start with RRRR."""
     for name, policy in (("two-armed-1", "best-single-hand"), ("two-armed-2", "best-of-all")):
         content = {**load_task(name).model_dump(mode="json"), "initial_hands": policy}
         task = parse_task(content, name)

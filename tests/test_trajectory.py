@@ -67,7 +67,7 @@ def test_segment_costs_are_the_integrals(cost, seed):
 @pytest.mark.parametrize(
     ("cost", "hands", "still"),
     [  # any two of them in every combination
-        (("path-length", "squared-changes")[(number + still) % 2], hands, still)
+        (("path-length", "squared-displacement")[(number + still) % 2], hands, still)
         for number, hands in enumerate(itertools.product(("left", "right"), repeat=2))
         for still in (False, True)
     ],
@@ -151,7 +151,7 @@ QUICK = {"nodes": 20, "graphs": 1, "chains": 1, "noisy_starts": 0}
 def planned(cost, task, stops=False):
     """The plan of a task's initial hands by the method of a cost."""
     (kind,) = (kind for kind in METHODS if kind.cost == cost)
-    method, session = kind(kind.Parameters(**QUICK)), Session(task, 0, kind.told)
+    method, session = kind(kind.Parameters(**QUICK)), Session(task, 0, kind.information)
     problem = trajectory_problem(task.robot, task.hands, len(task.goals), cost)
     hands = hands_of(task.initial_hands)
     instance = Instance.of(task, hands, still=False, radius=task.radius - PAPER.arrival_tolerance)

@@ -6,7 +6,7 @@ import pytest
 from coartic import load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
 from coartic.motion.trials import movements_of
-from coartic.optimisers import TOLD
+from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import make_trials, sample
 
 BLIND = frozenset({Information.REWARD_BY_TRIAL})
@@ -15,8 +15,8 @@ BLIND = frozenset({Information.REWARD_BY_TRIAL})
 def test_a_budget_that_ends_within_a_batch():
     task = load_task("two-armed-2")
     hands, targets = sample(task, 10)
-    unlimited = Session(task, 0, TOLD).trials(hands, targets)
-    session = Session(task, 0, TOLD, trial_budget=7)
+    unlimited = Session(task, 0, OPTIMISER_INFORMATION).trials(hands, targets)
+    session = Session(task, 0, OPTIMISER_INFORMATION, trial_budget=7)
     assert len(session.trials(hands[:4], targets[:4]).ticks) == 4
     rest = session.trials(hands[4:], targets[4:])
     np.testing.assert_array_equal(rest.rewards, unlimited.rewards[4:7])
@@ -26,13 +26,16 @@ def test_a_budget_that_ends_within_a_batch():
         session.trials(hands, targets)
 
 
-def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
+def test_a_method_without_the_corrective_process_does_not_see_it():
     task = load_task("ascending")
     hands, targets = sample(task, 3)
     session = Session(task, 0, BLIND)
-    blind, told = session.trials(hands, targets), Session(task, 0, TOLD).trials(hands, targets)
-    np.testing.assert_array_equal(blind.rewards, told.rewards)
-    assert told.corrections.sum() > 0
+    blind, information = (
+        session.trials(hands, targets),
+        Session(task, 0, OPTIMISER_INFORMATION).trials(hands, targets),
+    )
+    np.testing.assert_array_equal(blind.rewards, information.rewards)
+    assert information.corrections.sum() > 0
     hidden = (blind.corrections, blind.iterations, blind.targets, blind.reached)
     assert [len(field) for field in hidden] == [0] * 4
     solution = movements_of(hands[0], targets[0])
@@ -43,7 +46,7 @@ def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
     with pytest.raises(UndeclaredError, match="corrective process"):
         session.trials(hands, targets)
     with pytest.raises(UndeclaredError, match="reward by trial"):
-        Session(task, 0, TOLD - BLIND).trials(hands, targets)
+        Session(task, 0, OPTIMISER_INFORMATION - BLIND).trials(hands, targets)
 
 
 def test_what_was_given_is_left_alone():
@@ -77,7 +80,10 @@ def test_a_target_that_is_far_away_fails_its_trial_alone():
     task, rng = load_task("two-armed-2"), np.random.default_rng(0)
     hands, targets = sample(task, 12)
     targets[:, 2, 3:6] = np.nan
-    session, others = Session(task, 0, TOLD), Session(task, 0, TOLD)
+    session, others = (
+        Session(task, 0, OPTIMISER_INFORMATION),
+        Session(task, 0, OPTIMISER_INFORMATION),
+    )
     far = np.isin(np.arange(12), [0, 5, 11])
     given = targets.copy()
     given[far, rng.integers(4, size=3), rng.integers(6, 10, size=3)] = [1.1e5, -3e5, 1e300]
@@ -108,10 +114,13 @@ def test_no_number_of_threads_changes_a_trial(monkeypatch):
 def test_until_the_first_that_is_better():
     task = load_task("two-armed-2")
     hands, targets = sample(task, 12)
-    rewards = Session(task, 0, TOLD).trials(hands, targets).rewards
+    rewards = Session(task, 0, OPTIMISER_INFORMATION).trials(hands, targets).rewards
     until = np.full(12, np.inf)
     until[[2, 5, 9]] = rewards[[2, 5, 9]] - [0.0, 1.0, 1.0]  # the first one is equalled
-    session, alone = Session(task, 0, TOLD), Session(task, 0, TOLD)
+    session, alone = (
+        Session(task, 0, OPTIMISER_INFORMATION),
+        Session(task, 0, OPTIMISER_INFORMATION),
+    )
     np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
     alone.trials(hands[:6], targets[:6])
     assert session.meter == alone.meter

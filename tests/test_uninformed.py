@@ -8,13 +8,14 @@ import pytest
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
-from coartic.baselines.random_search import Climbing, DrawnHands
+from coartic.baselines.hill_climbing import HillClimbing
+from coartic.baselines.random_search import RandomSearchHands
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Meter, MethodError, Session
-from coartic.optimisers import TOLD
+from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import tiny_task
 
-METHODS = (Climbing, CMAES, GoalByGoal)
+METHODS = (HillClimbing, CMAES, GoalByGoal)
 ONE_GOAL = tiny_task(
     hands=["right"],
     goals=[[-3.0, 0.0]],
@@ -24,7 +25,9 @@ ONE_GOAL = tiny_task(
 
 
 def solve(method, task, seed=0, budget=None, model=None, **parameters):
-    session = Session(task, seed, method.told, trial_budget=budget, model=model or MotionModel())
+    session = Session(
+        task, seed, method.information, trial_budget=budget, model=model or MotionModel()
+    )
     result = method(method.Parameters(**parameters)).solve(session)
     return session, result
 
@@ -70,19 +73,19 @@ def test_hands_chosen_goal_by_goal():
     assert execute(many, result.solution).reward == max(filter(None, session.rewards))
 
 
-def test_guesses_with_every_hand_sequence():
-    """Each sequence has its corrective trial and as many guesses; the best of all is kept."""
+def test_random_search_with_every_hand_sequence():
+    """Each sequence has its corrective trial and as many random trials; the best of all is kept."""
     task = load_task("two-armed-2")
-    session, result = solve(DrawnHands, task, trials=165)
+    session, result = solve(RandomSearchHands, task, trials=165)
     assert session.meter.trials == 165
     alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
     starts = [165 * n // 16 for n in range(16)]
     assert sorted(session.rewards[n] for n in starts) == sorted(alone.values())
     completed = [reward for reward in session.rewards if reward is not None]
     assert execute(task, result.solution).reward == max(completed)
-    far, _ = solve(DrawnHands, task, trials=165, half_width=3.0)
-    assert max(filter(None, far.rewards)) == max(alone.values())  # no such guess is better
-    assert solve(DrawnHands, task, trials=301, budget=20)[0].meter.trials == 20
+    far, _ = solve(RandomSearchHands, task, trials=165, half_width=3.0)
+    assert max(filter(None, far.rewards)) == max(alone.values())  # no such random trial is better
+    assert solve(RandomSearchHands, task, trials=301, budget=20)[0].meter.trials == 20
 
 
 def test_the_bandit_exploits_explores_and_goes_where_rewards_are():
@@ -107,7 +110,7 @@ SECOND_FOR_THE_RIGHT = tiny_task(
 
 def one_by_one(task, seed, parameters):
     """Hill climbing as it is defined: draw, make one trial, draw again."""
-    session = Session(task, seed, TOLD)
+    session = Session(task, seed, OPTIMISER_INFORMATION)
     attempts, rng = Attempts(session, parameters), session.rng
     letters = [hand[0].upper() for hand in session.hands]
     centres, failed, hands = {}, set(), task.initial_hands
@@ -137,7 +140,7 @@ def one_by_one(task, seed, parameters):
 
 @pytest.mark.parametrize("task", [load_task("two-armed-2"), SECOND_FOR_THE_RIGHT])
 def test_trials_made_together_are_those_made_one_by_one(task):
-    session, _ = solve(Climbing, task, trials=300)
+    session, _ = solve(HillClimbing, task, trials=300)
     alone = one_by_one(task, 0, UninformedParameters(trials=300))
     assert session.rewards == alone.rewards
     together, single = vars(session.meter), vars(alone.meter)
@@ -177,7 +180,7 @@ class HalfOfAPlain:
 def test_failed_trials_rank_last():
     """The best that does not fail is (0.5, 1, 1), with -25."""
     attempts = HalfOfAPlain()
-    session = Session(ONE_GOAL, 0, TOLD)
+    session = Session(ONE_GOAL, 0, OPTIMISER_INFORMATION)
     strategy = Strategy(session, attempts, "R", 0.05)
     failed = []
     for _ in range(80):

@@ -22,7 +22,7 @@ from coartic.analysis import verify as checker
 from coartic.motion.movement import follow
 from coartic.motion.solution import other_arm_travel
 from coartic.robot import HANDS
-from coartic.runs.card import MethodCard
+from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Cell, Plan
 from coartic.runs.run import PARTS, Run, Score
 from coartic.runs.store import RUNS_FILE, writing
@@ -75,7 +75,7 @@ def true_folder(tmp_path_factory):
     ]
     for run, parameters in NARROW.items():
         asked.append((two_armed, parameters, [(run, {}, failed)]))
-    method = MethodCard("method", "", "", (), (), True, {}, "", "code")
+    method = MethodInfo("method", "", "", (), (), True, {}, "", "code")
     cells = tuple(Cell(task, method, each, each, 7) for task, each, _ in asked)
     with writing(folder) as store:
         plan = Plan("suite", 0, 7, 300, None, None, cells)

@@ -35,7 +35,7 @@ class Claim:
     runs beside them, so that they change no verdict on those cells; those on families of random
     tasks; with none, as it is counted exactly."""
     fitted: bool = False
-    """Whether it rests on goals that the paper does not print."""
+    """Whether it rests on goals that the paper does not publish."""
     sets: str = ""
     """Of such a claim: how many of the sets of goals that the paper's text admits support it
     (docs/reconstruction.md); not of one that chose them, or that takes other runs."""
@@ -57,7 +57,8 @@ class Higher(NamedTuple):
 def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ()) -> Finding:
     """Whether every mean is as claimed, by one-tailed bootstrap tests.
 
-    ``shown``: values that the evidence has as well. What the paper prints of both stands there too.
+    ``shown``: values that the evidence has as well. What the paper publishes of both stands there
+    too.
     """
     tests, parts = [], []
     before: Measurement | None = None
@@ -68,11 +69,11 @@ def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ())
         if second is not None:
             words += f" against {second} ({second.who})"
             if second.numbers.ndim:
-                apart = difference_of_means(first.numbers, second.numbers)
-                words += f", a difference of {estimate(apart, 1 if first.in_ticks else 3)}"
+                difference = difference_of_means(first.numbers, second.numbers)
+                words += f", a difference of {estimate(difference, 1 if first.in_ticks else 3)}"
                 words += " ticks" * first.in_ticks
-            if first.printed and second.printed:
-                words += f"; published {first.printed} and {second.printed}"
+            if first.published and second.published:
+                words += f"; published {first.published} and {second.published}"
         parts.append((first.quantity, words))
         before = first
     parts += [(values.quantity, f"{values.name}: {values}") for values in shown]

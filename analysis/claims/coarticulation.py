@@ -14,8 +14,8 @@ from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, Higher, all_higher
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES
-from coartic.analysis.signatures.context_tests import dependence_below
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
+from coartic.analysis.signatures.context_tests import posture_difference_below
 from coartic.analysis.signatures.measures import ticks_slower
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.solutions import Solutions
@@ -33,13 +33,13 @@ TEST_OF_MEANS = "one-tailed bootstrap test of the mean reward for each compariso
 
 
 def first_movement_sacrificed(read: Reader) -> Finding:
-    """The first movement is slower, the whole faster."""
+    """The first movement is slower, the whole task faster."""
     comparisons = []
     for task in ONE_ARMED:
         first = read.signature("first", task, EC1)
         comparisons += [
             Higher(first, by=margins.TICKS),
-            Higher(first, read.signature("first", task, GUESSES)),
+            Higher(first, read.signature("first", task, RANDOM_SEARCH)),
             Higher(first, read.signature("first", task, EC1_BY_SUBTASK)),
             Higher(read.signature("whole", task, EC1)),
         ]
@@ -48,32 +48,38 @@ def first_movement_sacrificed(read: Reader) -> Finding:
 
 
 def posture_depends_on_context(read: Reader) -> Finding:
-    """Postures at goal 1 depend on the goal that follows, more than those of guesses."""
+    """Postures at goal 1 depend on the goal that follows, more than in random search."""
     contexts, replayed = contexts_of(read, EC1), contexts_of(read, EC1, replay=True)
     equivalent, other = contexts.parts
     parts = [
-        f"postures at goal 1 lie {number(contexts.apart, 2)} apart, {number(contexts.spreads, 1)} "
-        f"pooled SD; per dimension {number(equivalent, 3)} of that leaves the hand in place and "
-        f"{number(other, 3)} moves it",
-        f"in noiseless replays {number(replayed.apart, 2)} apart",
+        f"posture difference at goal 1 {number(contexts.posture_difference, 2)}, standardised "
+        f"{number(contexts.standardised_posture_difference, 1)} pooled SD; per dimension "
+        f"{number(equivalent, 3)} of it leaves the hand in place and {number(other, 3)} moves it",
+        f"in noiseless replays {number(replayed.posture_difference, 2)}",
     ]
-    test = Estimate(contexts.spreads, p=contexts.p, n=(contexts.n,))
-    less_p = dependence_below(*contexts.configurations, margins.SPREAD, np.random.default_rng(SEED))
+    test = Estimate(contexts.standardised_posture_difference, p=contexts.p, n=(contexts.n,))
+    less_p = posture_difference_below(
+        *contexts.configurations, margins.SPREAD, np.random.default_rng(SEED)
+    )
     tests = [test]
     against = [replace(test, value=margins.SPREAD - test.value, p=less_p)]
-    guesses = [contexts_of(read, label) for label in read.guesses(ONE_ARMED[0])]
-    farthest = max(guesses, key=lambda each: each.apart)
+    random_search = [contexts_of(read, label) for label in read.random_search(ONE_ARMED[0])]
+    farthest = max(random_search, key=lambda each: each.posture_difference)
     for compared in (farthest, contexts_of(read, EC1_BY_SUBTASK)):
-        more = contexts.apart - compared.apart
+        more = contexts.posture_difference - compared.posture_difference
         beyond = replace(test, value=more, n=(contexts.n, compared.n))
         tests.append(replace(beyond, p=contexts.p_beyond(compared)))
         against.append(replace(beyond, value=-more, p=compared.p_beyond(contexts)))
-        parts.append(f"{methods.name_of(compared.method)}: {number(compared.apart, 2)} apart")
+        parts.append(
+            f"{methods.name_of(compared.method)}: {number(compared.posture_difference, 2)}"
+        )
     for label in ("posture-based/one-goal", methods.INITIAL):  # which look at the current goal
         with suppress(MissingError):
-            apart = contexts_of(read, label).apart
-            parts.append(f"{methods.name_of(label)}: {number(apart, 2)} apart")
-    holds = contexts.spreads > margins.SPREAD and all(each.value > 0 for each in tests)
+            posture_difference = contexts_of(read, label).posture_difference
+            parts.append(f"{methods.name_of(label)}: {number(posture_difference, 2)}")
+    holds = contexts.standardised_posture_difference > margins.SPREAD and all(
+        each.value > 0 for each in tests
+    )
     return Finding(holds, "; ".join(parts), tuple(tests), tuple(against))
 
 
@@ -87,7 +93,8 @@ def contexts_of(read: Reader, label: str, *, replay: bool = False) -> TwoContext
 
 
 def overall_reward(read: Reader) -> Finding:
-    """Without a reward for the whole, the first movement is not sacrificed and less is earned."""
+    """Without a reward for the whole task, the first movement is not sacrificed and less is
+    earned."""
     comparisons = []
     for task in ONE_ARMED:
         first = read.signature("first", task, EC1, replay=True)
@@ -106,7 +113,7 @@ def arm_coarticulation(read: Reader) -> Finding:
             arm = read.signature("arm", task, label)
             comparisons += [
                 Higher(arm, by=margins.TICKS),
-                Higher(arm, read.signature("arm", task, GUESSES)),
+                Higher(arm, read.signature("arm", task, RANDOM_SEARCH)),
             ]
             if label == EC4:
                 comparisons.append(Higher(arm, read.signature("arm", task, EC4_BY_SUBTASK)))
@@ -115,9 +122,11 @@ def arm_coarticulation(read: Reader) -> Finding:
 
 
 def other_arm_coarticulation(read: Reader) -> Finding:
-    """The waiting arm brings its hand nearer to its next goal."""
+    """The idle arm brings its hand nearer to its next goal."""
     arm = read.signature("other arm", TASK_1, EC4)
-    others = [read.signature("other arm", TASK_1, label) for label in (GUESSES, EC4_BY_SUBTASK)]
+    others = [
+        read.signature("other arm", TASK_1, label) for label in (RANDOM_SEARCH, EC4_BY_SUBTASK)
+    ]
     shown = [
         partial(read.signature, "other arm", TASK_1, EC4, replay=True),
         partial(read.signature, "other arm", TASK_1, EC3),
@@ -126,22 +135,28 @@ def other_arm_coarticulation(read: Reader) -> Finding:
 
 
 def slower_hands_are_chosen(read: Reader) -> Finding:
-    """Whether more runs than of guesses choose a hand that is slower for its goal alone."""
+    """Whether more runs than of random search choose a hand that is slower for its goal alone."""
     task, labels = TASK_1, (EC2, EC3)
     initial = read.initial_execution(task).hands
     chosen = {label: chosen_slower(read.cell(task, label), initial) for label in labels}
-    guesses = {
-        label: chosen_slower(read.cell(task, label), initial) > 0 for label in read.guesses(task)
+    random_search = {
+        label: chosen_slower(read.cell(task, label), initial) > 0
+        for label in read.random_search(task)
     }
-    label_guessed, guessed = max(guesses.items(), key=lambda item: item[1].mean())
+    label_of_random_search, of_random_search = max(
+        random_search.items(), key=lambda item: item[1].mean()
+    )
     tests, against, parts = [], [], []
     for label in labels:
         does = chosen[label] > 0
         count, total = int(does.sum()), len(does)
-        table = [[count, total - count], [int(guessed.sum()), int((~guessed).sum())]]
+        table = [
+            [count, total - count],
+            [int(of_random_search.sum()), int((~of_random_search).sum())],
+        ]
         p = float(stats.fisher_exact(table, alternative="greater").pvalue)
-        more = min(does.mean() - guessed.mean(), does.mean() - margins.FEW)
-        tests.append(Estimate(more, p=p, n=(total, len(guessed))))
+        more = min(does.mean() - of_random_search.mean(), does.mean() - margins.FEW)
+        tests.append(Estimate(more, p=p, n=(total, len(of_random_search))))
         against.append(share_test(count, total, margins.FEW, "less"))
         parts.append(f"{task} {who_is(label)}: {count} of {total} runs")
         if count:
@@ -151,7 +166,10 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
             rewards = np.array([run.reward for run in read.cell(task, label).runs], dtype=float)
             better = estimate(difference_of_means(rewards[does], rewards[~does]), 1)
             parts[-1] += f", which end with {better} ticks more reward than the others"
-    parts.append(f"{methods.name_of(label_guessed)}: {guessed.sum()} of {len(guessed)} runs")
+    parts.append(
+        f"{methods.name_of(label_of_random_search)}: {of_random_search.sum()} of "
+        f"{len(of_random_search)} runs"
+    )
     best = min(tests, key=lambda test: (test.value <= 0, test.p))
     test = replace(best, p=min(1.0, best.p * len(tests)))
     contrary = max(against, key=lambda test: test.p)
@@ -177,7 +195,7 @@ CLAIMS_OF_COARTICULATION = [
         place="Results, Exploration Condition 1, Figure 5",
         quote="the reward incurred after making the first movement is more negative",
         test="one-tailed bootstrap tests: the first movement takes more than 1 tick longer than in "
-        "the initial solution, it takes longer than in guesses and in the learner rewarded "
+        "the initial solution, it takes longer than in random search and in the learner rewarded "
         "by subtask, and the whole task is faster",
         judge=first_movement_sacrificed,
         short="the first movement is sacrificed",
@@ -188,9 +206,10 @@ CLAIMS_OF_COARTICULATION = [
         "against descending).",
         place="Results, Exploration Condition 1, Figure 5",
         quote="the joint configuration the robot used to hit the first goal differed",
-        test="permutation tests: postures at goal 1 lie more than 1 pooled SD apart, and further "
-        "apart than those of guesses and of the learner rewarded by subtask. For the opposite: "
-        "fewer than 5 % of bootstrap samples are, or one of the others lies further apart",
+        test="permutation tests: the standardised posture difference at goal 1 exceeds 1 pooled "
+        "SD, and the posture difference exceeds that of random search and of the learner "
+        "rewarded by subtask. For the opposite: it exceeds 1 in fewer than 5 % of bootstrap "
+        "samples, or one of the others has a larger difference",
         judge=posture_depends_on_context,
         short="the posture depends on the next goal",
     ),
@@ -209,14 +228,14 @@ CLAIMS_OF_COARTICULATION = [
     Claim(
         id="arm-coarticulation",
         text="Coarticulation shows in the chosen arm: base and arm hit a goal in a posture that "
-        "leaves the next goal nearer (both two-armed tasks, EC3 and EC4; the waiting arm is left "
+        "leaves the next goal nearer (both two-armed tasks, EC3 and EC4; the idle arm is left "
         "out).",
         place="Abstract; Discussion",
         quote="how the corresponding arm was used",
         test="one-tailed bootstrap tests: from the learned posture of base and chosen arm the "
         "corrective process reaches the next goal more than 1 tick sooner than from the posture in "
-        "which it would itself have hit the goal, and by more than in guesses "
-        "and, under EC4, in the learner rewarded by subtask. The waiting arm is where it "
+        "which it would itself have hit the goal, and by more than in random search "
+        "and, under EC4, in the learner rewarded by subtask. The idle arm is where it "
         "was before the movement. Mean over the goals of a run that others follow",
         judge=arm_coarticulation,
         fitted=True,
@@ -224,13 +243,13 @@ CLAIMS_OF_COARTICULATION = [
     ),
     Claim(
         id="other-arm-coarticulation",
-        text="Coarticulation shows in the waiting arm: under EC4 it brings its hand nearer to the "
+        text="Coarticulation shows in the idle arm: under EC4 it brings its hand nearer to the "
         "goal that it will hit next (Two-armed 1).",
         place="Method, The Learning Process; Discussion",
         quote="possibly in way so that the robot would be able to hit",
         test="one-tailed bootstrap tests that what the arm does since its own last hit brings its "
         "hand nearer (0 where it keeps still), as a share of the initial distance, and nearer than "
-        "in guesses and in the learner rewarded by subtask; mean over "
+        "in random search and in the learner rewarded by subtask; mean over "
         "the goals of a run",
         judge=other_arm_coarticulation,
         fitted=True,
@@ -255,7 +274,7 @@ CLAIMS_OF_COARTICULATION = [
         place="Method, Two-Armed Task 1; Discussion, Figure 6",
         quote="Coarticulation was seen in terms of which arm was used",
         test="one-tailed Fisher's exact tests: under one of the conditions more than 25% of the "
-        "runs, and more than of guesses, hit a goal that others follow with a hand that is "
+        "runs, and more than of random search, hit a goal that others follow with a hand that is "
         "slower for that goal alone and is not the initial solution's (smallest p times their "
         "number). For the opposite: under each condition fewer than 25% of the runs do (exact "
         "binomial tests)",

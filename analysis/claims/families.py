@@ -11,7 +11,16 @@ from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_fails
 from coartic.analysis.claims.judging import Finding, all_of, mean_beyond
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, LEARNER, LEARNERS, most_exploring
+from coartic.analysis.methods import (
+    EC1,
+    EC2,
+    EC3,
+    EC4,
+    LEARNER,
+    LEARNERS,
+    RANDOM_SEARCH,
+    most_exploring,
+)
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.topics.instances import best_of_instances
 from coartic.analysis.words import estimate
@@ -162,11 +171,15 @@ CLAIMS_ON_FAMILIES = [
         quote="the reward incurred after making the first movement is more negative",
         test="one-tailed bootstrap tests over instances, against the corrective process with the "
         "same hands: the first movement takes more than 1 tick longer, and longer than in "
-        "guesses; the whole task is faster",
+        "random search; the whole task is faster",
         judge=partial(
             in_every_family,
             OF_ONE_ARM,
-            [shows("first", by=margins.TICKS), shows("first", beyond=GUESSES), shows("whole")],
+            [
+                shows("first", by=margins.TICKS),
+                shows("first", beyond=RANDOM_SEARCH),
+                shows("whole"),
+            ],
         ),
     ),
     on_families(
@@ -177,39 +190,43 @@ CLAIMS_ON_FAMILIES = [
         place="Discussion",
         quote="Coarticulation was seen in terms of which arm was used",
         test="one-tailed bootstrap tests over instances, in each family, of the difference of the "
-        "shares of such goals, and of that to guesses",
+        "shares of such goals, and of that to random search",
         judge=partial(
-            in_every_family, OF_TWO_ARMS, [shows("hand", beyond=EC2), shows("hand", beyond=GUESSES)]
+            in_every_family,
+            OF_TWO_ARMS,
+            [shows("hand", beyond=EC2), shows("hand", beyond=RANDOM_SEARCH)],
         ),
     ),
     on_families(
         id="arm-coarticulation-in-general",
         text="In every family learned postures of base and chosen arm leave the next goal nearer "
-        "(the waiting arm is left out).",
+        "(the idle arm is left out).",
         place="Abstract; Discussion",
         quote="how the corresponding arm was used",
         test="one-tailed bootstrap tests over instances, in each family: from the learned posture "
         "of base and chosen arm the corrective process reaches the next goal more than 1 tick "
         "sooner than from the posture in which it would itself have hit the goal, and by more "
-        "ticks than in guesses. On both sides the waiting arm is "
+        "ticks than in random search. On both sides the idle arm is "
         "where it was before the movement. EC1 on one arm, EC4 on two; mean over goals",
         judge=partial(
             in_every_family,
             EVERY_FAMILY,
-            [shows("arm", by=margins.TICKS), shows("arm", beyond=GUESSES)],
+            [shows("arm", by=margins.TICKS), shows("arm", beyond=RANDOM_SEARCH)],
         ),
     ),
     on_families(
         id="other-arm-coarticulation-in-general",
-        text="In every family with two arms the waiting arm brings its hand nearer to its own next "
+        text="In every family with two arms the idle arm brings its hand nearer to its own next "
         "goal under EC4.",
         place="Method, The Learning Process; Discussion",
         quote="possibly in way so that the robot would be able to hit",
         test="one-tailed bootstrap tests over instances, in each family, that the hand of the "
-        "waiting arm gets nearer (0 where it keeps still; runs with both hands), and nearer than "
-        "in guesses",
+        "idle arm gets nearer (0 where it keeps still; runs with both hands), and nearer than "
+        "in random search",
         judge=partial(
-            in_every_family, OF_TWO_ARMS, [shows("other arm"), shows("other arm", beyond=GUESSES)]
+            in_every_family,
+            OF_TWO_ARMS,
+            [shows("other arm"), shows("other arm", beyond=RANDOM_SEARCH)],
         ),
     ),
     on_families(

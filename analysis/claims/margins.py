@@ -12,10 +12,10 @@ MOST = 0.75
 0.8 in the first version of the register. It was lowered when it turned out that even 20 of 20 runs
 could not pass it after Holm's correction (adjusted p = 0.104)."""
 SPREAD = 1.0
-"""Pooled standard deviations. Postures at a goal depend on context where their means are further
-apart than runs in one context are."""
+"""Pooled standard deviations. Postures at a goal depend on context where the difference of their
+means is larger than that of runs in one context."""
 CLOSE = 0.1
-"""A tenth, for want of a printed number, where the paper says close. The evidence gives the
+"""A tenth, for want of a published number, where the paper says close. The evidence gives the
 largest excess, so that any other margin can be put in its place."""
 HALFWAY = 0.5
 """Similar to a plan means nearer to it than halfway from the initial solution."""

@@ -43,10 +43,10 @@ CELLS_OF_TWO_ARMS = (
     *((TASK_2, label) for label in (EC3, EC4)),
 )
 """The paper's conditions on its tasks."""
-LEAST_CHANGES = "trajectory-optimisation/squared-changes"
+LEAST_DISPLACEMENT = "trajectory-optimisation/squared-displacement"
 """The plan of Jordan's smoothness cost."""
 SMOOTH_PLANS = (
-    LEAST_CHANGES,
+    LEAST_DISPLACEMENT,
     "trajectory-optimisation/acceleration",
     "trajectory-optimisation/jerk",
 )
@@ -159,19 +159,19 @@ def corrected_less_later(read: Reader, cells: Cells) -> Finding:
 def resemblance(read: Reader, task: str) -> Measurement:
     """Share of the initial solution's distance to the plan that each run has covered."""
     learned = read.cell(task, EC1).runs
-    (plan,) = read.cell(task, LEAST_CHANGES).runs
+    (plan,) = read.cell(task, LEAST_DISPLACEMENT).runs
     planned = plan.configurations
 
-    def apart(execution: Execution) -> float:
+    def distance(execution: Execution) -> float:
         """Mean distance of postures at the goals, length unit and rad mixed."""
         return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
 
-    before = apart(read.initial_execution(task))
-    shares = np.array([1 - apart(run) / before for run in learned])
+    before = distance(read.initial_execution(task))
+    shares = np.array([1 - distance(run) / before for run in learned])
     return Measurement(
         task, who_is(EC1), shares,
-        "share of the distance of the initial solution to the plan for least squared changes "
-        "that learning has covered (postures at the goals)",
+        "share of the distance of the initial solution to the plan of minimum squared joint "
+        "displacement that learning has covered (postures at the goals)",
     )  # fmt: skip
 
 
@@ -218,7 +218,8 @@ def runs_that(task: str, label: str, what: str, does: Sequence[bool], hands: lis
 
 
 def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
-    """Whether neither few nor most runs learned a sequence; the printed count speaks against it."""
+    """Whether neither few nor most runs learned a sequence; the published count speaks against
+    it."""
     learned = read.hands(task, label)
     does = [each == hands for each in learned]
     count, total = sum(does), len(does)
@@ -226,21 +227,21 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
     low, high = stats.binomtest(count, total).proportion_ci()
     cell = published_cell(task, who_is(label))
     assert cell is not None
-    printed, of_printed = cell[hands], sum(s.runs for of, s in cell.items() if of)
+    published, of_published = cell[hands], sum(s.runs for of, s in cell.items() if of)
     more = share_test(count, total, margins.FEW, "greater")
     fewer = share_test(count, total, margins.MOST, "less")
     inside = min(share - margins.FEW, margins.MOST - share)
     within = Estimate(inside, n=(total,), p=max(more.p, fewer.p))
-    table = [[count, total - count], [printed.runs, of_printed - printed.runs]]
+    table = [[count, total - count], [published.runs, of_published - published.runs]]
     unlike = Estimate(
-        share - printed.runs / of_printed,
-        n=(total, of_printed),
+        share - published.runs / of_published,
+        n=(total, of_published),
         p=float(stats.fisher_exact(table).pvalue),
     )
     return Finding(
         margins.FEW < share < margins.MOST,
         f"{runs_that(task, label, hands, does, learned)}, {low:.0%} to {high:.0%} of all (95 %); "
-        f"published {printed.runs} of {of_printed}{' (derived)' * printed.derived_runs}",
+        f"published {published.runs} of {of_published}{' (derived)' * published.derived_runs}",
         (within,),
         (unlike,),
     )
@@ -350,7 +351,7 @@ def on_either_kind(which: str, cells: Cells, best: str) -> list[Claim]:
 
 HALF = (
     "exact binomial tests that more than 25% and fewer than 75% of all runs do; for the opposite: "
-    "the share lies outside, and Fisher's exact test tells the counts from the printed ones. 20 "
+    "the share lies outside, and Fisher's exact test tells the counts from the published ones. 20 "
     "runs are too few to pass it after Holm's correction"
 )
 
@@ -358,7 +359,7 @@ CLAIMS_OF_THE_PAPER = [
     *CLAIMS_OF_COARTICULATION,
     *on_either_kind("one", CELLS_OF_ONE_ARM, best=EC1),
     Claim(
-        id="resembles-squared-changes",
+        id="resembles-squared-displacement",
         text="Learned movements are similar to movements planned for smoothness (least squared "
         "configuration changes). We judge whether the postures at the goals lie less than half as "
         "far from the plan's as those of the initial solution do.",

@@ -10,15 +10,19 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.methods import ALL_GUESSES, GUESSES, LEARNER, name_of
+from coartic.analysis.methods import LEARNER, RANDOM_SEARCH, RANDOM_SEARCHES, name_of
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.study import CellKey, Study
-from coartic.analysis.topics.guesses import guesses_on, most_guessed, signature_of
 from coartic.analysis.topics.published import (
     Summary,
     published_alone,
     published_cell,
+)
+from coartic.analysis.topics.random_search import (
+    most_of_random_search,
+    random_search_on,
+    signature_of,
 )
 from coartic.analysis.words import estimate, number
 from coartic.estimates import FEWEST, mean
@@ -36,13 +40,13 @@ class Measurement:
 
     task: str
     who: str
-    """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``guesses``."""
+    """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random-search``."""
     numbers: Array
     """Shape ``(runs,)``; ``()`` of one number, which is exact."""
     quantity: str = ""
     """The measured quantity, in words; empty for rewards."""
-    printed: str = ""
-    """The reward that the paper prints, in words; empty where it prints none."""
+    published: str = ""
+    """The reward that the paper publishes, in words; empty where it publishes none."""
 
     @property
     def name(self) -> str:
@@ -93,7 +97,7 @@ class Reader:
                 "the mean of the others would mislead"
             )
         runs = cell.good
-        if label.startswith((LEARNER, *ALL_GUESSES)):
+        if label.startswith((LEARNER, *RANDOM_SEARCHES)):
             trials = sorted(cell.runs.trials.unique())
             if trials != [TRIALS]:
                 raise MissingError(
@@ -120,7 +124,7 @@ class Reader:
         method = self.study.cells[task, label].method
         if not self.study.plan.methods[method].stochastic:
             rewards = np.array(rewards.mean())
-        return Measurement(task, who_is(label), rewards, printed=printed_reward(task, label))
+        return Measurement(task, who_is(label), rewards, published=published_reward(task, label))
 
     def replay(self, task: str, label: str) -> Measurement:
         """Rewards of noiseless replays after learning.
@@ -131,14 +135,14 @@ class Reader:
         rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         if np.isnan(rewards).any():
             raise MissingError(f"{who_is(label)} on {task} has no replay")
-        printed = printed_reward(task, label)
-        return Measurement(task, f"replay of {who_is(label)}", rewards, printed=printed)
+        published = published_reward(task, label)
+        return Measurement(task, f"replay of {who_is(label)}", rewards, published=published)
 
     def initial(self, task: str) -> Measurement:
         """Reward of a task's initial solution."""
         reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
         return Measurement(
-            task, "initial", reward, printed=in_words(published_alone(task, "initial hands"))
+            task, "initial", reward, published=in_words(published_alone(task, "initial hands"))
         )
 
     def best(self, task: str) -> Measurement:
@@ -148,32 +152,32 @@ class Reader:
             raise MissingError(
                 f"the corrective process alone completes {task} with no hand sequence"
             )
-        printed = in_words(published_alone(task, "best of all sequences"))
-        return Measurement(task, "best", np.array(np.nanmax(rewards)), printed=printed)
+        published = in_words(published_alone(task, "best of all sequences"))
+        return Measurement(task, "best", np.array(np.nanmax(rewards)), published=published)
 
     def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
         """A signature of coarticulation, of the runs that have one.
 
-        Of guesses, that of the widths and hands that show most of it on the task, or in the
+        Of random search, that of the width and hands that show most of it on the task, or in the
         family.
         """
         signature, words = SIGNATURES[name], SIGNATURES[name].words
-        for each in (label, *(self.guesses(task) if label == GUESSES else ())):
+        for each in (label, *(self.random_search(task) if label == RANDOM_SEARCH else ())):
             self.runs(task, each)
         if replay:
             values = signature.of(self.study.executed(task, label, replay=True))
             words = f"in noiseless replays, {words}"
-        elif label == GUESSES:
-            values = most_guessed(self.study, name, task)
+        elif label == RANDOM_SEARCH:
+            values = most_of_random_search(self.study, name, task)
         else:
             values = signature_of(self.study, name, task, label)
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         return Measurement(task, who_is(label), values, words)
 
-    def guesses(self, task: str) -> list[str]:
-        """Labels of the guesses that solved a task."""
-        return guesses_on(self.study, task) or [GUESSES]
+    def random_search(self, task: str) -> list[str]:
+        """Labels of the settings of random search that solved a task."""
+        return random_search_on(self.study, task) or [RANDOM_SEARCH]
 
     def initial_execution(self, task: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
@@ -197,13 +201,13 @@ def who_is(label: str) -> str:
     return label.removeprefix(LEARNER) if label.startswith(LEARNER) else name_of(label)
 
 
-def in_words(printed: Summary | None) -> str:
-    """A reward that the paper prints; empty where it prints none."""
-    return printed.in_words if printed else ""
+def in_words(published: Summary | None) -> str:
+    """A reward that the paper publishes; empty where it publishes none."""
+    return published.in_words if published else ""
 
 
-def printed_reward(task: str, label: str) -> str:
-    """Mean reward of runs as the paper has it, in words; empty where it does not print it."""
+def published_reward(task: str, label: str) -> str:
+    """Mean reward of runs as the paper has it, in words; empty where it does not publish it."""
     cell = published_cell(task, label.removeprefix(LEARNER))
     return in_words((cell or {}).get(""))
 

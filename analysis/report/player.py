@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from coartic.analysis.methods import GUESSES, LEARNERS, in_order, main_methods, name_of
+from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH, in_order, main_methods, name_of
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation import shared_goal
-from coartic.analysis.topics.guesses import every_guess_beside
 from coartic.analysis.topics.own import own_methods
+from coartic.analysis.topics.random_search import every_random_search_for
 from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS
@@ -26,12 +26,19 @@ def player(study: Study) -> str:
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
-        widths = every_guess_beside(study, shared)
-        strongest = max(widths, key=lambda each: (each.spreads >= 0, each.spreads), default=None)
+        widths = every_random_search_for(study, shared)
+        strongest = max(
+            widths,
+            key=lambda each: (
+                each.standardised_posture_difference >= 0,
+                each.standardised_posture_difference,
+            ),
+            default=None,
+        )
         (up, down), first = shared.tasks, shared.method
         both = {**preset_of(up), "label": f"{up.label} or {down.label}", "others": down.goals[1:]}
-        guesses = GUESSES if strongest is None else strongest.method
-        presets.append(both | {"runs": methods_played(study, [up.name, down.name], guesses)})
+        random_search = RANDOM_SEARCH if strongest is None else strongest.method
+        presets.append(both | {"runs": methods_played(study, [up.name, down.name], random_search)})
     alone = {
         name: preset_of(task) | {"runs": methods_played(study, [name])}
         for name, task in one_by_one(study).items()
@@ -67,17 +74,20 @@ def first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> 
     return {"who": preferred if preferred in ids[0] else ids[0][0]}
 
 
-def methods_played(study: Study, tasks: list[str], guesses: str = GUESSES) -> list[dict[str, Any]]:
+def methods_played(
+    study: Study, tasks: list[str], random_search: str = RANDOM_SEARCH
+) -> list[dict[str, Any]]:
     """Methods with solved runs on all of these tasks: their names, and of each task the movements
     of the run nearest the median reward; of several tasks also the postures of all runs at goal 1,
-    which they share. Methods that follow paths are left out: the script moves straight. Of guesses
-    it has those with the label ``guesses``, which the script puts beside the others."""
+    which they share. Methods that follow paths are left out: the script moves straight. Of random
+    search it has those with the label ``random_search``, which the script puts beside the
+    others."""
     labels = [label for name, label in study.cells if name == tasks[0]]
     ranked = {label for labels in labels_by_task(study).values() for label in labels.values()}
     shown = {*LEARNERS, *main_methods(labels), *ranked}
     runs = []
     for label in in_order([label for label in labels if label in shown]):
-        played = guesses if label == GUESSES else label
+        played = random_search if label == RANDOM_SEARCH else label
         films = [film_of(study, (name, played)) for name in tasks]
         if all(films):
             if len(tasks) > 1:

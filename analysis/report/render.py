@@ -40,14 +40,14 @@ TONES = {
 """Class of a verdict on the page, by its words."""
 IN_LATEX = {
     "own": "task, method, runs, reward, gap, nearest, nearest_gap",
-    "settings": "task, method, runs, reward, behind, p_holm",
-    "contexts": "place, method, runs, distance, dependence, p_holm, p_guesses",
+    "settings": "task, method, runs, reward, gap_ticks, p_holm",
+    "contexts": "place, method, runs, distance, standardised_difference, p_holm, p_random_search",
     "published": "task, condition, published, ours, runs, difference, verdict",
     "claims": "statement, verdict, p_holm",
     "ranking": "method, gap, on *",
-    "runtimes": "method, reached, trials_to_quarter, trials_to_half, kinematics_to_half",
+    "runtimes": "method, reached, trials_to_quarter, trials_to_half, forward_kinematics_to_half",
     "hands": "task, condition, hands, published, ours, runs, difference",
-    "learning": "task, method, runs, after_*, half_gain",
+    "learning": "task, method, runs, after_*, trials_to_half_gain",
     "signatures": "task, method, runs, first, total, as_in_isolation, preshaping",
     "family-gaps": "method, gap, in *",
     "tasks": "task, arms, base, initial, optimum, bound",

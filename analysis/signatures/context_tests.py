@@ -29,7 +29,7 @@ def distance_of_means(first: Array, second: Array) -> float:
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
 
 
-def context_dependence(first: Array, second: Array) -> float:
+def standardised_posture_difference(first: Array, second: Array) -> float:
     """:func:`distance_of_means` in pooled within-context standard deviations, 0 to ∞.
 
     The deviation is the root of the total variance (its trace) about each context's own
@@ -45,7 +45,7 @@ def context_dependence(first: Array, second: Array) -> float:
     return distance_of_means(first, second) / spread if spread else math.nan
 
 
-def dependence_below(
+def posture_difference_below(
     first: Array,
     second: Array,
     bound: float,
@@ -53,12 +53,12 @@ def dependence_below(
     *,
     resamples: int = RESAMPLES,
 ) -> float:
-    """Probability of so little context dependence if it were ``bound`` (pooled SDs) or more.
+    """Probability of so small a standardised posture difference if it were ``bound`` or more.
 
     The share of bootstrap samples, whole runs drawn within each context, whose
-    :func:`context_dependence` is at least the bound, the observed one counted. Noise adds to a
-    distance and never takes from it, so that the share is rather too large. NaN where a context
-    has one run.
+    :func:`standardised_posture_difference` is at least the bound, the observed one counted. Noise
+    adds to a distance and never takes from it, so that the share is rather too large. NaN where a
+    context has one run.
     """
     if min(len(first), len(second)) < 2:
         return math.nan
@@ -125,10 +125,11 @@ def beyond_p(
     contrast: Sequence[float] | Array = (1.0, -1.0),
     resamples: int = RESAMPLES,
 ) -> float:
-    """Test whether a method's contexts lie further apart than another's, by permutation.
+    """Test whether a method's posture difference between contexts exceeds another's, by
+    permutation.
 
-    How far contexts lie apart is the length of the sum of their mean configurations, each times its
-    number in ``contrast``: their distance for two, the slope for several positions. Within each
+    The difference is the length of the sum of mean configurations, each times its number in
+    ``contrast``: their distance for two contexts, the slope for several positions. Within each
     context the runs of both are divided anew at random, and the statistic is the method's length
     less the other's.
 

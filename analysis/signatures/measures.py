@@ -60,10 +60,10 @@ def gain_at_next(runs: Solutions) -> Array:
     goals = 1 + np.arange(len(task.goals))
     now, following = np.s_[:, :-1], np.s_[:, 1:]
     alone, there = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
-    waiting = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
+    idle = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
     for number, hand in enumerate(HANDS):
-        waiting[number, task.robot.joints(other(hand))] = True
-    hit = np.where(waiting[hands[now]], there, runs.configurations[now])
+        idle[number, task.robot.joints(other(hand))] = True
+    hit = np.where(idle[hands[now]], there, runs.configurations[now])
     after, nearer = (
         isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
     )
@@ -107,11 +107,11 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
         joints = task.robot.joints(other(hand))
         row[joints] = own_last[other(hand)][joints]
     nearer = np.full(len(task.goals), np.nan)
-    for k, waiting in enumerate(map(other, hands)):
-        if waiting in hands[k:]:
-            goal = task.goals[hands.index(waiting, k)]
+    for k, idle in enumerate(map(other, hands)):
+        if idle in hands[k:]:
+            goal = task.goals[hands.index(idle, k)]
             reached, kept, initially = (
-                np.linalg.norm(task.robot.forward_kinematics(q[k], waiting) - goal)
+                np.linalg.norm(task.robot.forward_kinematics(q[k], idle) - goal)
                 for q in (now, held, initial.configurations)
             )
             if initially > 0:
@@ -185,11 +185,11 @@ SIGNATURES = {
     "arm": Signature(
         arm,
         "ticks by which the posture of base and chosen arm leaves the next goal nearer, with the "
-        "waiting arm where it was (mean over goals)",
+        "idle arm where it was (mean over goals)",
     ),
     "other arm": Signature(
         other_arm,
-        "share of the initial distance to its next goal by which the waiting arm brings its hand "
+        "share of the initial distance to its next goal by which the idle arm brings its hand "
         "nearer (mean over goals)",
     ),
     "first": Signature(
@@ -199,7 +199,7 @@ SIGNATURES = {
     ),
     "whole": Signature(
         lambda runs: -runs.against_same_hands.sum(axis=1),
-        "ticks by which the whole is shorter than the corrective process's",
+        "ticks by which the whole task is shorter than the corrective process's",
     ),
 }
 """Every signature by its name in claims, in the order of the tables: ``first`` is t(i, 1) -

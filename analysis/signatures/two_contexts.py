@@ -19,9 +19,9 @@ from scipy import linalg
 from coartic import Hand, Task
 from coartic.analysis.signatures.context_tests import (
     beyond_p,
-    context_dependence,
     distance_of_means,
     permutation_p,
+    standardised_posture_difference,
 )
 from coartic.analysis.solutions import Solutions
 from coartic.estimates import SEED
@@ -122,14 +122,15 @@ class TwoContexts:
         return sum(map(len, self.configurations))
 
     @property
-    def apart(self) -> float:
-        """Distance of the mean postures, length unit and rad."""
+    def posture_difference(self) -> float:
+        """Posture difference between contexts: distance of the mean postures, length unit and
+        rad."""
         return distance_of_means(*self.configurations)
 
     @property
-    def spreads(self) -> float:
-        """Distance of the mean postures in pooled SDs of the runs; NaN without a spread."""
-        return context_dependence(*self.configurations)
+    def standardised_posture_difference(self) -> float:
+        """Posture difference in pooled SDs of the runs; NaN where no runs differ."""
+        return standardised_posture_difference(*self.configurations)
 
     @cached_property
     def parts(self) -> tuple[float, float]:
@@ -146,7 +147,7 @@ class TwoContexts:
         return permutation_p(*self.configurations, self._rng("context dependence"))
 
     def p_beyond(self, other: TwoContexts) -> float:
-        """P-value of the test that these runs lie further apart than others; NaN where a
+        """P-value of the test that the posture difference exceeds that of others; NaN where a
         context has one run."""
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 

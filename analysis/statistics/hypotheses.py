@@ -168,12 +168,13 @@ def equivalence(estimate: Estimate, margin: float) -> Equivalence:
     return "undecided"
 
 
-def difference_to_printed(
+def difference_to_published(
     ours: ArrayLike, published: float, sd: float | None, runs: int
 ) -> Estimate:
-    """Our mean less the published mean, with Welch's interval by the printed SD and number of runs.
+    """Our mean less the published mean, with Welch's interval by the published SD and number of
+    runs.
 
-    Where no SD is printed (None) the published mean is taken as exact, and the interval is
+    Where no SD is published (None) the published mean is taken as exact, and the interval is
     Student's. No interval for a single run; a point where no sample has any spread.
     """
     values = vector(ours)

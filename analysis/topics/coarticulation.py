@@ -15,8 +15,8 @@ from matplotlib.patheffects import withStroke
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import (
-    GUESSES,
     LEARNERS,
+    RANDOM_SEARCH,
     in_order,
     is_built_in,
     is_learner,
@@ -32,10 +32,10 @@ from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.guesses import (
+from coartic.analysis.topics.random_search import (
     context_beyond_p,
-    every_guess_beside,
-    guesses_beside,
+    every_random_search_for,
+    random_search_for,
     selects,
 )
 from coartic.analysis.topics.scores import failed_runs
@@ -46,7 +46,7 @@ from coartic.robot import HANDS, Array
 from coartic.text import counted
 
 SAME = 1e-9
-"""Postures, length units and rad, that lie no further apart are the same: it is rounding."""
+"""Postures with no larger difference, length units and rad, are the same: it is rounding."""
 
 
 def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
@@ -76,22 +76,30 @@ def shared_goal(study: Study) -> TwoContexts | None:
     return next((contexts for label in order for contexts in shared_goals(study, label)), None)
 
 
-@table("method, place, runs, distance, dependence, p_holm, p_guesses, equivalent, other")
+@table(
+    "method, place, runs, distance, standardised_difference, p_holm, p_random_search, equivalent, "
+    "other"
+)
 def list_contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors; p is corrected by method (Holm)."""
     for label in dict.fromkeys(label for _, label in study.cells):
         every = list(shared_goals(study, label))
-        p = holm([math.nan if math.isnan(shared.spreads) else shared.p for shared in every])
+        p = holm(
+            [
+                math.nan if math.isnan(shared.standardised_posture_difference) else shared.p
+                for shared in every
+            ]
+        )
         for shared, adjusted in zip(every, p, strict=True):
             first, second = shared.tasks
             row: Row = {
                 "method": label,
                 "place": f"goal {shared.goal} of {first.label} and {second.label}",
                 "runs": shared.n,
-                "distance": shared.apart,
-                "dependence": shared.spreads,
+                "distance": shared.posture_difference,
+                "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
-                "p_guesses": context_beyond_p(study, shared),
+                "p_random_search": context_beyond_p(study, shared),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **runs_of(*(study.cells[task.name, label] for task in shared.tasks)),
@@ -184,8 +192,8 @@ def draw_postures(study: Study) -> Parts | None:
     hands = [robot.forward_kinematics(q, shared.hand) for q in means]
     alt = (
         f"Two postures of one arm at goal {shared.goal}, which {first} and {second} share "
-        f"({name_of(shared.method)}): {shared.apart:.2f} apart in joint space, while the hand is "
-        f"at almost the same place ({np.linalg.norm(hands[0] - hands[1]):.2f} apart)."
+        f"({name_of(shared.method)}): the posture difference is {shared.posture_difference:.2f}, "
+        f"while the distance of the hands is {np.linalg.norm(hands[0] - hands[1]):.2f}."
     )
     return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
 
@@ -199,54 +207,64 @@ def next_goal(study: Study) -> str:
     shared = shared_goal(study)
     if shared is None or not is_subject(shared.method):
         return ""
-    # A method whose runs differ by chance takes a test, and one that selects needs guesses.
+    # A method whose runs differ by chance takes a test, and one that selects needs random search.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
     drawn = study.plan.methods[cells[0].method].stochastic
-    needed, guesses = selects(study, shared.method), guesses_beside(study, shared)
-    beyond = shared.p_beyond(guesses) if needed and guesses is not None else math.nan
+    needed, random_search = selects(study, shared.method), random_search_for(study, shared)
+    beyond = shared.p_beyond(random_search) if needed and random_search is not None else math.nan
     who = "The learner" if is_learner(shared.method) else name_of(shared.method)
     runs, p = counted(shared.n, "run"), p_value(shared.p)
-    in_sd = not math.isnan(shared.spreads)
+    in_sd = not math.isnan(shared.standardised_posture_difference)
 
     def distance(contexts: TwoContexts) -> float:
-        return contexts.spreads if in_sd else contexts.apart
+        return contexts.standardised_posture_difference if in_sd else contexts.posture_difference
 
     digits, unit = (1, "SD") if in_sd else (2, "length units and rad")
-    apart = f"{number(distance(shared), digits)} {unit} apart"
-    by_chance = [distance(each) for each in every_guess_beside(study, shared)]
+    posture_difference = f"{number(distance(shared), digits)} {unit}"
+    by_chance = [distance(each) for each in every_random_search_for(study, shared)]
     by_chance = [each for each in by_chance if not math.isnan(each)]
     beside = f"random search: {number(max(by_chance), digits)}" if by_chance else ""
-    apart_beside = f"{apart} ({beside})" if beside else apart
+    difference_beside = f"{posture_difference} ({beside})" if beside else posture_difference
     if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):
         text = "Too few runs to tell whether the next goal changes the posture."
-    elif not drawn and shared.apart <= SAME:
+    elif not drawn and shared.posture_difference <= SAME:
         text = f"No. {who} hits the same goal in the same posture."
     elif drawn and not shared.p < LEVEL:
-        text = (
-            f"No significant difference: postures before different next goals lie {apart_beside}."
-        )
+        text = f"No significant difference: between next goals it is {difference_beside}."
     elif not needed or beyond < LEVEL:
         different = "clearly different" if drawn else "different"
         text = (
             f"Yes. {who} hits the same goal in {different} postures "
-            f"({'; '.join(filter(None, (apart, beside)))})."
+            f"(difference {'; '.join(filter(None, (posture_difference, beside)))})."
         )
-    elif guesses is None:
-        text = f"Undecided: postures lie {apart}, and no guesses with as many trials ran."
+    elif random_search is None:
+        text = (
+            f"Undecided: the posture difference is {posture_difference}, and no random search "
+            "with as many trials ran."
+        )
     elif math.isnan(beyond):
-        text = f"Undecided: postures lie {apart}, and too few guesses ran to compare."
+        text = (
+            f"Undecided: the posture difference is {posture_difference}, and too few runs of "
+            "random search to compare."
+        )
     else:
-        text = f"Not shown: postures lie {apart_beside}, which is not significantly more."
+        text = (
+            f"Not shown: the posture difference is {difference_beside}, which is not "
+            "significantly more."
+        )
     text += (
-        f"\nDepending on the next goal, postures of {name_of(shared.method)} at goal {shared.goal} "
-        f"lie {number(shared.apart, 2)} apart (length units and rad; "
+        f"\nBetween next goals, the posture difference of {name_of(shared.method)} at goal "
+        f"{shared.goal} is {number(shared.posture_difference, 2)} (length units and rad; "
         f"{', '.join(filter(None, (runs, p)))})"
     )
-    if guesses is not None:
-        text += f", those of {name_of(guesses.method)} {number(guesses.apart, 2)}"
+    if random_search is not None:
+        text += (
+            f", that of {name_of(random_search.method)} "
+            f"{number(random_search.posture_difference, 2)}"
+        )
         text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
     elif needed:
-        text += f". Run method {GUESSES} as well to tell"
+        text += f". Run method {RANDOM_SEARCH} as well to tell"
     return f"{text}.{failed_runs(cells, ' and are not counted')}"
 
 

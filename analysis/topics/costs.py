@@ -27,11 +27,11 @@ from coartic.robot import Array
 SPENDS = ("trials", "forward_kinematics", "solve_s")
 """Kinds of cost: columns of ``runs``; ``solve_s`` is wall time in s."""
 TARGETS = tuple(n / 20 for n in range(1, 21))
-"""Targets, as shares of the way from the initial solution to the optimum."""
+"""Targets, as shares of the distance from the initial solution to the optimum."""
 COSTS = (
     ("trials_to_quarter", "trials", 0.25),
     ("trials_to_half", "trials", 0.5),
-    ("kinematics_to_half", "forward_kinematics", 0.5),
+    ("forward_kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
 """Columns of :func:`runtimes`: kind of cost, and share of the targets."""
@@ -70,7 +70,7 @@ def times_of(
 ) -> Array:
     """Cost at which each run of a cell reached each target, shape ``(runs, targets)``.
 
-    Infinite where it did not. A planner reaches all of its targets at the end. Kinematics
+    Infinite where it did not. A planner reaches all of its targets at the end. Forward-kinematics
     evaluations and time are known as totals of the run and spread evenly over its trials, which is
     not exact: over the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times their
     even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. A run whose spend is not known,
@@ -123,7 +123,7 @@ def runtimes(
     results : str, Path or Study
         A results folder, or a study of one.
     targets : sequence of float, shape (n,), optional
-        As shares of the way from the initial solution to the optimum, above 0 and up to 1; by
+        As shares of the distance from the initial solution to the optimum, above 0 and up to 1; by
         default 0.05, 0.1, ..., 1. Rewards are whole, so a target is the next whole tick.
 
     Returns
@@ -159,7 +159,7 @@ def runtimes(
 
 
 @table(
-    "method, reached, tasks, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
+    "method, reached, tasks, trials_to_quarter[], trials_to_half[], forward_kinematics_to_half[], "
     "seconds_to_half[], half on *",
 )
 def list_runtimes(study: Study) -> Rows:
@@ -190,10 +190,12 @@ def list_runtimes(study: Study) -> Rows:
     "are lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
-    """Share of targets reached, against trials and kinematics."""
+    """Share of targets reached (runtime ECDF), against trials and forward-kinematics
+    evaluations."""
     tabled = list_runtimes(study)
     curves = list(tabled.index)
-    if not compares_settings(study):  # methods that learn, guesses, the best planner, from files
+    # methods that learn, random search, the best planner, from files
+    if not compares_settings(study):
         alone = methods.INITIAL, methods.BEST_HANDS
         kept = [each for each in methods.main_methods(curves) if each not in alone]
         plan = [each for each in kept if scores.groups(study)[each] != scores.BY_TRIAL]

@@ -23,11 +23,11 @@ BUDGETS = (100, 1_000, 10_000)
 """Trials after which the table reads rewards."""
 WINDOW = 100
 """Trials over which a learning curve averages the reward of trials."""
-CURVES = (*methods.LEARNERS, "random-search/climbing", "cma-es/bandit")
+CURVES = (*methods.LEARNERS, "hill-climbing", "cma-es/bandit")
 """Built-in methods whose learning curves are drawn; of others they all are."""
 
 
-@table("task, method, runs, initial, after_100, after_1000, after_10000, half_gain[]")
+@table("task, method, runs, initial, after_100, after_1000, after_10000, trials_to_half_gain[]")
 def list_learning(study: Study) -> Rows:
     """Best reward after so many trials (mean over runs), and the trial at which half of what a run
     gains on the initial solution is there (median and quartiles of the runs; ∞ without gain)."""
@@ -56,7 +56,13 @@ def list_learning(study: Study) -> Rows:
         ]
         halves = [trials[0] if len(trials) else math.inf for trials in gained]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
-        row |= dict(zip(("half_gain", "half_gain_low", "half_gain_high"), quartiles, strict=True))
+        row |= dict(
+            zip(
+                ("trials_to_half_gain", "trials_to_half_gain_low", "trials_to_half_gain_high"),
+                quartiles,
+                strict=True,
+            )
+        )
         yield f"{task} {label}", row | runs_of(cell)
 
 
@@ -163,7 +169,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
 
 def how_fast(study: Study) -> str:
     """When half of the gain of the learner that explores most is there, by task."""
-    half = list_learning(study).half_gain
+    half = list_learning(study).trials_to_half_gain
     after = [
         f"{number(float(f'{half[row]:.2g}'))} trials on {marked(task)}"
         for name, task in study.tasks.items()

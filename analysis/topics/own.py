@@ -106,7 +106,7 @@ def card(study: Study, method: str) -> str:
 
 def details(study: Study, method: str) -> str:
     """Return the gap of a method from a file with its interval, and of others on the same tasks,
-    its trials where the learner made others, tests, and who says what it is told."""
+    its trials where the learner made others, tests, and who declares its information."""
     row, tests = standing(study, method), beside_learner(study, method)
     tasks, is_partial = scores.solved_tasks(study, method), bool(scores.coverage(study, method))
     gap = f"Gap of {name_in(study, method)} to the {scores.reference(study, tasks)}"
@@ -129,7 +129,7 @@ def details(study: Study, method: str) -> str:
             f"It is significantly better than the learner on {counted(int(row['better']), 'task')}"
         )
         sentences.append(f"{text} and worse on {row['worse']:.0f}")
-    sentences.append("What it is told is as its author declares")
+    sentences.append("Its information is as its author declares")
     return ". ".join(filter(None, sentences)) + "."
 
 

@@ -1,4 +1,4 @@
-"""Rewards that Shah, Barto & Fagg (2013) print, by task and condition (``published.toml``)."""
+"""Rewards that Shah, Barto & Fagg (2013) publish, by task and condition (``published.toml``)."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ RUNS: int = ENTRIES["general.runs"]["value"]
 
 
 class Summary(NamedTuple):
-    """A printed reward, or the mean of several, with what is printed about its spread."""
+    """A published reward, or the mean of several, with what is published about its spread."""
 
     mean: float
     sd: float | None = None
     runs: int = RUNS
-    """Number of runs that is printed, or the paper's general 20."""
-    printed_runs: int | None = None
+    """Number of runs that is published, or the paper's general 20."""
+    published_runs: int | None = None
     """Runs with the hand sequence, where their number stands beside the mean."""
     derived: bool = False
-    """Computed from other printed numbers rather than printed itself."""
+    """Computed from other published numbers rather than published itself."""
     derived_runs: bool = False
     """Whether the number of runs is computed from another."""
 
@@ -47,7 +47,7 @@ class Summary(NamedTuple):
 
 def published_alone(task: str, kind: str) -> Summary | None:
     """Reward of the corrective process alone with the ``initial hands`` of a task or the ``best of
-    all sequences``; None where the paper prints none."""
+    all sequences``; None where the paper publishes none."""
     of_task = [entry for entry in ENTRIES.values() if entry["task"] == task]
     hands = next((entry["hands"] for entry in of_task if entry["kind"] == kind), None)
     for entry in of_task:
@@ -57,8 +57,8 @@ def published_alone(task: str, kind: str) -> Summary | None:
 
 
 def published_cell(task: str, condition: str) -> dict[str, Summary] | None:
-    """Printed rewards of a cell by hand sequence, where the paper tells them apart, and of all runs
-    under ``""``; None for a cell that the paper does not have."""
+    """Published rewards of a cell by hand sequence, where the paper tells them apart, and of all
+    runs under ``""``; None for a cell that the paper does not have."""
     entries: dict[tuple[str, str], dict[str, Any]] = {
         (entry["kind"], entry.get("hands", "")): entry
         for entry in ENTRIES.values()

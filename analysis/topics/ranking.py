@@ -45,13 +45,15 @@ LONGEST = 36
 def gaps_on(study: Study, tasks: tuple[str, ...]) -> pd.DataFrame:
     """Mean gap over some tasks of each method that solved every run on all of them, nearest first.
 
-    Columns as of :func:`coartic.analysis.ranking`, ``method``, ``knows`` (its group) and
+    Columns as of :func:`coartic.analysis.ranking`, ``method``, ``information`` (its group) and
     ``algorithm``.
     """
     frame = scores.scores(study)
     frame = frame[frame.task.isin(tasks)]
     if not len(frame):
-        return pd.DataFrame(columns=["method", "knows", "gap", "gap_low", "gap_high", "tasks"])
+        return pd.DataFrame(
+            columns=["method", "information", "gap", "gap_low", "gap_high", "tasks"]
+        )
     rows = frames.ranking(frame)
     rows = rows[rows.gap.notna() & (rows.failed == 0)].reset_index()
     compared = scores.compared(study)
@@ -60,7 +62,7 @@ def gaps_on(study: Study, tasks: tuple[str, ...]) -> pd.DataFrame:
     together = rows.method.str.startswith(methods.TOGETHER)
     rows = rows[~together | np.array([len(labels) > 1 for labels in forms], dtype=bool)]
     return rows.assign(
-        knows=rows.method.map(scores.groups(study)),
+        information=rows.method.map(scores.groups(study)),
         algorithm=list(map(methods.algorithm_of, rows.method)),
     )
 
@@ -118,7 +120,7 @@ def list_against_learner(study: Study) -> Rows:
             yield f"{cell.task} {label}", row | runs_of(cell, learner)
 
 
-@table("method, gap[], tasks, knows, better, worse, on *, runs")
+@table("method, gap[], tasks, information, better, worse, on *, runs")
 def list_ranking(study: Study) -> Rows:
     """Gap over all tasks and on each, methods from files first.
 
@@ -139,13 +141,13 @@ def list_ranking(study: Study) -> Rows:
     names = dict.fromkeys([*over.index, *(method for *_, method in others)])
     for method in sorted(names, key=methods.is_built_in):
         cells = scores.compared(study)[method]
-        row: Row = {"method": method, "knows": scores.groups(study)[method], "gap": math.nan}
+        row: Row = {"method": method, "information": scores.groups(study)[method], "gap": math.nan}
         for t in single:
             row[f"on {t}"] = scores.cell_gap(study, cells[t]) if t in cells else math.nan
         if method in over.index:
             row |= over.loc[method, ["gap", "gap_low", "gap_high", "tasks"]].to_dict()
         tests = tested[tested.index.isin([f"{task} {cell.label}" for task, cell in cells.items()])]
-        # With Holm's correction over its tasks: could any of its tests have told them apart?
+        # With Holm's correction over its tasks: could any of its tests have distinguished them?
         if tests.least_p.count() * tests.least_p.min() < LEVEL:
             sure = tests[tests.p_holm < LEVEL]
             row |= {"better": sum(sure.reward > sure.learner)}
@@ -161,7 +163,7 @@ def leaders(study: Study, group: str, rows: pd.DataFrame | None = None) -> pd.Da
     The learner is there by the form that explores most.
     """
     rows = main_gaps(study) if rows is None else rows
-    rows = rows[rows.knows == group]
+    rows = rows[rows.information == group]
     learners = rows.method.map(methods.is_learner).astype(bool)
     most = learners & rows.method.str.contains("EC4")
     best = rows[~learners | (most if most.any() else learners)]
@@ -248,7 +250,7 @@ def draw_ranking(study: Study) -> Parts | None:
     if not len(rows):
         return None
     percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
-    looks, line, of_groups = looks_in(study, rows.method), 0.0, percent.groupby("knows")
+    looks, line, of_groups = looks_in(study, rows.method), 0.0, percent.groupby("information")
     size = style.ONE, 0.45 + 0.155 * (len(rows) + 1.4 * of_groups.ngroups)
     drawing, (axes,) = style.panels((1, 1), size)
     gaps = percent[["gap", "gap_low", "gap_high"]]
@@ -315,7 +317,7 @@ def nearest(study: Study) -> str:
 
     def declared(method: str) -> str:
         built_in = methods.is_built_in(method)
-        return "" if built_in else "; what it is told is as its author declares"
+        return "" if built_in else "; its information is as its author declares"
 
     def named(method: str) -> str:
         by_name = by_settings or not methods.is_learner(method)
@@ -351,16 +353,18 @@ def nearest(study: Study) -> str:
     for place in behind:
         text += f" Gap of the learner: {gap(learn.iloc[place])}."
     learners = learn.gap[[named(method) == "the learner" for method in learn.method]]
-    for guessed in by_trial.gap[by_trial.method == methods.GUESSES] if len(learn) else ():
-        text += f" Gap of guesses: {number(100 * guessed, 1)} %"
+    for of_random_search in (
+        by_trial.gap[by_trial.method == methods.RANDOM_SEARCH] if len(learn) else ()
+    ):
+        text += f" Gap of random search: {number(100 * of_random_search, 1)} %"
         for learned in learners:
-            size = "larger than" if learned < guessed - NEGLIGIBLE else "smaller than"
-            size = "the same as" if abs(learned - guessed) <= NEGLIGIBLE else size
+            size = "larger than" if learned < of_random_search - NEGLIGIBLE else "smaller than"
+            size = "the same as" if abs(learned - of_random_search) <= NEGLIGIBLE else size
             text += f", {size} the learner's"
         text += "."
     if len(learn) and len(by_formula):
         best = by_formula.iloc[0]
-        text += f" The best planner that knows the reward as a formula has a gap of {gap(best)}"
+        text += f" The best planner that uses the reward as a formula has a gap of {gap(best)}"
         text += f"{declared(best.method)}."
     cells = (cell for by_task in scores.compared(study).values() for cell in by_task.values())
     failed = scores.failed_runs(cells, ", which bars a method from the ranking")

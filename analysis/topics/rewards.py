@@ -1,4 +1,4 @@
-"""Learned rewards and hands beside those that the paper prints."""
+"""Learned rewards and hands beside those that the paper publishes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import LEARNER, LEARNERS, name_of
-from coartic.analysis.statistics.hypotheses import MARGIN, difference_to_printed, equivalence
+from coartic.analysis.statistics.hypotheses import MARGIN, difference_to_published, equivalence
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.topics.published import RUNS, published_alone, published_cell
@@ -32,9 +32,9 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
     """Every cell that the paper has too, in the order of the plan, and its hand sequences.
 
     Sequences follow their cell where the paper or our runs tell several apart: those that the paper
-    prints come first, then ours by their number of runs. A row has ``cell``, ``hands`` (empty for
-    the whole cell), ``published`` and its ``published_sd``, ``published_runs`` (of hands 0 only
-    where all others are printed), ``pooled`` (whether the printed mean is one over several hand
+    publishes come first, then ours by their number of runs. A row has ``cell``, ``hands`` (empty
+    for the whole cell), ``published`` and its ``published_sd``, ``published_runs`` (of hands 0 only
+    where all others are published), ``pooled`` (whether the published mean is one over several hand
     sequences), ``several`` (whether the paper has them) and the ``margin`` of equivalence,
     ``ours``, ``ours_sd`` and ``runs`` of our runs with a solution, ``of_runs`` of the cell. Where
     both are there, it has ``difference[]``, ours less published, and a ``verdict`` if our runs have
@@ -43,15 +43,15 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
     rows = []
     for cell in study.cells.values():
         own, condition = cell.label in LEARNERS, cell.label.removeprefix(LEARNER)
-        printed, hands = published_cell(cell.task, condition) if own else None, cell.good.hands
-        if printed is None:
+        published, hands = published_cell(cell.task, condition) if own else None, cell.good.hands
+        if published is None:
             continue
-        complete = sum(each.printed_runs or 0 for of, each in printed.items() if of) == RUNS
-        several = len(printed) > 1 or len(set(hands)) > 1
+        complete = sum(each.published_runs or 0 for of, each in published.items() if of) == RUNS
+        several = len(published) > 1 or len(set(hands)) > 1
         ours = map(str, hands.value_counts().index) if several else ()
-        for name in dict.fromkeys(["", *printed, *ours]):
+        for name in dict.fromkeys(["", *published, *ours]):
             rewards = cell.rewards[(hands == name).to_numpy(bool)] if name else cell.rewards
-            summary = printed.get(name)
+            summary = published.get(name)
             row: dict[str, Any] = {
                 "cell": cell,
                 "task": marked(study.tasks[cell.task]),
@@ -59,9 +59,9 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
                 "hands": name,
                 "published": summary.mean if summary else None,
                 "published_sd": summary.sd if summary else None,
-                "published_runs": summary.printed_runs if summary else 0 if complete else None,
+                "published_runs": summary.published_runs if summary else 0 if complete else None,
                 "pooled": summary.derived if summary else False,
-                "several": len(printed) > 2,  # with that of the whole cell
+                "several": len(published) > 2,  # with that of the whole cell
                 "margin": MARGIN * abs(summary.mean) if summary else None,
                 "ours": rewards.mean() if len(rewards) else math.nan,
                 "ours_sd": standard_deviation(rewards),
@@ -70,10 +70,12 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
                 "verdict": None,
             }
             if summary and len(rewards):
-                apart = difference_to_printed(rewards, summary.mean, summary.sd, summary.runs)
-                row |= apart.columns("difference")
+                difference = difference_to_published(
+                    rewards, summary.mean, summary.sd, summary.runs
+                )
+                row |= difference.columns("difference")
                 if (cell.good.trials == TRIALS).all():
-                    row["verdict"] = equivalence(apart, row["margin"])
+                    row["verdict"] = equivalence(difference, row["margin"])
             rows.append(row)
     return rows
 
@@ -87,9 +89,9 @@ def list_published(study: Study) -> Rows:
     for row in beside_paper(study):
         cell = row["cell"]
         if not row["hands"]:
-            printed = published_alone(cell.task, "initial hands")
+            published = published_alone(cell.task, "initial hands")
             initial = {
-                "published_initial": printed and printed.mean,
+                "published_initial": published and published.mean,
                 "ours_initial": cell.good.initial_reward.dropna().mean(),
             }
             yield f"{cell.task} {row['condition']}", row | initial | runs_of(cell)
@@ -113,10 +115,10 @@ def list_hands(study: Study) -> Rows:
     "interval lies within the margin (equivalent). Open squares: it crosses the margin "
     "(undecided). Diamonds: it lies outside (different). ↳: runs with one hand sequence; in "
     "brackets, how many of our runs have it, then how many of the published ones. * pooled from "
-    "several printed sequences.",
+    "several published sequences.",
 )
 def draw_published(study: Study) -> Parts | None:
-    """Difference of every mean reward to the printed one, with interval and margin."""
+    """Difference of every mean reward to the published one, with interval and margin."""
     shown = []
     for pair in beside_paper(study):
         cell = pair["cell"]
@@ -132,11 +134,13 @@ def draw_published(study: Study) -> Parts | None:
     tasks = {name: task for name, task in study.tasks.items() if (data.task == name).any()}
     names, words = [], []
     for place, row in enumerate(data.to_dict("records")):
-        printed, margin, y = row["published_runs"], row["margin"], -place
+        published, margin, y = row["published_runs"], row["margin"], -place
         name = f"{marked(tasks[row['task']])}, {name_of(row['method'])}{'*' * row['pooled']}"
         if row["hands"]:
-            of_printed = "" if printed is None or math.isnan(printed) else f"; {printed:.0f}"
-            name = f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{of_printed})"
+            of_published = (
+                "" if published is None or math.isnan(published) else f"; {published:.0f}"
+            )
+            name = f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{of_published})"
         names.append(name)
         axes.barh(y, 2 * margin, 0.8, left=-margin, color=style.GREY, alpha=0.2)
         if not row["runs"]:
@@ -161,15 +165,15 @@ def draw_published(study: Study) -> Parts | None:
 
 
 def rewards_reproduced(study: Study) -> str:
-    """Number of printed rewards that agree with ours, and undecided ones that are off."""
+    """Number of published rewards that agree with ours, and undecided ones that are off."""
     rows = [row for row in beside_paper(study) if not row["hands"] and row["verdict"]]
     if not rows:
         return ""
     verdicts = [row["verdict"] for row in rows]
     agree, undecided, differ = map(verdicts.count, ("equivalent", "undecided", "different"))
     text = (
-        f"Of the {len(rows)} learned rewards that the paper prints, ours agree with {agree} within "
-        f"1 %; {differ or 'none'} {'differ' if differ > 1 else 'differs'} by more, "
+        f"Of the {len(rows)} learned rewards that the paper publishes, ours agree with {agree} "
+        f"within 1 %; {differ or 'none'} {'differ' if differ > 1 else 'differs'} by more, "
         f"{undecided or 'none'} {'are' if undecided > 1 else 'is'} undecided.\n"
     )
     for row in rows:
@@ -177,7 +181,7 @@ def rewards_reproduced(study: Study) -> str:
         if row["verdict"] == "undecided" and sure:
             text += (
                 f"{row['condition']} on {row['task']} is "
-                f"{interval(row, 'difference')} ticks from the printed mean: its interval "
+                f"{interval(row, 'difference')} ticks from the published mean: its interval "
                 "leaves out 0, not corrected for the number of rewards. "
             )
     return text

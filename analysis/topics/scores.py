@@ -153,16 +153,18 @@ def is_compared(study: Study, label: str) -> bool:
 def groups(study: Study) -> dict[str, str]:
     """Which of :data:`GROUPS` each method belongs to.
 
-    A method that makes a single trial on every task makes no use of the reward that it is told. The
-    learner's conditions together are told what each of them is.
+    A method that makes a single trial on every task makes no use of the reward of a trial. The
+    learner's conditions together have the information of each.
     """
     of_label = {}
     for label in dict.fromkeys(label for _, label in study.cells):
         parts = [cell.runs for (_, name), cell in study.cells.items() if name == label]
-        told = ", ".join(each for runs in parts for each in runs.told.unique()).split(", ")
+        information = ", ".join(each for runs in parts for each in runs.information.unique()).split(
+            ", "
+        )
         several = any((runs.trials > 1).any() for runs in parts)
-        learns = Information.REWARD_BY_TRIAL.value in told and several
-        by_formula = Information.REWARD_FORMULA.value in told
+        learns = Information.REWARD_BY_TRIAL.value in information and several
+        by_formula = Information.REWARD_FORMULA.value in information
         of_label[label] = BY_FORMULA if by_formula else BY_TRIAL if learns else WITHOUT_REWARD
     together = {name: EC1 for name in labels_by_task(study) if name not in of_label}
     return of_label | {name: of_label[label] for name, label in together.items()}

@@ -19,12 +19,12 @@ MOST_TASKS = 4
 """Tasks on which a sentence names the best setting."""
 
 
-@table("task, method, runs, solved, reward[], behind, p_holm, least_p")
+@table("task, method, runs, solved, reward[], gap_ticks, p_holm, least_p")
 def list_settings(study: Study) -> Rows:
     """Mean reward of each setting, the best of each task first.
 
-    ``behind``: ticks behind the best of its task; ``p_holm``: of the two-tailed bootstrap test of
-    that difference, corrected for the settings of the task; ``least_p``: the smallest that this
+    ``gap_ticks``: ticks behind the best of its task; ``p_holm``: of the two-tailed bootstrap test
+    of that difference, corrected for the settings of the task; ``least_p``: the smallest that this
     test can give, uncorrected. Empty where folders compare methods.
     """
     for task in study.tasks if compares_settings(study) else ():
@@ -41,7 +41,7 @@ def list_settings(study: Study) -> Rows:
                 "runs": len(cell.runs),
                 "solved": len(cell.good),
                 **mean(cell.rewards).columns("reward"),
-                "behind": cells[0].rewards.mean() - cell.rewards.mean(),
+                "gap_ticks": cells[0].rewards.mean() - cell.rewards.mean(),
                 "p_holm": corrected,
                 "least_p": least_p,
             }
@@ -76,11 +76,11 @@ def best_settings(study: Study) -> str:
     more, of_tasks = len(texts) - MOST_TASKS, counted(len(texts), "task")
     card = f"No setting is better than all others on any of {of_tasks}"
     for best_name, count in [each for each in won.most_common() if each[0]][:1]:
-        told = (
+        certainty = (
             f"significantly on {sure[best_name]}"
             if best_name in sure
-            else "too few runs to tell surely"
+            else "too few runs to be sure"
         )
-        card = f"{capital(best_name)} is best on {count} of {of_tasks}, {told}"
+        card = f"{capital(best_name)} is best on {count} of {of_tasks}, {certainty}"
     several = f" And {more} more in the table." if more > 0 else ""
     return f"{card}.\n{' '.join(texts[:MOST_TASKS])}{several}"

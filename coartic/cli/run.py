@@ -72,11 +72,11 @@ def run(
         str | None,
         typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead of this machine."),
     ] = None,
-    beside: Annotated[
+    include: Annotated[
         list[str] | None,
         typer.Option(
             metavar="FOLDER",
-            help="Put these results beside: a folder, or 'shipped' for the shipped ones.",
+            help="Include the runs of a folder, or of the 'shipped' results.",
         ),
     ] = None,
 ) -> None:
@@ -85,8 +85,8 @@ def run(
     If it is interrupted, repeat the command: it resumes where it stopped, and repeats runs that
     crashed.
     """
-    from coartic.benchmarks.beside import put_beside
     from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.include import include_folders
     from coartic.benchmarks.planning import plan_suite
     from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
@@ -105,8 +105,8 @@ def run(
     for file in family_file or ():
         check_kind(str(file), "family")
     names = given.methods_meant(named(methods), registered)
-    if beside and not names:  # the user's own alone
-        names = [name for name, card in registered.items() if card.where.endswith(".py")]
+    if include and not names:  # the user's own alone
+        names = [name for name, info in registered.items() if info.where.endswith(".py")]
     plan = plan_suite(
         chosen,
         cells=select_cells(
@@ -132,9 +132,9 @@ def run(
         return one_line(f"Saved in {out}: {done}; repeat the command to resume.{kept}")
 
     with interruptible(saved), display:
-        if beside:
-            display.line(f"Copying {' and '.join(beside)}.")
-            plan = put_beside(plan, beside, out)
+        if include:
+            display.line(f"Copying {' and '.join(include)}.")
+            plan = include_folders(plan, include, out)
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(plan, out, executor=executor, watch=display.update)
     say(str(progress))
@@ -214,7 +214,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
         if name in builtin_tasks():
-            yield "Goals are", "reconstructed" if task.reconstructed else "printed in the paper"
+            yield "Goals are", "reconstructed" if task.reconstructed else "published in the paper"
     elif kind == "shipped family":
         family = shipped_families().get(name) or shipped_families()[f"{name}/v1"]
         yield "Family", f"{family.name}: {family.description}"
@@ -228,16 +228,16 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
                 raise
             names = [*suites(), *builtin_tasks(), *shipped_families(), *registered]
             raise CoarticError(unknown("task, suite, method or family", name, names)) from error
-        for card in map(registered.__getitem__, methods):
-            applies = (t for t in builtin_tasks() if card.why_not(load_task(t)) is None)
-            parameters = [f"{k}={v}" for k, v in card.defaults.items()]
-            yield "Method", f"{card.name}: {card.title}"
-            yield "Called", name_of(card.name)
-            yield "Told", ", ".join(card.told)
+        for info in map(registered.__getitem__, methods):
+            applies = (t for t in builtin_tasks() if info.why_not(load_task(t)) is None)
+            parameters = [f"{k}={v}" for k, v in info.defaults.items()]
+            yield "Method", f"{info.name}: {info.title}"
+            yield "Called", name_of(info.name)
+            yield "Information", ", ".join(info.information)
             yield "Parameters", ", ".join(parameters) or "none"
             yield "Tasks", ", ".join(applies) or "none of the four"
-            yield "Runs", "differ by seed" if card.stochastic else "are all the same"
-            yield "Cites", card.citation or "nothing"
+            yield "Runs", "differ by seed" if info.stochastic else "are all the same"
+            yield "Cites", info.citation or "nothing"
 
 
 def reproduce(
@@ -334,16 +334,16 @@ def new(
     """Write a method that works, to be changed into your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.reader import check_declaration
-    from coartic.benchmarks.registry import add_cards, registry
+    from coartic.benchmarks.registry import add_methods, registry
     from coartic.files import write_output
-    from coartic.runs.card import card_of
+    from coartic.runs.method_info import method_info
 
     path = Path(given.file_name(name)) if out is None else out
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
     mine = type("Mine", (template.Mine,), {"name": name})
     check_declaration(mine, "coartic new")
-    add_cards(registry(), [card_of(mine, "coartic new", "", "")])
+    add_methods(registry(), [method_info(mine, "coartic new", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     say_pairs(
@@ -352,7 +352,7 @@ def new(
             ("Check", f"coartic check {name} --method-file {path}"),
             (
                 "Run",
-                f"coartic run comparison --method-file {path} --beside shipped --out results/mine",
+                f"coartic run comparison --method-file {path} --include shipped --out results/mine",
             ),
         ]
     )

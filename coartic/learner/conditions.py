@@ -56,9 +56,9 @@ class ExplorationCondition:
     """How the hand for a goal is explored: not at all (``"none"``), by taking the one that is
     closest to the goal (``"closest"``), or at random (``"random"``, DASel)."""
     epsilon: Share = 0.2
-    """ε: the probability with which the hand for a goal is explored (printed)."""
+    """ε: the probability with which the hand for a goal is explored (published)."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE)] = 0.05
-    """Standard deviation of the noise η, length unit (base) and rad (joints) (printed)."""
+    """Standard deviation of the noise η, length unit (base) and rad (joints) (published)."""
     corrects: bool = True
     """Whether **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
@@ -81,8 +81,8 @@ class ExplorationCondition:
             )
         if self.credit == "subtask" and self.learned == "best":
             raise ValueError(
-                "a learner with credit 'subtask' is told nothing of the whole, so that its best "
-                "trial is no solution that it knows: set learned to 'replay'"
+                "a learner with credit 'subtask' has no information about the whole task, so that "
+                "its best trial is no solution that it knows: set learned to 'replay'"
             )
 
     def __repr__(self) -> str:

@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
 from coartic.motion.compiled import entry, fill_row, generator_at, inlined, inner, record_type
-from coartic.motion.lanes import lanes_for, runs_for, width_of
-from coartic.motion.reach import LOOK, MOVE, STAY, Batch, Bench, attempt, correct_missed
-from coartic.motion.setup import arm_of
+from coartic.motion.reach import CHECK, IDLE, MOVE, Batch, CompiledTask, attempt, correct_missed
+from coartic.motion.robot_parameters import arm_of
+from coartic.motion.slots import runs_for, slots_for, width_of
 from coartic.motion.solution import Movement
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
@@ -41,8 +41,8 @@ _EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 
 
-class Rules(NamedTuple):
-    """A task and an exploration condition, as the kernel reads them."""
+class LearnerParameters(NamedTuple):
+    """Learner parameters: a task and an exploration condition, as the kernel reads them."""
 
     start: Any  # (dof,)
     goals: Any  # (G, 2)
@@ -60,7 +60,7 @@ class Rules(NamedTuple):
     counts_earlier: bool
 
 
-class Log(NamedTuple):
+class TrialLog(NamedTuple):
     """The movements of one trial of each run, where it stood when each goal was hit, and the
     return of each."""
 
@@ -69,7 +69,7 @@ class Log(NamedTuple):
     hits: Any  # (N, G) records of hand, reward and credit of the subtask, and q
 
 
-class Kept(NamedTuple):
+class Results(NamedTuple):
     """Results of each run."""
 
     rewards: Any  # (N, T)
@@ -79,9 +79,9 @@ class Kept(NamedTuple):
     replay_rewards: Any  # (N,)
     counts: Any  # (N, COUNTED) what was spent, without the replay
     corrections: Any  # (N, 1 + TENTHS) made in trial 0 and in each tenth of the rest
-    first: Log
-    best: Log
-    replay: Log
+    first: TrialLog
+    best: TrialLog
+    replay: TrialLog
 
 
 COUNTED = (
@@ -97,7 +97,7 @@ TENTHS = 10
 """Equal parts of the trials after trial 0, of which corrections are counted apart."""
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """Work space of N runs, each now at the same goal of the same trial."""
 
     batch: Batch
@@ -106,9 +106,12 @@ class Work(NamedTuple):
     ys: Any
 
 
-def rules_of(bench: Bench, condition: ExplorationCondition, first: Sequence[Movement]) -> Rules:
-    """The rules of a task and a condition, with a movement to each goal for trial 0."""
-    task, width = bench.task, width_of(bench.task.robot)
+def learner_parameters_of(
+    compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
+) -> LearnerParameters:
+    """The learner parameters of a task and a condition, with a movement to each goal for trial
+    0."""
+    task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.zeros((len(first), width))
     for target, movement in zip(first_targets, first, strict=True):
         target[: task.robot.dof] = np.nan if movement.target is None else movement.target
@@ -120,9 +123,9 @@ def rules_of(bench: Bench, condition: ExplorationCondition, first: Sequence[Move
         explored[chosen, of_arm] = condition.modify_chosen
         explored[chosen, others] = condition.modify_other
         follows[chosen, others] = not condition.modify_other
-    return Rules(
-        start=bench.starts[0],
-        goals=bench.goals[0],
+    return LearnerParameters(
+        start=compiled.starts[0],
+        goals=compiled.goals[0],
         first_hands=np.array([HANDS.index(movement.hand) for movement in first], dtype=np.int64),
         first_targets=first_targets,
         hands=np.array(sorted(HANDS.index(hand) for hand in condition.hands), dtype=np.int64),
@@ -150,7 +153,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     return tables
 
 
-def empty_log(runs: int, task: Task) -> Log:
+def empty_log(runs: int, task: Task) -> TrialLog:
     """Logs without movements."""
     goals, q = len(task.goals), (np.float64, width_of(task.robot))
     numbers = dict.fromkeys(("goal", "hand", "kind", "ticks"), np.int64)
@@ -158,7 +161,7 @@ def empty_log(runs: int, task: Task) -> Log:
     credit = dict.fromkeys(("reward", "credit"), np.float64)
     hit = record_type({"hand": np.int64, **credit, "q": q})
     count = np.zeros(runs, dtype=np.int64)
-    return Log(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
+    return TrialLog(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
 
 
 _TRIAL = record_type(
@@ -171,10 +174,10 @@ _TRIAL = record_type(
 )
 
 
-def work_for(runs: int, task: Task) -> Work:
-    """Work space of runs, as many as there are lanes at most; all counters are 0."""
-    return Work(
-        batch=Batch(runs_for(runs, task.robot), lanes_for(task.robot)),
+def workspace_for(runs: int, task: Task) -> Workspace:
+    """Work space of runs, as many as there are slots at most; all counters are 0."""
+    return Workspace(
+        batch=Batch(runs_for(runs, task.robot), slots_for(task.robot)),
         trials=np.zeros(runs, _TRIAL),
         xs=np.empty(task.robot.most_links + 1),
         ys=np.empty(task.robot.most_links + 1),
@@ -182,34 +185,40 @@ def work_for(runs: int, task: Task) -> Work:
 
 
 @inlined
-def distance_to_goal(n: int, hand: int, setup: Any, work: Any) -> float:
+def distance_to_goal(n: int, hand: int, robot_parameters: Any, workspace: Any) -> float:
     """How far a hand of run ``n`` is from the centre of its goal, length unit."""
-    run, arm = work.batch.runs[n], arm_of(setup, hand)
-    joint_chain(run.q, arm, work.xs, work.ys)
+    run, arm = workspace.batch.runs[n], arm_of(robot_parameters, hand)
+    joint_chain(run.q, arm, workspace.xs, workspace.ys)
     run.evaluations += 1
     tip = len(arm.links)
-    dx = run.goal[0] - work.xs[tip]
-    dy = run.goal[1] - work.ys[tip]
+    dx = run.goal[0] - workspace.xs[tip]
+    dy = run.goal[1] - workspace.ys[tip]
     return math.sqrt(dx * dx + dy * dy)
 
 
 @inlined
 def choose_hand(
-    n: int, entries: Any, explore: bool, setup: Any, rules: Any, rngs: Any, work: Any
+    n: int,
+    entries: Any,
+    explore: bool,
+    robot_parameters: Any,
+    learner_parameters: Any,
+    rngs: Any,
+    workspace: Any,
 ) -> int:
     """The hand of highest value; with probability ε a random one, or the closest to the goal.
 
     Of equal values the first, of hands that are equally close a random one.
     """
-    hands = rules.hands
-    if explore and rules.exploration != 0:
+    hands = learner_parameters.hands
+    if explore and learner_parameters.exploration != 0:
         rng = generator_at(rngs, n)
-        if rng.random() < rules.epsilon:
-            nearest, draws = hands[0], rules.exploration == _RANDOM
+        if rng.random() < learner_parameters.epsilon:
+            nearest, draws = hands[0], learner_parameters.exploration == _RANDOM
             if not draws:
-                least = distance_to_goal(n, nearest, setup, work)
+                least = distance_to_goal(n, nearest, robot_parameters, workspace)
                 for hand in hands[1:]:
-                    distance = distance_to_goal(n, hand, setup, work)
+                    distance = distance_to_goal(n, hand, robot_parameters, workspace)
                     draws = abs(distance - least) <= _EQUALLY_NEAR
                     if distance < least:
                         nearest, least = hand, distance
@@ -227,31 +236,35 @@ def aim(
     number: int,
     first: bool,
     explore: bool,
-    setup: Any,
-    rules: Any,
+    robot_parameters: Any,
+    learner_parameters: Any,
     tables: Any,
     rngs: Any,
-    work: Any,
+    workspace: Any,
 ) -> None:
     """Choose the hand of a run and, where there is a target q*(s, a), set q^t = q*(s, a) + η;
     joints that are not to be modified keep their current values."""
-    run = work.batch.runs[n]
+    run = workspace.batch.runs[n]
     if first:
-        run.hand = rules.first_hands[number]
-        if not math.isnan(rules.first_targets[number, 0]):
-            fill_row(run.target, rules.first_targets[number])
+        run.hand = learner_parameters.first_hands[number]
+        if not math.isnan(learner_parameters.first_targets[number, 0]):
+            fill_row(run.target, learner_parameters.first_targets[number])
             run.how = MOVE
         return
-    entries = tables[n, number, work.trials[n].previous]
-    run.hand = choose_hand(n, entries, explore, setup, rules, rngs, work)
+    entries = tables[n, number, workspace.trials[n].previous]
+    run.hand = choose_hand(
+        n, entries, explore, robot_parameters, learner_parameters, rngs, workspace
+    )
     stored = entries[run.hand]
     if stored.value > -math.inf:
         run.how = MOVE
         rng = generator_at(rngs, n)
         for j in range(len(run.q)):
-            run.target[j] = run.q[j] if rules.follows[run.hand, j] else stored.target[j]
-            if explore and rules.explored[run.hand, j]:
-                run.target[j] += rules.noise_sd * rng.standard_normal()
+            run.target[j] = (
+                run.q[j] if learner_parameters.follows[run.hand, j] else stored.target[j]
+            )
+            if explore and learner_parameters.explored[run.hand, j]:
+                run.target[j] += learner_parameters.noise_sd * rng.standard_normal()
 
 
 @inlined
@@ -270,40 +283,57 @@ def record_movement(log: Any, n: int, number: int, kind: int, run: Any, trial: A
 
 @inner
 def make_trial(
-    first: bool, explore: bool, setup: Any, rules: Any, tables: Any, log: Any, rngs: Any, work: Any
+    first: bool,
+    explore: bool,
+    robot_parameters: Any,
+    learner_parameters: Any,
+    tables: Any,
+    log: Any,
+    rngs: Any,
+    workspace: Any,
 ) -> None:
     """One trial of every run into ``log``; ``first``: trial 0. A trial fails at a goal missed."""
-    runs = len(work.trials)
+    runs = len(workspace.trials)
     for n in range(runs):
-        run, trial = work.batch.runs[n], work.trials[n]
-        fill_row(run.q, rules.start)
+        run, trial = workspace.batch.runs[n], workspace.trials[n]
+        fill_row(run.q, learner_parameters.start)
         run.evaluations = 0
         run.going = True
         trial.previous = NO_HAND
         trial.ticks = trial.corrections = 0
         log.count[n] = 0
-    for number in range(len(rules.goals)):
+    for number in range(len(learner_parameters.goals)):
         for n in range(runs):
-            run = work.batch.runs[n]
-            fill_row(run.goal, rules.goals[number])
+            run = workspace.batch.runs[n]
+            fill_row(run.goal, learner_parameters.goals[number])
             fill_row(run.target, run.q)
-            run.how, run.hit = LOOK if run.going else STAY, False
+            run.how, run.hit = CHECK if run.going else IDLE, False
             if run.going:
-                aim(n, number, first, explore, setup, rules, tables, rngs, work)
-        attempt(runs, setup, work.batch)
+                aim(
+                    n,
+                    number,
+                    first,
+                    explore,
+                    robot_parameters,
+                    learner_parameters,
+                    tables,
+                    rngs,
+                    workspace,
+                )
+        attempt(runs, robot_parameters, workspace.batch)
         for n in range(runs):
-            run = work.batch.runs[n]
-            run.corrects = rules.corrects or first or run.how != MOVE
+            run = workspace.batch.runs[n]
+            run.corrects = learner_parameters.corrects or first or run.how != MOVE
             if run.how == MOVE:
-                record_movement(log, n, number, LEARNED, run, work.trials[n])
-        correct_missed(runs, setup, work.batch)
+                record_movement(log, n, number, LEARNED, run, workspace.trials[n])
+        correct_missed(runs, robot_parameters, workspace.batch)
         for n in range(runs):
-            run, trial = work.batch.runs[n], work.trials[n]
+            run, trial = workspace.batch.runs[n], workspace.trials[n]
             if run.going:
                 trial.counts[_ITERATIONS] += run.iterations
                 trial.counts[_CORRECTIONS] += run.converged
                 trial.corrections += run.converged
-                if run.converged or (run.hit and run.how == LOOK):
+                if run.converged or (run.hit and run.how == CHECK):
                     record_movement(log, n, number, CORRECTIVE, run, trial)
                 run.going = run.hit
                 if run.going:
@@ -313,11 +343,11 @@ def make_trial(
                 else:
                     trial.counts[_FAILED] += 1
     for n in range(runs):
-        work.trials[n].counts[_EVALUATIONS] += work.batch.runs[n].evaluations
+        workspace.trials[n].counts[_EVALUATIONS] += workspace.batch.runs[n].evaluations
 
 
 @inlined
-def find_returns(n: int, rules: Any, log: Any) -> None:
+def find_returns(n: int, learner_parameters: Any, log: Any) -> None:
     """Set the return of each goal in the log of a completed trial."""
     goals, row, earlier, later = log.hits.shape[1], 0, 0.0, 0.0
     for number in range(goals):
@@ -328,11 +358,11 @@ def find_returns(n: int, rules: Any, log: Any) -> None:
             row += 1
         hit.reward = -ticks
         hit.credit = earlier
-        if rules.counts_earlier:
-            earlier = rules.discount * (earlier + hit.reward)
+        if learner_parameters.counts_earlier:
+            earlier = learner_parameters.discount * (earlier + hit.reward)
     for number in range(goals - 1, -1, -1):
         hit = log.hits[n, number]
-        later = hit.reward + rules.discount * later
+        later = hit.reward + learner_parameters.discount * later
         hit.credit += later
 
 
@@ -345,54 +375,71 @@ def copy_movements(n: int, source: Any, destination: Any) -> None:
 
 
 @inner
-def learn_from(number: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
+def learn_from(
+    number: int, learner_parameters: Any, tables: Any, results: Any, log: Any, workspace: Any
+) -> None:
     """Keep the rewards of a trial; where it was completed, update Q and q*: credit visited states
     and hands with the reward of the trial, or each with its return."""
-    others = max(1, kept.rewards.shape[1] - 1)
+    others = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
-    for n in range(len(work.trials)):
-        trial = work.trials[n]
-        kept.corrections[n, part] += trial.corrections
+    for n in range(len(workspace.trials)):
+        trial = workspace.trials[n]
+        results.corrections[n, part] += trial.corrections
         reward = -trial.ticks
-        kept.rewards[n, number] = reward
-        kept.completed[n, number] = work.batch.runs[n].going
-        if not work.batch.runs[n].going:
+        results.rewards[n, number] = reward
+        results.completed[n, number] = workspace.batch.runs[n].going
+        if not workspace.batch.runs[n].going:
             continue
         if number == 0:
-            copy_movements(n, log, kept.first)
-        if rules.by_subtask:
-            find_returns(n, rules, log)
+            copy_movements(n, log, results.first)
+        if learner_parameters.by_subtask:
+            find_returns(n, learner_parameters, log)
         for goal in range(log.hits.shape[1]):
             hit = log.hits[n, goal]
-            credit = hit.credit if rules.by_subtask else float(reward)
+            credit = hit.credit if learner_parameters.by_subtask else float(reward)
             before = log.hits[n, goal - 1].hand if goal > 0 else NO_HAND
             learned = tables[n, goal, before, hit.hand]
             if credit > learned.value:
                 learned.value = credit
                 fill_row(learned.target, hit.q)
-        best = kept.best_trial[n]
-        if best < 0 or reward > kept.rewards[n, best]:
-            kept.best_trial[n] = number
-            copy_movements(n, log, kept.best)
+        best = results.best_trial[n]
+        if best < 0 or reward > results.rewards[n, best]:
+            results.best_trial[n] = number
+            copy_movements(n, log, results.best)
 
 
 @entry
 def learn_kernel(
-    setup: Any, rules: Any, tables: Any, kept: Any, log: Any, rngs: Any, work: Any
+    robot_parameters: Any,
+    learner_parameters: Any,
+    tables: Any,
+    results: Any,
+    log: Any,
+    rngs: Any,
+    workspace: Any,
 ) -> None:
     """All trials of N runs, each with its own generator, and the replay of what they learned.
 
-    ``tables`` and ``kept`` are filled; ``log`` is overwritten by every trial.
+    ``tables`` and ``results`` are filled; ``log`` is overwritten by every trial.
     """
-    trials = kept.rewards.shape[1]
+    trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         if number == trials:
-            for n in range(len(work.trials)):
-                fill_row(kept.counts[n], work.trials[n].counts)
-        make_trial(number == 0, number < trials, setup[0], rules, tables, log, rngs, work)
+            for n in range(len(workspace.trials)):
+                fill_row(results.counts[n], workspace.trials[n].counts)
+        make_trial(
+            number == 0,
+            number < trials,
+            robot_parameters[0],
+            learner_parameters,
+            tables,
+            log,
+            rngs,
+            workspace,
+        )
         if number < trials:
-            learn_from(number, rules, tables, kept, log, work)
-    for n in range(len(work.trials)):
-        kept.replayed[n] = work.batch.runs[n].going
-        kept.replay_rewards[n] = -work.trials[n].ticks
-        copy_movements(n, log, kept.replay)
+            learn_from(number, learner_parameters, tables, results, log, workspace)
+    for n in range(len(workspace.trials)):
+        results.replayed[n] = workspace.batch.runs[n].going
+        results.replay_rewards[n] = -workspace.trials[n].ticks
+        copy_movements(n, log, results.replay)

@@ -17,13 +17,13 @@ from coartic.learner.kernel import (
     COUNTED,
     LEARNED,
     TENTHS,
-    Kept,
-    Log,
+    Results,
+    TrialLog,
     empty_log,
     empty_tables,
     learn_kernel,
-    rules_of,
-    work_for,
+    learner_parameters_of,
+    workspace_for,
 )
 from coartic.learner.run import LearningRun
 from coartic.method import Meter
@@ -31,17 +31,17 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import corrective_movements, initial_hands
-from coartic.motion.lanes import LANES
 from coartic.motion.movement import move
 from coartic.motion.outside import note_trials
-from coartic.motion.reach import bench_of
+from coartic.motion.reach import compiled_task
+from coartic.motion.slots import SLOTS
 from coartic.motion.solution import Movement, hands_in, movements_by_goal
 from coartic.motion.trials import trials_on
 from coartic.robot import HANDS
 from coartic.tasks.task import Task, TaskLike, as_task, check_hands, letters_of
 from coartic.threads import threads_for
 
-TRIALS = 10_000  # trials of one run (printed)
+TRIALS = 10_000  # trials of one run (published)
 _MOST_SEED = 2**128 - 1  # seeds of runs are hashes
 
 
@@ -197,7 +197,7 @@ def learn_many(
         first = corrective_movements(hands)
     note_trials(trials * len(ordered))
     threads = threads_for(jobs)
-    together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
+    together = max(min(SLOTS, math.ceil(len(ordered) / threads)), 1)
     batches = [ordered[begin : begin + together] for begin in range(0, len(ordered), together)]
     learn_together(task, condition, model, first, [0], 0)  # compiles, on no run's time
 
@@ -221,11 +221,11 @@ def learn_together(
     """All trials of runs side by side, one a seed, which differ in nothing else.
 
     Nothing is checked. ``first`` has a movement to each goal for trial 0; there are no more seeds
-    than lanes.
+    than slots.
     """
-    runs, dof, bench = len(seeds), task.robot.dof, bench_of(task, model)
+    runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
-    kept = Kept(
+    results = Results(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
         best_trial=np.full(runs, -1),
@@ -239,18 +239,18 @@ def learn_together(
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     arguments = (
-        bench.setup,
-        rules_of(bench, condition, first),
+        compiled.robot_parameters,
+        learner_parameters_of(compiled, condition, first),
         tables,
-        kept,
+        results,
         empty_log(runs, task),
         addresses(generators),
-        work_for(runs, task),
+        workspace_for(runs, task),
     )
     clock = time.perf_counter()
     learn_kernel(*arguments)
     wall = time.perf_counter() - clock
-    counts = [dict(zip(COUNTED, row, strict=True)) for row in kept.counts.tolist()]
+    counts = [dict(zip(COUNTED, row, strict=True)) for row in results.counts.tolist()]
     return [
         LearningRun(
             task=task,
@@ -258,15 +258,15 @@ def learn_together(
             model=model,
             seed=seed,
             first_hands=hands_in(first),
-            rewards=np.ma.array(kept.rewards[n], mask=~kept.completed[n]),
-            best_trial=int(kept.best_trial[n]) if kept.best_trial[n] >= 0 else None,
-            initial=logged_movements(kept.first, n, dof),
-            solution=logged_movements(kept.best, n, dof),
-            replay=logged_movements(kept.replay, n, dof) if kept.replayed[n] else (),
-            replay_reward=int(kept.replay_rewards[n]) if kept.replayed[n] else None,
+            rewards=np.ma.array(results.rewards[n], mask=~results.completed[n]),
+            best_trial=int(results.best_trial[n]) if results.best_trial[n] >= 0 else None,
+            initial=logged_movements(results.first, n, dof),
+            solution=logged_movements(results.best, n, dof),
+            replay=logged_movements(results.replay, n, dof) if results.replayed[n] else (),
+            replay_reward=int(results.replay_rewards[n]) if results.replayed[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
-            corrections=kept.corrections[n],
+            corrections=results.corrections[n],
             counters=Meter(
                 trials=trials, jacobians=counts[n]["corrective_iterations"], **counts[n]
             ),
@@ -294,14 +294,16 @@ def warm_up(task: Task, *parts: Part) -> None:
     if "trials" in wanted:
         shape = 0, len(task.goals)
         trials_on(
-            bench_of(task, PAPER), np.empty(shape, np.int64), np.empty((*shape, task.robot.dof))
+            compiled_task(task, PAPER),
+            np.empty(shape, np.int64),
+            np.empty((*shape, task.robot.dof)),
         )
     if "motion" in wanted:
         move(task.robot, task.q0, task.q0, hand, goal, task.radius)
         correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
 
 
-def logged_movements(log: Log, run: int, dof: int) -> tuple[Movement, ...]:
+def logged_movements(log: TrialLog, run: int, dof: int) -> tuple[Movement, ...]:
     """The movements of a run in a log of the kernel."""
     return tuple(
         Movement(

@@ -1,6 +1,6 @@
 """The dual-process learner as a method, one per exploration condition and ablation.
 
-Variants that are told more than the paper's learner are methods of their own, with the
+Variants that use more information than the paper's learner are methods of their own, with the
 parameter that makes the difference; the others do not have it, so that what a method
 declares holds under all its parameters.
 """
@@ -34,7 +34,7 @@ from coartic.method import (
     Result,
     Session,
 )
-from coartic.motion.lanes import LANES
+from coartic.motion.slots import SLOTS
 
 _MOST_TRIALS = 4_000_000  # of runs that are performed together
 
@@ -83,16 +83,16 @@ class DualProcess(Method):
         return result
 
     def most_together(self) -> int:
-        """As many as there are lanes, if their rewards fit into one answer."""
+        """As many as there are slots, if their rewards fit into one answer."""
         trials: int = self.parameters.trials
-        return max(1, min(LANES, _MOST_TRIALS // trials))
+        return max(1, min(SLOTS, _MOST_TRIALS // trials))
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Learn in each session; a solution is the best trial's, or the replay's."""
         parameters: DualProcessParameters = self.parameters
         of_condition = parameters.model_dump(include={f.name for f in fields(ExplorationCondition)})
         condition = replace(self.condition, **of_condition)
-        tasks = [session.hand_over(*self.told) for session in sessions]
+        tasks = [session.reveal(*self.information) for session in sessions]
         task, model = tasks[0], sessions[0].model
         for session in sessions:
             session.find_initial_hands(condition.hands)  # counts what that takes
@@ -122,11 +122,11 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
     """The learner under a condition as a method."""
     parameters: type[DualProcessParameters] = DualProcessParameters
     citation = DualProcess.citation
-    told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-    if condition.hand_exploration == "closest":  # to know where things are
-        told |= {Information.GOALS, Information.FORWARD_KINEMATICS}
+    information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
+    if condition.hand_exploration == "closest":  # to find the closest hand
+        information |= {Information.GOALS, Information.FORWARD_KINEMATICS}
     if condition.credit == "subtask":
-        told |= {Information.REWARD_BY_SUBTASK}
+        information |= {Information.REWARD_BY_SUBTASK}
         parameters = SubtaskParameters
         citation += (
             " Reward of subtasks, after T. G. Dietterich (2000). Hierarchical reinforcement "
@@ -143,7 +143,7 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "name": f"{METHOD_PREFIX}{condition.id}",
             "title": f"Dual-process learner, exploration condition {number}"
             + (f", {ablation}" if ablation else ""),
-            "told": frozenset(told),
+            "information": frozenset(information),
             "citation": citation,
             "Parameters": parameters,
             "condition": condition,

@@ -7,7 +7,7 @@ Numba keys its on-disk cache by the file of the cached function alone, so a chan
 in a function it calls from another file would go unnoticed. Here the cache folder
 is named after a hash of the package's sources: changed sources, fresh code.
 
-LLVM is told how to compile before Numba first asks it for machine code. Only how fast the
+LLVM gets its options before Numba first asks it for machine code. Only how fast the
 kernels are hangs on it. A program that has compiled something else with Numba before it calls
 a kernel keeps the vectors that LLVM prefers.
 """
@@ -61,10 +61,10 @@ from numba.extending import intrinsic  # noqa: E402
 _KEPT_S = 30 * 24 * 3600.0
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
 
-# Loops over the links of an arm are unrolled, or the loop over lanes around them could not be
+# Loops over the links of an arm are unrolled, or the loop over slots around them could not be
 # made of vector instructions: LLVM's own bound ends that at four links.
 binding.set_option("coartic", "-unroll-threshold=1000")
-# Nor is the first lane taken out of a loop over whole vectors, which would leave seven over.
+# No loop peeling: it would take the first slot out of a loop over whole vectors and leave seven.
 binding.set_option("coartic", "-unroll-peel-max-count=0")
 
 # Vectors have 512 bits where there are any: on Intel's processors LLVM would prefer 256, with
@@ -117,7 +117,7 @@ _INNER = _OPTIONS | {"no_cpython_wrapper": True}
 def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
     """Compile a function as the decorator of this name in :mod:`coartic.motion.compiled` says.
 
-    Raises CoarticError where Numba is told to compile nothing.
+    Raises CoarticError where Numba is set to compile nothing.
     """
     if numba.config.DISABLE_JIT:
         raise CoarticError("NUMBA_DISABLE_JIT is set: unset it, as coartic's kernels are compiled")

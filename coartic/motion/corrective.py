@@ -16,25 +16,25 @@ import numpy as np
 
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, inlined, inner, joint_lever, shared
-from coartic.motion.lanes import (
+from coartic.motion.movement import check_goal, configuration, largest_square
+from coartic.motion.robot_parameters import arm_of, robot_parameters_for
+from coartic.motion.slots import (
     GOING,
-    board,
-    fill,
-    lanes_for,
-    leave,
+    compact,
+    load,
     near,
     padded_count,
     place,
     runs_for,
+    slots_for,
+    store,
     winding,
 )
-from coartic.motion.movement import check_goal, configuration, largest_square
-from coartic.motion.setup import arm_of, setup_for
 from coartic.motion.trigonometry import LARGEST
 from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 from coartic.text import short_repr
 
-_AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
+_AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # statuses of a slot
 
 
 class Correction(NamedTuple):
@@ -53,27 +53,27 @@ class Correction(NamedTuple):
 
 
 @inner
-def find_fates(at: Any, count: int, square: float) -> None:
-    """Set the fate of lanes whose hand is near enough, or nowhere."""
+def find_statuses(at: Any, count: int, square: float) -> None:
+    """Set the status of slots whose hand is near enough, or nowhere."""
     tip = len(at.length)
     for i in range(padded_count(count)):
         error_x = at.goal[0, i] - at.x[tip, i]
         error_y = at.goal[1, i] - at.y[tip, i]
         error = error_x * error_x + error_y * error_y
-        fate = GOING if error < math.inf else _FAILED
-        at.fate[i] = _AT_GOAL if error <= square else fate
+        status = GOING if error < math.inf else _FAILED
+        at.status[i] = _AT_GOAL if error <= square else status
 
 
 @inlined
 def descend(at: Any, count: int, gain: float, free_x: bool, free_y: bool) -> tuple[int, bool]:
-    """q += α Jᵀ e in every lane that goes on; how many have ended, and :func:`near`."""
+    """q += α Jᵀ e in every slot that goes on; how many have ended, and :func:`near`."""
     ended = 0
     far = 0
     tip = len(at.length)
     for i in range(padded_count(count)):
         error_x = at.goal[0, i] - at.x[tip, i]
         error_y = at.goal[1, i] - at.y[tip, i]
-        going = at.fate[i] == GOING
+        going = at.status[i] == GOING
         x = at.q[0, i] + gain * error_x if free_x else at.q[0, i]
         y = at.q[1, i] + gain * error_y if free_y else at.q[1, i]
         moved = (x != at.q[0, i]) | (y != at.q[1, i])
@@ -87,39 +87,39 @@ def descend(at: Any, count: int, gain: float, free_x: bool, free_y: bool) -> tup
             at.q[BASE_DOF + k, i] = turned if going else before
         # Where nothing moves: a stationary point away from the goal, which it will not leave.
         stuck = going & (not moved)
-        at.fate[i] = _STUCK if stuck else at.fate[i]
+        at.status[i] = _STUCK if stuck else at.status[i]
         ended += 0 if (going & moved) | (i >= count) else 1
         far += 0 if winding(at.q, i) < LARGEST else 1
     return ended, far == 0
 
 
 @shared
-def correct_lanes(lanes: Any, count: int, setup: Any, runs: Any) -> None:
-    """Let **A** descend in the first ``count`` lanes until each has ended.
+def correct_slots(slots: Any, count: int, robot_parameters: Any, runs: Any) -> None:
+    """Let **A** descend in the first ``count`` slots until each has ended.
 
-    The ``target`` of each run becomes what its lane ends with; the rest of its record says how.
+    The ``target`` of each run becomes what its slot ends with; the rest of its record says how.
     """
-    at, model = lanes.at[0], setup.model
-    gain, free_x, free_y = model.gain, setup.free_x, setup.free_y
+    at, model = slots.at[0], robot_parameters.model
+    gain, free_x, free_y = model.gain, robot_parameters.free_x, robot_parameters.free_y
     square = largest_square(model.correction_tolerance)
     is_near, iteration = near(at, count), 0
     while count > 0:
         place(at, count, is_near)
-        find_fates(at, count, square)
+        find_statuses(at, count, square)
         ended = count
         if iteration < model.max_iterations:
             ended, is_near = descend(at, count, gain, free_x, free_y)
         if ended > 0:
-            for lane in range(count - 1, -1, -1):
-                if at.fate[lane] == GOING and iteration < model.max_iterations:
+            for slot in range(count - 1, -1, -1):
+                if at.status[slot] == GOING and iteration < model.max_iterations:
                     continue
-                run = runs[at.run[lane]]
-                leave(at, lane, run.target)
-                run.converged = at.fate[lane] == _AT_GOAL
-                run.iterations = iteration + (at.fate[lane] == _STUCK)
+                run = runs[at.run[slot]]
+                store(at, slot, run.target)
+                run.converged = at.status[slot] == _AT_GOAL
+                run.iterations = iteration + (at.status[slot] == _STUCK)
                 run.evaluations += run.iterations + 1
                 count -= 1
-                fill(lanes.corrected, lane, count)
+                compact(slots.corrected, slot, count)
                 ended -= 1
                 if ended == 0:
                     break
@@ -127,11 +127,11 @@ def correct_lanes(lanes: Any, count: int, setup: Any, runs: Any) -> None:
 
 
 @entry
-def correct_kernel(setup: Any, lanes: Any, runs: Any) -> None:
+def correct_kernel(robot_parameters: Any, slots: Any, runs: Any) -> None:
     """Correct the target of the only run."""
     run = runs[0]
-    board(lanes.at[0], 0, 0, run.target, arm_of(setup[0], run.hand), run.goal)
-    correct_lanes(lanes, 1, setup[0], runs)
+    load(slots.at[0], 0, 0, run.target, arm_of(robot_parameters[0], run.hand), run.goal)
+    correct_slots(slots, 1, robot_parameters[0], runs)
 
 
 def correct(
@@ -143,10 +143,10 @@ def correct(
     locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
 ) -> Correction:
-    """The corrective process: find a configuration that puts a hand at a goal.
+    """Jacobian-transpose inverse kinematics, the corrective process: find where a hand is at a
+    goal.
 
-    It descends from ``q`` on the distance to the goal, by the transposed Jacobian. The other arm
-    does not move.
+    It descends from ``q`` on the distance to the goal. The other arm does not move.
 
     Parameters
     ----------
@@ -185,8 +185,10 @@ def correct(
     run, figures = runs[0], slice(robot.dof)
     run["target"][figures] = configuration(robot, q)
     run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal)
-    setup = setup_for(robot, locked_base=tuple(locked_base), model=check_model(model))
-    correct_kernel(setup, lanes_for(robot), runs)
+    robot_parameters = robot_parameters_for(
+        robot, locked_base=tuple(locked_base), model=check_model(model)
+    )
+    correct_kernel(robot_parameters, slots_for(robot), runs)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))
 
 

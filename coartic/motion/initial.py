@@ -15,7 +15,7 @@ from functools import lru_cache
 from coartic.errors import NotApplicableError
 from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel
-from coartic.motion.reach import bench_of
+from coartic.motion.reach import compiled_task
 from coartic.motion.solution import Execution, Movement, execute, execute_many
 from coartic.robot import HANDS, Hand
 from coartic.tasks.task import (
@@ -150,7 +150,7 @@ def ranked_sequences(
 
     each = list(sequences)
     trials: list[tuple[str, Execution]] = []
-    executions = execute_many(bench_of(task, model), map(corrective_movements, each))
+    executions = execute_many(compiled_task(task, model), map(corrective_movements, each))
     for hands, trial in zip(each, executions, strict=True):
         if isinstance(trial, Exception):
             raise trial

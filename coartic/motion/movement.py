@@ -27,17 +27,17 @@ from coartic.inputs import real_array
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.compiled import entry, fill_row, inner, shared
-from coartic.motion.lanes import (
+from coartic.motion.robot_parameters import arm_of, robot_parameters_for
+from coartic.motion.slots import (
     GOING,
-    depart,
-    fill,
-    lanes_for,
+    compact,
     padded_count,
     place,
     runs_for,
+    slots_for,
+    start,
     winding,
 )
-from coartic.motion.setup import arm_of, setup_for
 from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 from coartic.text import short_repr
 
@@ -48,7 +48,7 @@ _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
-_IN_GOAL, _MISSED = 1.0, 2.0  # fates of a lane
+_IN_GOAL, _MISSED = 1.0, 2.0  # statuses of a slot
 LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
@@ -94,16 +94,16 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
     twice = (gap + gap) * distance
     root = np.sqrt(toward * toward + turn * twice)
     approaching = toward > _NOTHING
-    way = twice if approaching else root - toward
+    path = twice if approaching else root - toward
     rate = toward + root if approaching else turn
-    curved = way / (rate + _UNDERFLOW)
+    curved = path / (rate + _UNDERFLOW)
     steps = max(gap * _single(slowness), curved) * _FEWER
     return steps if (gap > _NOTHING) & (root < _OVERFLOW) else _NOTHING
 
 
 @inner
 def set_off(at: Any, count: int, step: float) -> bool:
-    """Set rates, bounds and number of steps of every lane.
+    """Set rates, bounds and number of steps of every slot.
 
     Returns True if all angles stay in the range of the fast cosine.
     """
@@ -137,7 +137,7 @@ def set_off(at: Any, count: int, step: float) -> bool:
 
 @inner
 def place_between(at: Any, count: int, step: float) -> None:
-    """The point at which each lane is now."""
+    """The point at which each slot is now."""
     for i in range(padded_count(count)):
         fraction = at.step[i] * step / at.distance[i]
         for j in range(len(at.q)):
@@ -156,7 +156,7 @@ def look(
     hit: float,
     arrived: float,
 ) -> int:
-    """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended.
+    """Evaluate the stopping rule, or skip the steps that are clear; slots that have ended.
 
     A movement on arrival stops ``near`` the end. ``hit`` and ``arrived`` are the largest squares of
     distances to the goal and to the end at which a movement stops.
@@ -182,26 +182,28 @@ def look(
             closing = velocity_x * dx + velocity_y * dy
             rim = near + at.clearance[i]
             clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
-        fate = _MISSED if stop else GOING
-        fate = _IN_GOAL if to_goal <= hit else fate
+        status = _MISSED if stop else GOING
+        status = _IN_GOAL if to_goal <= hit else status
         # Every step up to step + clear is clear of both discs.
         after = min(at.step[i] + 1.0 + np.floor(min(clear, at.last[i])), at.last[i])
-        at.step[i] = after if fate == GOING else at.step[i]
-        at.fate[i] = fate
-        ended += 0 if (fate == GOING) | (i >= count) else 1
+        at.step[i] = after if status == GOING else at.step[i]
+        at.status[i] = status
+        ended += 0 if (status == GOING) | (i >= count) else 1
     return ended
 
 
 @shared
-def move_lanes(lanes: Any, count: int, stop_on_arrival: bool, setup: Any, runs: Any) -> None:
-    """Move the first ``count`` lanes until each has ended.
+def move_slots(
+    slots: Any, count: int, stop_on_arrival: bool, robot_parameters: Any, runs: Any
+) -> None:
+    """Move the first ``count`` slots until each has ended.
 
-    Each run's ``q``, from which it departed to its ``target``, becomes the configuration in
+    Each run's ``q``, from which it started to its ``target``, becomes the configuration in
     which it stopped; the rest of its record says how.
     """
-    at, evaluations = lanes.at[0], 0
-    step, near = setup.model.step, setup.model.arrival_tolerance
-    radius = setup.radius
+    at, evaluations = slots.at[0], 0
+    step, near = robot_parameters.model.step, robot_parameters.model.arrival_tolerance
+    radius = robot_parameters.radius
     hit, arrived = largest_square(radius), largest_square(near)
     is_near = set_off(at, count, step)
     if stop_on_arrival:
@@ -218,32 +220,32 @@ def move_lanes(lanes: Any, count: int, stop_on_arrival: bool, setup: Any, runs: 
         ended = look(at, count, radius, stop_on_arrival, near, hit, arrived)
         if ended == 0:
             continue
-        for lane in range(count - 1, -1, -1):
-            if at.fate[lane] == GOING:
+        for slot in range(count - 1, -1, -1):
+            if at.status[slot] == GOING:
                 continue
-            run = runs[at.run[lane]]
+            run = runs[at.run[slot]]
             q, target = run.q, run.target
-            at_end = at.step[lane] == at.last[lane]
-            fraction = 0.0 if at_end else at.step[lane] * step / at.distance[lane]
+            at_end = at.step[slot] == at.last[slot]
+            fraction = 0.0 if at_end else at.step[slot] * step / at.distance[slot]
             for j in range(len(q)):
                 between = q[j] + fraction * (target[j] - q[j])
                 q[j] = target[j] if at_end else between
-            run.hit = at.fate[lane] == _IN_GOAL
-            run.ticks = int(at.step[lane]) + 1
+            run.hit = at.status[slot] == _IN_GOAL
+            run.ticks = int(at.step[slot]) + 1
             run.evaluations += evaluations
             count -= 1
-            fill(lanes.moved, lane, count)
+            compact(slots.moved, slot, count)
             ended -= 1
             if ended == 0:
                 break
 
 
 @entry
-def move_kernel(stop_on_arrival: bool, setup: Any, lanes: Any, runs: Any) -> None:
+def move_kernel(stop_on_arrival: bool, robot_parameters: Any, slots: Any, runs: Any) -> None:
     """Move the only run."""
     run = runs[0]
-    depart(lanes.at[0], 0, 0, run.q, run.target, arm_of(setup[0], run.hand), run.goal)
-    move_lanes(lanes, 1, stop_on_arrival, setup[0], runs)
+    start(slots.at[0], 0, 0, run.q, run.target, arm_of(robot_parameters[0], run.hand), run.goal)
+    move_slots(slots, 1, stop_on_arrival, robot_parameters[0], runs)
 
 
 def move(
@@ -299,8 +301,8 @@ def move(
     run["q"][figures] = configuration(robot, q)
     run["target"][figures] = configuration(robot, target)
     run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
-    setup = setup_for(robot, radius, model=check_model(model))
-    move_kernel(stop_on_arrival, setup, lanes_for(robot), runs)
+    robot_parameters = robot_parameters_for(robot, radius, model=check_model(model))
+    move_kernel(stop_on_arrival, robot_parameters, slots_for(robot), runs)
     return MoveResult(
         run["q"][figures].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
     )

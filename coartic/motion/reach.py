@@ -18,17 +18,18 @@ from numpy.typing import NDArray
 
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, fill_row, inlined, shared
-from coartic.motion.corrective import correct_lanes
-from coartic.motion.lanes import LANES, board, depart, lanes_for, runs_for
-from coartic.motion.movement import check_goal, configuration, move_lanes
-from coartic.motion.setup import arm_of, setup_for
+from coartic.motion.corrective import correct_slots
+from coartic.motion.movement import check_goal, configuration, move_slots
+from coartic.motion.robot_parameters import arm_of, robot_parameters_for
+from coartic.motion.slots import SLOTS, load, runs_for, slots_for, start
 from coartic.robot import Array, Robot
 from coartic.tasks.task import Task
 from coartic.threads import in_parts
 
-STAY, LOOK, MOVE, REPEAT = range(4)
-"""How a run acts next: not at all; it looks whether its hand is in the goal; it moves to its target
-and ends on arrival, too; it repeats a corrective movement, which ends on a hit or at the target."""
+IDLE, CHECK, MOVE, REPEAT = range(4)
+"""How a run acts next: not at all; it checks whether its hand is in the goal; it moves to its
+target and ends on arrival, too; it repeats a corrective movement, which ends on a hit or at the
+target."""
 
 
 class Reached(NamedTuple):
@@ -67,58 +68,58 @@ class Batch(NamedTuple):
     """Work space of a lot of arms, each now at its next goal."""
 
     runs: Any  # records: see runs_for
-    lanes: Any
+    slots: Any
 
 
 @shared
-def move_acting(count: int, stops: bool, setup: Any, batch: Any) -> None:
+def move_acting(count: int, stops: bool, robot_parameters: Any, batch: Any) -> None:
     """Move the acting arms to their targets."""
-    at, lane = batch.lanes.at[0], 0
+    at, slot = batch.slots.at[0], 0
     for i in range(count):
         run = batch.runs[i]
         if run.acting:
-            depart(at, lane, i, run.q, run.target, arm_of(setup, run.hand), run.goal)
-            lane += 1
-    if lane > 0:
-        move_lanes(batch.lanes, lane, stops, setup, batch.runs)
+            start(at, slot, i, run.q, run.target, arm_of(robot_parameters, run.hand), run.goal)
+            slot += 1
+    if slot > 0:
+        move_slots(batch.slots, slot, stops, robot_parameters, batch.runs)
 
 
 @inlined
-def attempt(count: int, setup: Any, batch: Any) -> None:
+def attempt(count: int, robot_parameters: Any, batch: Any) -> None:
     """Let each run act as it is to; one that does not move takes no ticks."""
     for stops in (True, False):
         for i in range(count):
             run = batch.runs[i]
             # A movement to where an arm is tells whether it hits; it needs no other end.
-            run.acting = run.how == MOVE if stops else run.how == LOOK or run.how == REPEAT
-        move_acting(count, stops, setup, batch)
+            run.acting = run.how == MOVE if stops else run.how == CHECK or run.how == REPEAT
+        move_acting(count, stops, robot_parameters, batch)
     for i in range(count):
         if batch.runs[i].how < MOVE:
             batch.runs[i].ticks = 0
 
 
 @shared
-def find_corrections(count: int, setup: Any, batch: Any) -> None:
+def find_corrections(count: int, robot_parameters: Any, batch: Any) -> None:
     """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
-    at, lane = batch.lanes.at[0], 0
+    at, slot = batch.slots.at[0], 0
     for i in range(count):
         run = batch.runs[i]
         run.acting, run.converged = run.corrects and run.going and not run.hit, False
         run.ticks, run.iterations = 0, 0
         if run.acting:
             fill_row(run.target, run.q)
-            board(at, lane, i, run.q, arm_of(setup, run.hand), run.goal)
-            lane += 1
-    correct_lanes(batch.lanes, lane, setup, batch.runs)
+            load(at, slot, i, run.q, arm_of(robot_parameters, run.hand), run.goal)
+            slot += 1
+    correct_slots(batch.slots, slot, robot_parameters, batch.runs)
 
 
 @inlined
-def correct_missed(count: int, setup: Any, batch: Any) -> None:
+def correct_missed(count: int, robot_parameters: Any, batch: Any) -> None:
     """Have **A** finish missed goals; ``target`` and ``ticks`` become those of its movements."""
-    find_corrections(count, setup, batch)
+    find_corrections(count, robot_parameters, batch)
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
-    move_acting(count, False, setup, batch)
+    move_acting(count, False, robot_parameters, batch)
 
 
 @inlined
@@ -128,7 +129,9 @@ def row_of(rows: Any, n: int) -> Any:
 
 
 @inlined
-def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch: Any) -> None:
+def reach_lot(
+    first: int, count: int, arms: Any, robot_parameters: Any, reached: Any, batch: Any
+) -> None:
     """Some of the arms to their goals, as many as there is room for."""
     for i in range(count):
         fill_row(batch.runs[i].q, row_of(arms.starts, first + i))
@@ -144,7 +147,7 @@ def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch
             for i in range(count):
                 run, target = batch.runs[i], arms.targets[first + i, g, m]
                 fill_row(run.target, run.q)
-                run.how = LOOK if m == 0 and setup.looks and run.going else STAY
+                run.how = CHECK if m == 0 and robot_parameters.checks and run.going else IDLE
                 if run.going and (m == 0 or not run.hit):
                     given = 0
                     for j in range(len(target)):  # a joint without a target stays where it is
@@ -155,11 +158,11 @@ def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch
                         stops = len(arms.stops) == 0 or arms.stops[first + i, g, m]
                         run.how = MOVE if stops else REPEAT
                         fill_row(target, run.target)
-            attempt(count, setup, batch)
+            attempt(count, robot_parameters, batch)
             for i in range(count):
                 reached.moved[first + i, g, m] = batch.runs[i].ticks
                 reached.ticks[first + i, g] += batch.runs[i].ticks
-        correct_missed(count, setup, batch)
+        correct_missed(count, robot_parameters, batch)
         for i in range(count):
             n, run = first + i, batch.runs[i]
             fill_row(reached.q[n, g], run.q)
@@ -173,14 +176,14 @@ def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch
 
 
 @entry
-def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
+def reach_goals(arms: Any, robot_parameters: Any, reached: Any, batch: Any) -> None:
     """Every arm to its goals, in lots."""
     count, room = len(arms.targets), len(batch.runs)
     for first in range(0, count, room):
-        reach_lot(first, min(room, count - first), arms, setup[0], reached, batch)
+        reach_lot(first, min(room, count - first), arms, robot_parameters[0], reached, batch)
 
 
-SHARE = 14 * LANES
+SHARE = 14 * SLOTS
 """Arms for a thread, at least: to begin one takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Arrays for the kernel to work on that nobody uses, by :attr:`Robot.most_links`."""
@@ -206,10 +209,10 @@ def blank(arms: Requests) -> Reached:
 
 def batch_for(robot: Robot) -> Batch:
     """New arrays for the kernel to work on."""
-    return Batch(runs_for(LANES, robot), lanes_for(robot))
+    return Batch(runs_for(SLOTS, robot), slots_for(robot))
 
 
-def reach_with(robot: Robot, arms: Requests, setup: NDArray[np.void]) -> Reached:
+def reach_with(robot: Robot, arms: Requests, robot_parameters: NDArray[np.void]) -> Reached:
     """Let N arms reach for G goals each, in turn, until they miss one.
 
     Nothing is checked. In ``arms.targets`` joints without a target are filled in, for goals that
@@ -226,7 +229,7 @@ def reach_with(robot: Robot, arms: Requests, setup: NDArray[np.void]) -> Reached
             batch = idle.pop()  # no other thread gets it
         except IndexError:
             batch = batch_for(robot)
-        reach_goals(some, setup, results, batch)
+        reach_goals(some, robot_parameters, results, batch)
         idle.append(batch)
 
     if count >= 2 * SHARE:
@@ -244,7 +247,7 @@ def reach_unchecked(
     radius: float,
     targets: Array | None = None,
     *,
-    looks: bool = True,
+    checks: bool = True,
     locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
@@ -253,13 +256,15 @@ def reach_unchecked(
     Nothing is checked. ``q`` has shape ``(N, dof)``, length unit (base) and rad (joints); ``hands``
     ``(N,)``, indices into HANDS; ``goals`` ``(N, 2)`` and ``radius`` is that of them all, length
     unit. ``targets`` has shape ``(N, dof)``: where a joint's target is NaN, the joint keeps its
-    value, and an arm whose row is NaN has none. ``looks``: whether such an arm may be in its goal
+    value, and an arm whose row is NaN has none. ``checks``: whether such an arm may be in its goal
     already; else **A** begins at once. ``locked_base`` holds ``"x"`` and/or ``"y"``; **A** leaves
     these as they are. Source: paper, sections *Generating Movement for Each Goal* and *The
     Corrective Process*.
     """
     given = np.full(q.shape, np.nan) if targets is None else np.array(targets, order="C")
-    setup = setup_for(robot, radius, locked_base=locked_base, model=model, looks=looks)
+    robot_parameters = robot_parameters_for(
+        robot, radius, locked_base=locked_base, model=model, checks=checks
+    )
     arms = Requests(
         starts=np.array(q, order="C"),
         hands=np.array(hands)[:, None],
@@ -267,35 +272,37 @@ def reach_unchecked(
         stops=ALL_STOP,
         goals=np.array(goals, order="C")[:, None],
     )
-    return Reached._make(each[:, 0] for each in reach_with(robot, arms, setup))
+    return Reached._make(each[:, 0] for each in reach_with(robot, arms, robot_parameters))
 
 
-class Bench(NamedTuple):
-    """A task as the kernel reads it (:func:`bench_of`)."""
+class CompiledTask(NamedTuple):
+    """A task as the kernel reads it (:func:`compiled_task`)."""
 
     task: Task
     starts: Array  # (1, dof)
     goals: Array  # (1, G, 2)
-    setup: NDArray[np.void]  # (1,)
+    robot_parameters: NDArray[np.void]  # (1,)
     model: MotionModel
 
 
-def bench_of(task: Task, model: MotionModel) -> Bench:
+def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
     """A task for the kernel. Raises ValueError for a task or a model that no trial can be made
     with: a copy of a task with changed fields is unchecked."""
     check_model(model, radius=task.radius)
     goals = [check_goal(goal, task.radius) for goal in task.goals]
-    return Bench(
+    return CompiledTask(
         task=task,
         starts=configuration(task.robot, task.q0)[None],
         goals=np.array([goals], dtype=np.float64),
-        setup=setup_for(task.robot, task.radius, locked_base=task.locked_base, model=model),
+        robot_parameters=robot_parameters_for(
+            task.robot, task.radius, locked_base=task.locked_base, model=model
+        ),
         model=model,
     )
 
 
 def reach_all(
-    bench: Bench,
+    compiled: CompiledTask,
     hands: NDArray[np.int64],
     targets: Array,
     stops: NDArray[np.bool_] = ALL_STOP,
@@ -307,5 +314,5 @@ def reach_all(
     made, further ones where it is still missed. ``stops``, of the shape of ``targets`` without the
     last axis: whether a movement ends on arrival, too; each does by default.
     """
-    arms = Requests(bench.starts, hands, targets, stops, bench.goals)
-    return reach_with(bench.task.robot, arms, bench.setup)
+    arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
+    return reach_with(compiled.task.robot, arms, compiled.robot_parameters)

@@ -23,7 +23,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import correct, explain_failure
 from coartic.motion.movement import LARGEST_ENTRY, configuration, follow, move
 from coartic.motion.outside import note_trials
-from coartic.motion.reach import Bench, bench_of, reach_all
+from coartic.motion.reach import CompiledTask, compiled_task, reach_all
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, letters_of
 from coartic.text import counted, short_repr
@@ -170,7 +170,7 @@ def execute(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    (execution,) = execute_many(bench_of(as_task(task), model), [solution])
+    (execution,) = execute_many(compiled_task(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
     if execution.ticks > WHOLE_TURNS / model.step:
@@ -193,7 +193,7 @@ def hint_at_degrees(movements: Iterable[Movement]) -> None:
 
 
 def execute_many(
-    bench: Bench, solutions: Iterable[Iterable[Movement]]
+    compiled: CompiledTask, solutions: Iterable[Iterable[Movement]]
 ) -> list[Execution | Refused]:
     """:func:`execute` solutions of one task side by side, which takes a fraction of the time.
 
@@ -203,20 +203,20 @@ def execute_many(
     plans: list[ByGoal | Refused] = []
     for solution in solutions:
         try:
-            plans.append(movements_by_goal(bench.task, solution))
+            plans.append(movements_by_goal(compiled.task, solution))
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
             plans.append(error)
     note_trials(len(plans))
     straight = [plan for plan in plans if isinstance(plan, list) and not has_path(plan)]
-    outcomes = iter(make_straight(bench, straight))
+    outcomes = iter(make_straight(compiled, straight))
     executions: list[Execution | Refused] = []
     for plan in plans:
         if not isinstance(plan, list):
             executions.append(plan)
         elif has_path(plan):
-            executions.append(execution_of(bench, plan, make_one_by_one(bench, plan)))
+            executions.append(execution_of(compiled, plan, make_one_by_one(compiled, plan)))
         else:
-            executions.append(execution_of(bench, plan, next(outcomes)))
+            executions.append(execution_of(compiled, plan, next(outcomes)))
     return executions
 
 
@@ -252,7 +252,7 @@ class Subtask(NamedTuple):
     hit: bool
     iterations: int
     evaluations: int
-    """Without a look before the first movement, which :func:`execution_of` counts."""
+    """Without a check before the first movement, which :func:`execution_of` counts."""
 
 
 def has_path(plan: ByGoal) -> bool:
@@ -269,7 +269,7 @@ def slots_for(movements: list[Movement]) -> list[Movement | None]:
     return [None, *with_target] if movements[0].kind == "corrective" else [*with_target]
 
 
-def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
+def make_straight(compiled: CompiledTask, plans: list[ByGoal]) -> list[list[Subtask]]:
     """Make the movements of plans without paths side by side.
 
     Returns the results of the goals that were attempted, a list for each plan.
@@ -279,7 +279,7 @@ def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
     slots = [[slots_for(movements) for movements in plan] for plan in plans]
     most = max(len(each) for of_plan in slots for each in of_plan)
     hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
-    targets = np.empty((*hands.shape, most, bench.starts.shape[1]))
+    targets = np.empty((*hands.shape, most, compiled.starts.shape[1]))
     stops = np.empty(targets.shape[:3], dtype=np.bool_)
     targets[:], stops[:] = np.nan, True
     for n, of_plan in enumerate(slots):
@@ -288,7 +288,7 @@ def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
                 if movement is not None:
                     targets[n, g, m] = movement.target
                     stops[n, g, m] = movement.kind != "corrective"
-    reached = reach_all(bench, hands, targets, stops)
+    reached = reach_all(compiled, hands, targets, stops)
     names = ("hit", "ticks", "moved", "corrections", "iterations", "evaluations")
     hit, ticks, moved, corrections, iterations, evaluations = (
         getattr(reached, name).tolist() for name in names
@@ -316,18 +316,18 @@ def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
     return outcomes
 
 
-def make_one_by_one(bench: Bench, plan: ByGoal) -> list[Subtask]:
+def make_one_by_one(compiled: CompiledTask, plan: ByGoal) -> list[Subtask]:
     """Make the movements of a plan, of which some follow paths, one after the other.
 
     Returns the results of the goals that were attempted.
     """
-    task, model = bench.task, bench.model
-    subtasks, q = list[Subtask](), bench.starts[0]
+    task, model = compiled.task, compiled.model
+    subtasks, q = list[Subtask](), compiled.starts[0]
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
         hand, made = movements[0].hand, list[Movement]()
         where, iterations, evaluations = (hand, goal, task.radius), 0, 0
-        looks = movements[0].kind == "corrective"
-        hit = looks and move(task.robot, q, q, *where, model=model).hit
+        checks = movements[0].kind == "corrective"
+        hit = checks and move(task.robot, q, q, *where, model=model).hit
         for movement in [] if hit else [*movements, Movement(number, hand, "corrective")]:
             target, stops = movement.target, movement.kind != "corrective"
             if target is None:
@@ -351,7 +351,7 @@ def make_one_by_one(bench: Bench, plan: ByGoal) -> list[Subtask]:
     return subtasks
 
 
-def execution_of(bench: Bench, plan: ByGoal, subtasks: list[Subtask]) -> Execution:
+def execution_of(compiled: CompiledTask, plan: ByGoal, subtasks: list[Subtask]) -> Execution:
     """The execution of a plan, of whose goals these were attempted."""
     movements: list[Movement] = []
     hits: list[Array] = []
@@ -363,7 +363,7 @@ def execution_of(bench: Bench, plan: ByGoal, subtasks: list[Subtask]) -> Executi
             ticks += movement.ticks or 0
             corrections += movement.kind == "corrective"
         iterations += subtask.iterations
-        # And a look before the first movement, and one at where that leads.
+        # And a check before the first movement, and one at where that leads.
         evaluations += subtask.evaluations + 2
         if subtask.hit:
             hits.append(subtask.q)
@@ -371,8 +371,8 @@ def execution_of(bench: Bench, plan: ByGoal, subtasks: list[Subtask]) -> Executi
                 movements.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
     reason = ""
     if not subtask.hit:
-        task, where = bench.task, (hand, bench.task.goals[goal - 1])
-        why = explain_failure(task.robot, subtask.q, *where, task.locked_base, bench.model)
+        task, where = compiled.task, (hand, compiled.task.goals[goal - 1])
+        why = explain_failure(task.robot, subtask.q, *where, task.locked_base, compiled.model)
         reason = (
             f"goal {goal}: the corrective process did not converge with the {hand} hand in "
             f"{counted(subtask.iterations, 'iteration')}{why}"
@@ -428,10 +428,10 @@ def check_movement(task: Task, movement: Movement) -> Movement:
     if kind == "path":
         if waypoints is None or len(waypoints) == 0:
             raise SolutionError("a path needs waypoints")
-        way = np.array([check_point(task, point) for point in waypoints], dtype=np.float64)
+        path = np.array([check_point(task, point) for point in waypoints], dtype=np.float64)
         if target is not None and not np.array_equal(target, waypoints[-1]):
             raise SolutionError("a path's target is its last waypoint")
-        return replace(movement, target=way[-1], waypoints=way)
+        return replace(movement, target=path[-1], waypoints=path)
     if waypoints is not None:
         raise SolutionError(f"a {kind} movement has no waypoints")
     if target is not None:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.inputs import brief_value, real_array
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.motion.reach import Bench, reach_all
+from coartic.motion.reach import CompiledTask, reach_all
 from coartic.motion.solution import Movement, hold_base
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, check_hands, hands_of
@@ -49,7 +49,7 @@ class Trials(NamedTuple):
         return np.where(self.completed, -self.ticks, -np.inf)
 
 
-def trials_on(bench: Bench, hands: NDArray[np.int64], targets: Array) -> Trials:
+def trials_on(compiled: CompiledTask, hands: NDArray[np.int64], targets: Array) -> Trials:
     """Make N trials of a task that is checked, as nothing else is.
 
     ``hands`` has shape ``(N, G)``, indices into HANDS, ``targets`` ``(N, G, dof)``, in which joints
@@ -57,8 +57,8 @@ def trials_on(bench: Bench, hands: NDArray[np.int64], targets: Array) -> Trials:
     movement.
     """
     if (far := are_far(targets)) is not None:
-        return trials_but(far, bench, hands, targets)
-    reached = reach_all(bench, hands, targets[:, :, None])
+        return trials_but(far, compiled, hands, targets)
+    reached = reach_all(compiled, hands, targets[:, :, None])
     if not reached.hit.all():
         reached.q[~reached.hit] = np.nan
     return Trials(
@@ -81,10 +81,10 @@ def are_far(targets: Array) -> NDArray[np.bool_] | None:
 
 
 def trials_but(
-    far: NDArray[np.bool_], bench: Bench, hands: NDArray[np.int64], targets: Array
+    far: NDArray[np.bool_], compiled: CompiledTask, hands: NDArray[np.int64], targets: Array
 ) -> Trials:
     """Make all trials but those ``far`` ones, which fail without a movement."""
-    made = trials_on(bench, hands[~far], targets[~far])
+    made = trials_on(compiled, hands[~far], targets[~far])
     blank = (np.zeros((len(far), *each.shape[1:]), each.dtype) for each in made)
     trials = Trials._make(blank)._replace(targets=targets)
     trials.reached[far] = np.nan

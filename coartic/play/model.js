@@ -17,7 +17,7 @@ const PAPER = {
   step: 0.01, arrival_tolerance: 0.01, gain: 0.05, correction_tolerance: 0.01, max_iterations: 20000,
 };
 
-/* coartic/motion/setup.py; `task` is one of the package as plain data. */
+/* coartic/motion/robot_parameters.py; `task` is one of the package as plain data. */
 function problem_of(task, model = PAPER) {
   const { robot, goals, radius, start: { base, left, right } } = task;
   const arm = (first, links, [shoulder_x, shoulder_y]) => ({ first, links, shoulder_x, shoulder_y });
@@ -553,7 +553,7 @@ class Learner {
   }
 }
 
-/* coartic/baselines/random_search.py, `Guesses`: uniform targets in a box around the postures in which the corrective
+/* coartic/baselines/random_search.py, `RandomSearch`: uniform targets in a box around the postures in which the corrective
    process alone hits the goals with its best hands. The best trial is kept; nothing is learned. */
 class RandomSearch {
   constructor(problem, seed, half_width = 0.12) {
@@ -611,7 +611,7 @@ function project(problem, q, place, hand, joints, radius, tip) {
   return false;
 }
 
-const apart = (a, b) => Math.sqrt(a.reduce((square, value, j) => square + (value - b[j]) ** 2, 0));
+const distance_of = (a, b) => Math.sqrt(a.reduce((square, value, j) => square + (value - b[j]) ** 2, 0));
 
 /* The shortest joint-space path from `q` through goals `from` to `to` (excluded) with given hands, from
    guessed postures: a taut string whose corners slide on the discs. Null where it finds none. */
@@ -625,8 +625,8 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
     corners.forEach((here, k) => {
       const before = k ? corners[k - 1] : q;
       const after = corners[k + 1];
-      const w = 1 / (apart(here, before) + 1e-6);
-      const v = after ? 1 / (apart(here, after) + 1e-6) : 0;
+      const w = 1 / (distance_of(here, before) + 1e-6);
+      const v = after ? 1 / (distance_of(here, after) + 1e-6) : 0;
       const way = here.map((value, j) => (w * before[j] + (after ? v * after[j] : 0)) / (w + v) - value);
       const { dx, dy, distance, rows } = pull_of(problem, here, problem.goals[from + k], hands[k], joints);
       if (distance > radius - 1e-6) { // on the rim it slides along
@@ -636,13 +636,13 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
         if (share < 0) inward.forEach((value, i) => { way[joints[i]] -= share * value; });
       }
       const there = here.map((value, j) => value + strides[k] * way[j]);
-      const around = (corner) => apart(corner, before) + (after ? apart(corner, after) : 0);
+      const around = (corner) => distance_of(corner, before) + (after ? distance_of(corner, after) : 0);
       const shorter = project(problem, there, problem.goals[from + k], hands[k], joints, radius) && around(there) < around(here) - 1e-9;
       strides[k] = shorter ? Math.min(1, 1.5 * strides[k]) : strides[k] / 2;
       if (shorter) corners[k] = there;
     });
   }
-  const length = corners.reduce((sum, corner, k) => sum + apart(corner, k ? corners[k - 1] : q), 0);
+  const length = corners.reduce((sum, corner, k) => sum + distance_of(corner, k ? corners[k - 1] : q), 0);
   return { corners, length, hands };
 }
 
@@ -682,7 +682,7 @@ function receding_horizon(problem, horizon) {
       for (let k = 0; trial.going && k < followed; k += 1) {
         // Through the rim: the target lies beyond the corner, so that the movement ends with the first step inside.
         const corner = plan.corners[k];
-        const beyond = THROUGH / (apart(corner, trial.q) + 1e-9);
+        const beyond = THROUGH / (distance_of(corner, trial.q) + 1e-9);
         const target = corner.map((value, j) => value + beyond * (value - trial.q[j]));
         trial.reaches(goal + k, plan.hands[k], target);
       }

@@ -14,7 +14,7 @@ const ROLES = ["first", "second"];
 const NAMES = {
   alone: "one goal at a time", learner: "the learner", plan: "the planner", you: "you",
 };
-const RANDOM_SEARCH = "guesses"; // among stored runs
+const RANDOM_SEARCH = "random-search"; // among stored runs
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
 const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
@@ -23,12 +23,13 @@ const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, v
 const within = (place) => bounded(place).map((value) => Math.round(100 * value) / 100);
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-/* What the reader has chosen; all of it is in the link. `mate` moves the second robot where you move the first. `told`
+/* What the reader has chosen; all of it is in the link. `mate` moves the second robot where you move the first.
+   `announced`
    has the place from which a goal has just moved. Of `own` postures, each with its hand, one without joints is left to
    the robot. Before tick 0 the robots stand where they hit the goal they share, or you place yours. */
 const AT_FIRST = {
   open: 0, preset: 0, who: "learner", mate: "learner", reward: "whole", explores: "EC4", ahead: 1, goals: null,
-  others: null, told: null, trials: 0, tick: -1, own: null, edited: 1,
+  others: null, announced: null, trials: 0, tick: -1, own: null, edited: 1,
 };
 
 /* As text: goals=6,0.1;6,2&trials=300. A list of others that is empty is written as well. */
@@ -51,12 +52,12 @@ function read(link, first) {
   return state;
 }
 
-/* How far two samples of postures lie apart: their means, and how far these are apart, also in pooled standard
-   deviations; null without any spread. */
+/* Posture difference of two samples: their means and the distance of these, also in pooled standard deviations; null
+   where no runs differ. */
 function posture_difference(samples) {
   const means = samples.map((runs) => runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length));
-  const distance = apart(...means);
-  const squares = samples.reduce((sum, runs, k) => sum + runs.reduce((part, q) => part + apart(q, means[k]) ** 2, 0), 0);
+  const distance = distance_of(...means);
+  const squares = samples.reduce((sum, runs, k) => sum + runs.reduce((part, q) => part + distance_of(q, means[k]) ** 2, 0), 0);
   const [n, m] = samples.map((runs) => runs.length);
   const deviation = n > 1 && m > 1 ? Math.sqrt(squares / (n + m - 2)) : 0;
   return { means, distance, deviations: deviation ? distance / deviation : null, runs: Math.min(n, m) };
@@ -134,10 +135,10 @@ class Play {
   }
 
   /* Where a goal has just moved: its number, and the task as it was. */
-  get told() {
-    const { who, told, goals, others } = this.state;
-    if (!told || others || who !== "learner" || !this.moved) return null;
-    return { goal: this.moved, task: this.taskWith(goals.with(this.moved, told[0])) };
+  get announced() {
+    const { who, announced, goals, others } = this.state;
+    if (!announced || others || who !== "learner" || !this.moved) return null;
+    return { goal: this.moved, task: this.taskWith(goals.with(this.moved, announced[0])) };
   }
 
   /* Runs of a results folder, as long as nobody has changed the task. */
@@ -174,23 +175,23 @@ class Play {
     if (this.busy && this.held) return;
     this.stale = false;
     this.order += 1;
-    const { told } = this;
+    const { announced } = this;
     const jobs = [];
     const order = (key, task, job) => jobs.push({ key, task, trials: 1, turn: 1, ...job });
     const practise = (key, task, rules, turn) => {
-      for (let seed = 0; seed < (told ? 1 : SEEDS); seed += 1) {
+      for (let seed = 0; seed < (announced ? 1 : SEEDS); seed += 1) {
         order(`${key} ${seed}`, task, { rules, seed, trials: TRIALS, turn: turn || (seed && seed + 1) });
       }
     };
     this.tasks.forEach((task, k) => {
       const who = this.by(k);
       if (!this.alone[k].going || this.stored(who)) return; // or a goal is out of reach
-      if (who === "learner") practise(`${k} run`, told ? told.task : task, this.rules);
+      if (who === "learner") practise(`${k} run`, announced ? announced.task : task, this.rules);
       if (this.state.others && ["learner", "plan"].includes(this.state.who)) practise(`${k} random`, task, "random search", SEEDS + 1);
       if (who === "plan") order(`${k} plan`, task, { horizon: this.state.ahead, turn: 0 });
       else order(`${k} far`, task, { horizon: MOST_GOALS });
     });
-    if (told) order("0 before", told.task, { horizon: MOST_GOALS });
+    if (announced) order("0 before", announced.task, { horizon: MOST_GOALS });
     this.asked = new Map(jobs.map((job) => [job.key, JSON.stringify(job)]));
     // What is known need not be found again.
     this.fresh = new Set([...this.asked.keys()].filter((key) => {
@@ -228,7 +229,7 @@ class Play {
     return result ? result.snapshots.findLast((each) => each.trials <= trials) || null : null;
   }
 
-  /* What each run knows after the trials shown, of runs that have made them; the first may be on its way. */
+  /* What each run has learned after the trials shown, of runs that have made them; the first may be on its way. */
   practised(key) {
     const keys = Array.from({ length: SEEDS }, (_, seed) => `${key} ${seed}`);
     const there = keys.filter((each, seed) => this.fresh.has(each) && (this.results.get(each).done || (!seed && key.endsWith("run"))));
@@ -263,7 +264,7 @@ class Play {
       const trial = fits ? execute(problem, movements.filter((m) => m.goal < problem.goals.length)) : this.alone[k];
       return new Mover(problem, trial, ROLES[k]);
     });
-    const planned = this.told && this.fresh.has("0 far") && this.snapshot("0 far", Infinity);
+    const planned = this.announced && this.fresh.has("0 far") && this.snapshot("0 far", Infinity);
     if (planned) this.movers.push(new Mover(this.problems[0], execute(this.problems[0], planned.movements), "second"));
     const ghost = this.movers.length < 2 && this.state.who !== "alone";
     if (ghost) this.movers.unshift(new Mover(this.problems[0], this.alone[0], "ghost"));
@@ -277,7 +278,7 @@ class Play {
   /* ---- Time: both robots wait for each other at the goal they share, or that is before the moved one ---- */
 
   get shared() {
-    return this.told ? this.told.goal - 1 : 0;
+    return this.announced ? this.announced.goal - 1 : 0;
   }
 
   get main() {
@@ -402,10 +403,10 @@ class Play {
 
   /* Postures in which the robots hit the shared goal, of each run; where a goal has moved, before and after. */
   get postures_met() {
-    const { told, shared } = this;
+    const { announced, shared } = this;
     return this.main.map(({ trial }, k) => {
       const who = this.by(k);
-      if (told) {
+      if (announced) {
         const before = k ? this.snapshot("0 before", Infinity) : this.snapshot("0 run 0");
         return before ? [before.reached[shared], trial.reached[shared]] : [];
       }
@@ -414,14 +415,14 @@ class Play {
     }).map((runs) => runs.filter(Boolean));
   }
 
-  /* How far apart the robots hit the goal they share, in words and as a picture. */
+  /* Posture difference of the robots at the goal that they share, in words and as a picture. */
   compare() {
     const both = this.main.length > 1 ? this.postures_met : [];
     this.find("together").hidden = !both.length || !both.every((runs) => runs.length);
     [this.difference, this.by_chance] = [null, null];
     if (this.find("together").hidden) return;
-    this.difference = posture_difference(this.told ? both.map((runs) => runs.slice(1)) : both);
-    if (this.told) this.difference.shifts = both.map(([before, after]) => apart(before, after));
+    this.difference = posture_difference(this.announced ? both.map((runs) => runs.slice(1)) : both);
+    if (this.announced) this.difference.shifts = both.map(([before, after]) => distance_of(before, after));
     else {
       const stored = this.stored(RANDOM_SEARCH);
       const random = both.map((_, k) => (stored ? stored.films[k].reached : this.practised(`${k} random`).map(({ reached }) => reached[0])));
@@ -433,7 +434,7 @@ class Play {
     const points = both.flatMap((runs, k) => [...runs, means[k]].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
     const [x, y] = problem.goals[this.shared];
     inset.begin(around([...points, [x + 0.3, y + 0.2], ...means.map(([base_x, base_y]) => [base_x - 0.5, base_y - 0.1])], 0.3));
-    const thin = this.told ? " Thin: before the goal moved." : both.some((runs) => runs.length > 1) ? " Thin: single runs; thick: their mean." : "";
+    const thin = this.announced ? " Thin: before the goal moved." : both.some((runs) => runs.length > 1) ? " Thin: single runs; thick: their mean." : "";
     this.find("enlarged").textContent = `At goal ${this.shared + 1}, enlarged.${thin}`;
     both.forEach((runs, k) => {
       runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
@@ -445,7 +446,7 @@ class Play {
   /* Ticks needed against trials, on a logarithmic scale. */
   drawCurve() {
     const { curve, colours } = this;
-    const learns = this.state.who === "learner" && !this.told;
+    const learns = this.state.who === "learner" && !this.announced;
     this.find("learning").hidden = !learns;
     if (!learns) return;
     const runs_of = (k) => Array.from({ length: SEEDS }, (_, seed) => this.result(`${k} run ${seed}`)).filter(Boolean);
@@ -493,7 +494,7 @@ class Play {
     const box = ["The box stands", "The box slides on its rail", "The box slides"][free.filter(Boolean).length];
     let seen = `the robot hits ${goals.length > 1 ? `goals 1 to ${goals.length} in turn` : "goal 1"}${hands.length > 1 ? ", with either hand" : ""}.`;
     if (two) seen = "both robots hit goal 1; then blue goes for the blue goals, orange for the orange ones.";
-    if (this.told) seen = `goal ${this.told.goal + 1} has just moved. Blue is its next trial, orange a planner's.`;
+    if (this.announced) seen = `goal ${this.announced.goal + 1} has just moved. Blue is its next trial, orange a planner's.`;
     if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot, a posture for each goal.${two ? ` Orange: ${this.nameOf(mate)}.` : ""}`;
     return `${capital(this.nameOf(who))}: ${seen} ${box}, the joints turn.${this.editing ? "" : " Goals can be dragged."}`;
   }
@@ -504,13 +505,13 @@ class Play {
 
   /* What comes out, and what its words mean. */
   get finding() {
-    const { state, main, told, difference } = this;
+    const { state, main, announced, difference } = this;
     const missed = main.find((mover) => !mover.trial.going);
     if (missed) return [`Goal ${missed.trial.reached.length + 1} is out of the robot's reach.`];
     const far = "Distances are of box and joints together, in length units and radians.";
-    if (told) {
+    if (announced) {
       const [learner, planner] = difference && main.length > 1 ? difference.shifts.map(short) : ["…", "…"];
-      return [`At goal ${told.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner}.`, far];
+      return [`At goal ${announced.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner}.`, far];
     }
     if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) return ["You are as fast as the planner!"];
     if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
@@ -530,9 +531,9 @@ class Play {
     const { by_chance } = this;
     const beside = (value) => (by_chance ? ` (random search: ${value})` : "");
     if (distance < 0.005) return ["At goal 1 the two robots stand alike."];
-    if (deviations === null) return [`At goal 1 the robots' postures lie ${short(distance)} apart${beside(by_chance && short(by_chance.distance))}.`, far];
+    if (deviations === null) return [`At goal 1 the posture difference is ${short(distance)}${beside(by_chance && short(by_chance.distance))}.`, far];
     return [
-      `At goal 1 the robots' postures lie ${deviations.toFixed(1)} standard deviations apart${beside(by_chance && (by_chance.deviations || 0).toFixed(1))}.`,
+      `At goal 1 the posture difference is ${deviations.toFixed(1)} standard deviations${beside(by_chance && (by_chance.deviations || 0).toFixed(1))}.`,
       `One standard deviation is how far single runs lie from their mean (${runs} runs each). Random search keeps the best of as many random trials.`,
     ];
   }
@@ -542,7 +543,7 @@ class Play {
     const { state, main } = this;
     const you = state.who === "you";
     let names = you ? ["You", `Orange: ${this.nameOf(state.mate)}`] : ["Blue", "Orange"];
-    if (this.told) names = ["The learner's next trial", "The planner"];
+    if (this.announced) names = ["The learner's next trial", "The planner"];
     if (main.length < 2) names = [capital(this.nameOf(state.who))];
     const scores = main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
     if (main.length > 1 && !you) return scores;
@@ -688,7 +689,7 @@ class Play {
     const { state } = this;
     if (k) state.others = state.others.with(g - 1, within(to));
     else state.goals = state.goals.with(g, within(to));
-    Object.assign(state, { own: null, told: null });
+    Object.assign(state, { own: null, announced: null });
     this.ask();
   }
 
@@ -743,7 +744,7 @@ class Play {
   listen() {
     const on = (name, kind, act) => this.find(name).addEventListener(kind, act);
     const change = (name, value) => {
-      Object.assign(this.state, { [name]: value, told: null });
+      Object.assign(this.state, { [name]: value, announced: null });
       if (this.state.who === "you") [this.state.tick, this.playing] = [-1, false];
       this.ask();
       this.keep();
@@ -783,12 +784,12 @@ class Play {
       Object.assign(state, { own: null, edited: 1 });
       change("goals", state.goals);
     };
-    on("told", "click", () => {
+    on("announced", "click", () => {
       const { moved, state } = this;
       const [from, to] = state.goals.slice(moved - 1);
       const way = [to[0] - from[0], to[1] - from[1]];
       const length = Math.hypot(...way) || 1;
-      Object.assign(state, { goals: state.goals.with(moved, within([to[0] - way[1] / length, to[1] + way[0] / length])), others: null, told: [to], tick: -1 });
+      Object.assign(state, { goals: state.goals.with(moved, within([to[0] - way[1] / length, to[1] + way[0] / length])), others: null, announced: [to], tick: -1 });
       this.playing = false;
       this.ask();
       this.keep();
@@ -843,10 +844,10 @@ class Play {
     const { task, others = null } = this.preset;
     const most = Math.max(MOST_GOALS, task.goals.length);
     const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, most).map(within);
-    const [goals, second, told] = ["goals", "others", "told"].map(places);
+    const [goals, second, announced] = ["goals", "others", "announced"].map(places);
     state.goals = goals && goals.length ? goals : task.goals;
     state.others = second ? (second.length && state.goals.length > 1 ? second : null) : others;
-    state.told = told && told.length ? told : null;
+    state.announced = announced && announced.length ? announced : null;
     state.own = state.own && state.own.map(bounded);
     if (!(state.trials >= 1 && state.trials < TRIALS)) state.trials = 0;
     [state.tick, state.trials] = [state.tick, state.trials].map(Math.round);
@@ -882,9 +883,9 @@ class Play {
     this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores });
     ["who", "reward"].forEach((name) => this.find(name).querySelectorAll("input").forEach((input) => { input.checked = input.value === state[name]; }));
     this.find("two").checked = Boolean(others);
-    this.find("told").textContent = `Move goal ${this.moved + 1} now`;
+    this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
     const few = goals.length < 2;
-    this.set("disabled", { reset: !changed && !state.own, two: few, fewer: few, told: few, add: goals.length >= MOST_GOALS });
+    this.set("disabled", { reset: !changed && !state.own, two: few, fewer: few, announced: few, add: goals.length >= MOST_GOALS });
     this.set("hidden", {
       runs: !runs.length, "for-learner": who !== "learner", "for-two": who !== "learner" || one, "for-plan": who !== "plan",
       "for-you": who !== "you", "by-hand": one,

@@ -15,7 +15,7 @@ from pydantic import Field, TypeAdapter
 from coartic.inputs import MOST_RUNS
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.model import PAPER
-from coartic.runs.card import MethodCard
+from coartic.runs.method_info import MethodInfo
 from coartic.tasks.task import Task, parse_task
 
 SEARCH = "optimum/"
@@ -27,7 +27,7 @@ class Cell:
     """One method with parameters on one task."""
 
     task: Task
-    method: MethodCard
+    method: MethodInfo
     parameters: dict[str, Any] = field(default_factory=dict)
     """The parameters that the suite sets."""
     complete: dict[str, Any] = field(default_factory=dict)
@@ -70,7 +70,7 @@ now."""
 
 def dropped(method: str) -> dict[str, Any]:
     """Parameters of a method that earlier versions stored, and this version does not have."""
-    if method.startswith("nullspace-qp/"):
+    if method.startswith("posture-qp/"):
         return {"modelling": "none"}
     return _LEARNER_THEN if method.startswith(METHOD_PREFIX) else {}
 
@@ -91,7 +91,7 @@ class Specification:
     method: str
     code: str
     """Hash of the method's code."""
-    told: tuple[str, ...]
+    information: tuple[str, ...]
     parameters: dict[str, Any]
     """All parameters of the method."""
     trial_budget: int | None
@@ -129,7 +129,7 @@ class Specification:
             "parameters": json.dumps(self.parameters, ensure_ascii=False, sort_keys=True),
             "model": PAPER._asdict(),
             "trial_budget": self.trial_budget,
-            "told": ", ".join(self.told),
+            "information": ", ".join(self.information),
         }
 
     @classmethod
@@ -140,7 +140,7 @@ class Specification:
             task=parse_task(json.loads(row["definition"]), source),
             method=row["method"],
             code=row["code"],
-            told=tuple(filter(None, row["told"].split(", "))),
+            information=tuple(filter(None, row["information"].split(", "))),
             parameters=parameters_from(row["method"], row["parameters"]),
             trial_budget=row["trial_budget"],
         )
@@ -183,7 +183,7 @@ class Plan:
         return {cell.task.name: cell.task for cell in self.cells}
 
     @cached_property
-    def methods(self) -> dict[str, MethodCard]:
+    def methods(self) -> dict[str, MethodInfo]:
         """Methods by id."""
         return {cell.method.name: cell.method for cell in self.cells}
 
@@ -200,7 +200,7 @@ class Plan:
                 task=cell.task,
                 method=cell.method.name,
                 code=cell.method.code,
-                told=cell.method.told,
+                information=cell.method.information,
                 parameters=cell.complete,
                 trial_budget=self.trial_budget,
             )
@@ -210,7 +210,7 @@ class Plan:
     def to_rows(self) -> dict[str, list[dict[str, Any]]]:
         """Its rows by table; that of a cell has the row of its specification, not its number."""
         tasks = self.tasks.items()
-        names = [each.name for each in fields(MethodCard) if each.name != "where"]
+        names = [each.name for each in fields(MethodInfo) if each.name != "where"]
         return {
             "suite": [{"name": self.suite, **{name: getattr(self, name) for name in _OF_SUITE}}],
             "tasks": [{"name": name, "definition": t.model_dump(mode="json")} for name, t in tasks],
@@ -238,7 +238,9 @@ class Plan:
         methods = {
             row["name"]: {
                 **row,
-                **{name: json.loads(row[name]) for name in ("told", "secondary", "defaults")},
+                **{
+                    name: json.loads(row[name]) for name in ("information", "secondary", "defaults")
+                },
             }
             for row in rows["methods"]
         }

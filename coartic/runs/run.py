@@ -18,7 +18,7 @@ from coartic.errors import SolutionError
 from coartic.learner.run import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import PAPER
-from coartic.motion.reach import bench_of
+from coartic.motion.reach import compiled_task
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.runs.plan import Specification, run_seed
 from coartic.tasks.task import Task
@@ -54,7 +54,7 @@ RESULTS = {
     "time_limit_s": "REAL",
     "date": "TEXT NOT NULL",
     "environment": "INTEGER NOT NULL REFERENCES environments",
-    "used": "TEXT NOT NULL",  # what the method used of what it was told, comma-separated
+    "used": "TEXT NOT NULL",  # declared information that the method used, comma-separated
     "details": "TEXT NOT NULL",  # whatever the method keeps beside its solution, JSON
     "result": "TEXT NOT NULL",  # hash of status, solutions, rewards of all trials, bound
 }
@@ -164,11 +164,11 @@ class Run:
         return self.rewards.index(self.reward)
 
     @property
-    def is_thin(self) -> bool:
-        """Whether rewards of some trials are not kept (:meth:`thin`)."""
+    def is_downsampled(self) -> bool:
+        """Whether rewards of some trials are not kept (:meth:`downsample`)."""
         return self.meter is not None and self.rewards.count(None) > self.meter.failed_trials
 
-    def thin(self) -> Run:
+    def downsample(self) -> Run:
         """The run with the rewards of its best trial and of trials that were better than all before
         alone; the others are None. It takes a tenth of the room."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
@@ -293,7 +293,7 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
-    executions = iter(execute_many(bench_of(task, PAPER), short))
+    executions = iter(execute_many(compiled_task(task, PAPER), short))
     return [next(executions) if error is None else error for error in errors]
 
 

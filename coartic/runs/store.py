@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 3
-"""Raised when a table changes its meaning, or a table or a view its text. Formats 1, of versions
-1.0 and 1.1, and 2, of version 2.0, are read as well: see :data:`_EARLIER_VIEWS`."""
+FORMAT = 4
+"""Raised when a table changes its meaning, or a table or a view its text. Format 2 is that of
+version 2.0.0, 1 that of versions 1.0 and 1.1; their folders are refused."""
 _APPLICATION = 0x636F6172  # "coar"
 FAILED_TRIAL = -(2**31)
 """Stored in place of the reward of a trial that did not hit every goal."""
@@ -56,7 +56,7 @@ _DTYPES: dict[str, Any] = {
     },
     **dict.fromkeys(("suite", "task", "method", "setting", "hand", "kind"), "string"),
     **dict.fromkeys(("variant", "label"), "string"),  # of format 1
-    **dict.fromkeys(("told", "parameters", "commit", "code", "packages", "part"), "string"),
+    **dict.fromkeys(("information", "parameters", "commit", "code", "packages", "part"), "string"),
     **dict.fromkeys(("result_id", "order", "goal", "ticks"), "Int64"),
     "warm": "boolean",
 }
@@ -68,15 +68,15 @@ _SCHEMA = f"""
 CREATE TABLE suite (name TEXT, seed INTEGER, runs INTEGER, trials INTEGER, readings TEXT,
     time_limit_s REAL, trial_budget INTEGER, command TEXT, date TEXT, environment INTEGER);
 CREATE TABLE tasks (name TEXT PRIMARY KEY, definition TEXT NOT NULL);
-CREATE TABLE methods (name TEXT PRIMARY KEY, title TEXT, citation TEXT, told TEXT, secondary TEXT,
-    stochastic INTEGER, defaults TEXT, origin TEXT, code TEXT);
+CREATE TABLE methods (name TEXT PRIMARY KEY, title TEXT, citation TEXT, information TEXT,
+    secondary TEXT, stochastic INTEGER, defaults TEXT, origin TEXT, code TEXT);
 CREATE TABLE cells (position INTEGER PRIMARY KEY, setting INTEGER NOT NULL, variant TEXT NOT NULL,
     parameters TEXT NOT NULL, runs INTEGER NOT NULL);
 CREATE TABLE environments (id INTEGER PRIMARY KEY, content TEXT NOT NULL UNIQUE, commit_id TEXT,
     packages TEXT);
 CREATE TABLE settings (id INTEGER PRIMARY KEY, asked TEXT NOT NULL, code TEXT NOT NULL,
     task TEXT NOT NULL, definition TEXT NOT NULL, method TEXT NOT NULL, parameters TEXT NOT NULL,
-    model TEXT NOT NULL, trial_budget INTEGER, told TEXT NOT NULL, UNIQUE (asked, code));
+    model TEXT NOT NULL, trial_budget INTEGER, information TEXT NOT NULL, UNIQUE (asked, code));
 CREATE TABLE results (id INTEGER PRIMARY KEY,
     {", ".join(f"{name} {kind}" for name, kind in RESULTS.items() if name != "initial_trials")},
     UNIQUE (setting, suite_seed, run));
@@ -103,7 +103,7 @@ DROP VIEW IF EXISTS paths;
 CREATE VIEW runs AS SELECT run_id, (SELECT name FROM suite) AS suite, settings.task, method,
     variant AS setting,
     {", ".join(f"results.{name}" for name in _OWN if name != "run_id")},
-    settings.told, settings.parameters, commit_id AS "commit", settings.code, packages
+    settings.information, settings.parameters, commit_id AS "commit", settings.code, packages
     {_ASKED_FOR} JOIN environments ON environments.id = results.environment
     ORDER BY cells.position, results.run;
 CREATE VIEW solutions AS SELECT results.run_id, movements.* {_ASKED_FOR}
@@ -584,9 +584,14 @@ def has_tables(connection: sqlite3.Connection) -> bool:
         if there:
             raise CoarticError("it is not a file of coartic; move it away")
         return False
-    if version not in (*_EARLIER_VIEWS, FORMAT):
+    if version != FORMAT:
+        reads = {1: ", which version 1.1.0 reads", 2: ", which version 2.0.0 reads"}.get(
+            version, ""
+        )
         do = "update coartic" if version > FORMAT else "run the suite again with another --out"
-        raise CoarticError(f"it has format {version}; this version of coartic reads {FORMAT}: {do}")
+        raise CoarticError(
+            f"it has format {version}{reads}; this version of coartic reads {FORMAT}: {do}"
+        )
     with closing(sqlite3.connect(":memory:")) as ours:
         ours.executescript(_SCHEMA)
         columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]

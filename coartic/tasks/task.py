@@ -101,8 +101,8 @@ def address_of(name: str) -> Address | None:
 class Provenance(FileData):
     """Where a figure of a task comes from: the entry of a key in ``Task.provenance``."""
 
-    status: Literal["printed", "inferred", "chosen"]
-    """Printed in the paper, inferred from it, or chosen by the task's author."""
+    status: Literal["published", "inferred", "chosen"]
+    """Published in the paper, inferred from it, or chosen by the task's author."""
     source: Line
     """Place in the paper, or the person who chose it, in one line."""
 
@@ -200,7 +200,7 @@ class Task(FileData):
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
-        """Keys whose figures were inferred, not printed."""
+        """Keys whose figures were inferred, not published."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="before")

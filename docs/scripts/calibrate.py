@@ -1,8 +1,9 @@
 """How intervals and tests do where the truth is known: ``python docs/scripts/calibrate.py``.
 
-With a folder of many runs of guesses on ascending and descending, how often they pass as a
-signature of coarticulation: ``coartic run comparison --tasks ascending,descending --methods guesses
---runs 400 --out results/guesses``, then ``python docs/scripts/calibrate.py results/guesses``.
+With a folder of many runs of random search on ascending and descending, how often it passes as a
+signature of coarticulation: ``coartic run comparison --tasks ascending,descending --methods
+random-search --runs 400 --out results/random-search``, then ``python docs/scripts/calibrate.py
+results/random-search``.
 
 Samples like rewards are drawn, 500 times for each number of runs. Intervals at 95 % should
 hold the truth in 95 % of them; tests at 5 % should reject a true hypothesis in 5 % at most. The
@@ -19,11 +20,15 @@ import pandas as pd
 
 from coartic import estimates
 from coartic.analysis.claims import margins
-from coartic.analysis.methods import GUESSES
-from coartic.analysis.signatures.context_tests import beyond_p, context_dependence, permutation_p
+from coartic.analysis.methods import RANDOM_SEARCH
+from coartic.analysis.signatures.context_tests import (
+    beyond_p,
+    permutation_p,
+    standardised_posture_difference,
+)
 from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
-    difference_to_printed,
+    difference_to_published,
     share_test,
     sign_flip_test,
 )
@@ -64,8 +69,8 @@ def of_rewards(rng: np.random.Generator, draw: Draw, n: int, mean: float) -> dic
         "interval of paired differences (BCa)": holds(
             estimates.mean(a - b, resamples=RESAMPLES), 0
         ),
-        "interval to a printed mean (Welch)": holds(
-            difference_to_printed(a, float(b.mean()), sd, n), 0
+        "interval to a published mean (Welch)": holds(
+            difference_to_published(a, float(b.mean()), sd, n), 0
         ),
         "test of a mean (bootstrap)": bootstrap_test(a, mean, resamples=RESAMPLES).p <= LEVEL,
         "test of two means (bootstrap)": bootstrap_test(a, b, resamples=RESAMPLES).p <= LEVEL,
@@ -111,38 +116,46 @@ def rates() -> Iterator[tuple[str, str, int, float]]:
             yield from ((str(what), name, n, rate) for what, rate in seen.mean().items())
 
 
-STUDIES, GUESSES_RUNS = 200, 20
-"""Simulated studies, and runs of the method and of guesses in each."""
+STUDIES, RANDOM_SEARCH_RUNS = 200, 20
+"""Simulated studies, and runs of the method and of random search in each."""
 
 
-def rates_of_guesses(study: Study) -> Iterator[tuple[str, float]]:
-    """In what share of simulated studies guesses pass as a signature, by rule.
+def rates_of_random_search(study: Study) -> Iterator[tuple[str, float]]:
+    """In what share of simulated studies random search passes as a signature, by rule.
 
-    A study takes runs of guesses without replacement, half of them as a method's. By the rules
-    of the claims *context* and *first-movement-sacrificed*, each with and without guesses.
+    A study takes runs of random search without replacement, half of them as a method's. By the
+    rules of the claims *context* and *first-movement-sacrificed*, each with and without random
+    search.
     """
     tasks = ("ascending", "descending")
-    cells = [study.executed(task, GUESSES) for task in tasks]
+    cells = [study.executed(task, RANDOM_SEARCH) for task in tasks]
     shown = [cell.configurations[:, 0] for cell in cells]
     slower = [cell.against_same_hands[:, 0].astype(np.float64) for cell in cells]
     rng, passed = np.random.default_rng(0), []
     for _ in range(STUDIES):
-        picks = [rng.permutation(len(runs))[: 2 * GUESSES_RUNS] for runs in shown]
+        picks = [rng.permutation(len(runs))[: 2 * RANDOM_SEARCH_RUNS] for runs in shown]
         pairs = list(zip(shown, picks, strict=True))
-        method = pairs[0][0][pairs[0][1][:GUESSES_RUNS]], pairs[1][0][pairs[1][1][:GUESSES_RUNS]]
-        rest = pairs[0][0][pairs[0][1][GUESSES_RUNS:]], pairs[1][0][pairs[1][1][GUESSES_RUNS:]]
-        apart = context_dependence(*method) > margins.SPREAD
-        apart &= bool(permutation_p(*method, rng, resamples=RESAMPLES) < LEVEL)
+        method = (
+            pairs[0][0][pairs[0][1][:RANDOM_SEARCH_RUNS]],
+            pairs[1][0][pairs[1][1][:RANDOM_SEARCH_RUNS]],
+        )
+        rest = (
+            pairs[0][0][pairs[0][1][RANDOM_SEARCH_RUNS:]],
+            pairs[1][0][pairs[1][1][RANDOM_SEARCH_RUNS:]],
+        )
+        differ = standardised_posture_difference(*method) > margins.SPREAD
+        differ &= bool(permutation_p(*method, rng, resamples=RESAMPLES) < LEVEL)
         beyond = beyond_p(method, rest, rng, resamples=RESAMPLES) < LEVEL
         ticks = [
-            (t[p[:GUESSES_RUNS]], t[p[GUESSES_RUNS:]]) for t, p in zip(slower, picks, strict=True)
+            (t[p[:RANDOM_SEARCH_RUNS]], t[p[RANDOM_SEARCH_RUNS:]])
+            for t, p in zip(slower, picks, strict=True)
         ]
         first = [bootstrap_test(a, margins.TICKS, resamples=RESAMPLES).p < LEVEL for a, _ in ticks]
         more = [bootstrap_test(a, b, resamples=RESAMPLES).p < LEVEL for a, b in ticks]
         passed.append({
-            "context, without guesses": apart,
-            "context": apart and beyond,
-            "first movement, without guesses": all(first),
+            "context, without random search": differ,
+            "context": differ and beyond,
+            "first movement, without random search": all(first),
             "first movement": all(first) and all(more),
         })  # fmt: skip
     for rule, share in pd.DataFrame(passed).mean().items():
@@ -153,7 +166,7 @@ def main() -> None:
     """Print the rates in per cent, a row for each procedure and population."""
     if len(sys.argv) > 1:
         rates_by_rule = pd.DataFrame(
-            rates_of_guesses(load(sys.argv[1])), columns=["rule", "passes"]
+            rates_of_random_search(load(sys.argv[1])), columns=["rule", "passes"]
         )
         print(rates_by_rule.to_csv(index=False, float_format="%.3f"))
         return

@@ -23,15 +23,16 @@ import numpy as np
 
 from coartic import CONDITIONS, Objective, Task, execute, learn_many, load_task
 from coartic.baselines.cma_es import CMAES
-from coartic.baselines.random_search import Climbing, Guesses
+from coartic.baselines.hill_climbing import HillClimbing
+from coartic.baselines.random_search import RandomSearch
 from coartic.benchmarks.planning import plan_suite
 from coartic.gym import TaskEnv, TaskVectorEnv
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Method, Session
 from coartic.model import PAPER
-from coartic.motion.lanes import LANES
-from coartic.motion.reach import ALL_STOP, Requests, batch_for, bench_of, blank, reach_goals
+from coartic.motion.reach import ALL_STOP, Requests, batch_for, blank, compiled_task, reach_goals
+from coartic.motion.slots import SLOTS
 from coartic.motion.trials import hand_codes, movements_of
 from coartic.robot import Array
 
@@ -40,10 +41,10 @@ def main(*, is_long: bool = False) -> None:
     """Measure and print."""
     show_ways()
     warm_up(load_task("ascending"))
-    print(f"{'experiment':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
+    print(f"{'experiment':20}{'one run':>12}{f'{SLOTS} runs':>12}   microseconds of a core a trial")
     for cell in plan_suite("paper").cells:
         task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
-        alone, many = (_us_a_trial(task, condition, runs) for runs in (1, LANES))
+        alone, many = (_us_a_trial(task, condition, runs) for runs in (1, SLOTS))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
     show_methods()
     show_commands(is_long=is_long)
@@ -56,9 +57,12 @@ def show_ways() -> None:
     columns = [ways(load_task(name)) for name in tasks]
     heads = "".join(f"{name:>14}{'least':>8}{'most':>8}" for name in tasks)
     print(f"{'way':32}{heads}   CPU microseconds a trial, median")
-    for way in columns[0]:
-        times = [_us(*column[way]) for column in columns]
-        print(f"{way:32}" + "".join(f"{a:14.2f}{b:8.2f}{c:8.2f}" for a, b, c in times), flush=True)
+    for distance in columns[0]:
+        times = [_us(*column[distance]) for column in columns]
+        print(
+            f"{distance:32}" + "".join(f"{a:14.2f}{b:8.2f}{c:8.2f}" for a, b, c in times),
+            flush=True,
+        )
 
 
 def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
@@ -67,7 +71,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     They are around what CMA-ES finds, so that few goals are missed; those of the environments are
     others, around what the corrective process does, and count by their steps.
     """
-    session = Session(task, 0, CMAES.told)
+    session = Session(task, 0, CMAES.information)
     solution = CMAES(CMAES.Parameters(trials=3000)).solve(session).solution
     hands = "".join(movement.hand[0].upper() for movement in solution)
     best = np.array([movement.target for movement in solution])
@@ -75,12 +79,12 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     noise = 0.005 * np.random.default_rng(0).standard_normal((1000, *best.shape)) * cost.joints
     targets = best + noise
     points, solutions = targets[:100, cost.joints], [movements_of(hands, t) for t in targets[:100]]
-    bench, codes = bench_of(task, PAPER), hand_codes(task, hands, 1000)
+    compiled, codes = compiled_task(task, PAPER), hand_codes(task, hands, 1000)
 
     def arguments(targets: Array) -> tuple[Any, ...]:
         asked = targets[:, :, None].copy()
-        arms = Requests(bench.starts, codes[: len(targets)], asked, ALL_STOP, bench.goals)
-        return arms, bench.setup, blank(arms), batch_for(task.robot)
+        arms = Requests(compiled.starts, codes[: len(targets)], asked, ALL_STOP, compiled.goals)
+        return arms, compiled.robot_parameters, blank(arms), batch_for(task.robot)
 
     none, together, *alone = map(arguments, (targets[:0], targets, *targets[:100, None]))
     env, many = TaskEnv(task), TaskVectorEnv(1000, task)
@@ -132,7 +136,7 @@ def show_methods() -> None:
     included."""
     tasks = ("ascending", "two-armed-1")
     print(f"{'method':32}{tasks[0]:>12}{tasks[1]:>12}   microseconds of a core a trial")
-    for method in (CMAES, Climbing, Guesses):
+    for method in (CMAES, HillClimbing, RandomSearch):
         costs = [_us_of(method, load_task(name)) for name in tasks]
         print(f"{method.name:32}" + "".join(f"{us:12.1f}" for us in costs), flush=True)
 
@@ -140,7 +144,7 @@ def show_methods() -> None:
 def _us_of(method: type[Method], task: Task) -> float:
     parameters: Any = method.Parameters
     for trials in (500, TRIALS):  # the first time libraries are imported
-        session = Session(task, 0, method.told, trusted=True)
+        session = Session(task, 0, method.information, trusted=True)
         clock = time.thread_time()
         method(parameters(trials=trials)).solve(session)
     return (time.thread_time() - clock) / TRIALS * 1e6

@@ -24,8 +24,8 @@ from coartic.analysis import (
     write_study,
 )  # fmt: skip
 
-GUESSES = "guesses"
-"""The best of random guesses, which selects its solution and learns nothing."""
+RANDOM_SEARCH = "random-search"
+"""The best of random targets, which selects its solution and learns nothing."""
 KEYS = ["group", "counted", "dose"]
 MEASURES = {
     "nearer": "next goal nearer (ticks)",
@@ -42,22 +42,23 @@ GAIN = 1.0
 
 
 def measure_runs(study):
-    """Solved runs with what they learned, a row a run; those of guesses with what they selected.
+    """Solved runs with what they learned, a row a run; that of random search with what they
+    selected.
 
     ``group``: the family, or the task of the paper. ``counted``: the movements whose rewards count.
     ``dose``: the factor γ. ``kind``: both in words. What was learned is judged by the noiseless
     replay.
     """
-    guesses = study.runs.method == GUESSES
+    random_search = study.runs.method == RANDOM_SEARCH
     runs = study.runs.assign(
         group=study.runs.family.str.partition("/")[0].fillna(study.runs.task),
-        counted=study.runs.counted.fillna("guesses"),
+        counted=study.runs.counted.fillna("random search"),
         dose=study.runs.discount,
-        nearer=study.signature("arm", replay=True).where(~guesses, study.signature("arm")),
-        first=study.signature("first", replay=True).where(~guesses, study.signature("first")),
+        nearer=study.signature("arm", replay=True).where(~random_search, study.signature("arm")),
+        first=study.signature("first", replay=True).where(~random_search, study.signature("first")),
     )
-    reward = runs.replay_reward.where(~guesses, runs.reward)
-    initial = runs.groupby("task").initial_reward.transform("first")  # guesses have none
+    reward = runs.replay_reward.where(~random_search, runs.reward)
+    initial = runs.groupby("task").initial_reward.transform("first")  # random search has none
     runs["saved"] = (100 * (initial - reward) / initial).astype("Float64")
     of_dose = runs.dose.map(lambda dose: "" if np.isnan(dose) else f" {dose:g}")
     runs["kind"] = runs.counted + of_dose
@@ -74,25 +75,31 @@ def tabulate(study, runs):
     table = means(units, ["row", *KEYS], [*MEASURES]).set_index("row").drop(columns="rows")
     table.insert(3, "tasks", every.groupby("row").task.nunique())
     table.insert(4, "runs", every.groupby("row").size())
-    return table.join(tabulate_apart(study, runs))
+    return table.join(tabulate_posture_difference(study, runs))
 
 
-def tabulate_apart(study, runs):
-    """How far mean postures lie apart at the goal that two tasks of the paper share, by γ.
+def tabulate_posture_difference(study, runs):
+    """Posture difference at the goal that two tasks of the paper share, by γ.
 
-    ``apart``: the distance, length unit and rad mixed. ``apart_p``: of the permutation test that
-    there is none. ``beyond_p``: of that that it is no larger than that of guesses.
+    ``posture_difference``: length unit and rad mixed. ``posture_difference_p``: of the permutation
+    test that there is none. ``beyond_p``: of the test that it is no larger than in random search.
     """
-    guesses = TwoContexts(*(study.executed(task, GUESSES) for task in SHARED), 1, "right")
+    random_search = TwoContexts(
+        *(study.executed(task, RANDOM_SEARCH) for task in SHARED), 1, "right"
+    )
     rows = {}
     first = runs[runs.task == SHARED[0]].groupby("kind").first()
     labels = (first.method + " " + first.setting).str.strip()
     for kind, label in labels.items():
         learned = [study.executed(task, label, replay=True) for task in SHARED]
-        ours = guesses if label == GUESSES else TwoContexts(*learned, 1, "right")
-        beyond = np.nan if label == GUESSES else ours.p_beyond(guesses)
-        apart = {"apart": ours.apart, "apart_p": ours.p, "beyond_p": beyond}
-        rows[f"{SHARED[0]} {kind}"] = apart
+        ours = random_search if label == RANDOM_SEARCH else TwoContexts(*learned, 1, "right")
+        beyond = np.nan if label == RANDOM_SEARCH else ours.p_beyond(random_search)
+        posture_difference = {
+            "posture_difference": ours.posture_difference,
+            "posture_difference_p": ours.p,
+            "beyond_p": beyond,
+        }
+        rows[f"{SHARED[0]} {kind}"] = posture_difference
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
@@ -117,15 +124,15 @@ def judge_claims(study, runs):
         "dose-moves-postures": (
             "The reward of the whole task moves postures: where it counts in full, what is learned "
             "leaves the next goal nearer than where each movement counts by itself, and nearer "
-            "than guesses do.",
+            "than random search does.",
             "one-tailed bootstrap tests over random tasks, of noiseless replays: with γ = 1 "
             "postures of base and chosen arm leave the next goal nearer by more than 1 tick more "
-            "than with γ = 0, and nearer than those of guesses",
+            "than with γ = 0, and nearer than that of random search",
             all_of(
                 mean_beyond("With γ = 1 postures leave the next goal nearer by {} ticks more than "
                             "with γ = 0", nearer["all 1"] - nearer["all 0"], TICK),
-                mean_beyond("than those of guesses by {} ticks",
-                            nearer["all 1"] - nearer["guesses"]),
+                mean_beyond("than that of random search by {} ticks",
+                            nearer["all 1"] - nearer["random search"]),
             ),
         ),
         "dose-slows-first-movements": (
@@ -144,9 +151,9 @@ def judge_claims(study, runs):
             saves("all 1", "all 0"),
         ),
         "no-step-at-a-small-dose": (
-            "A little of the other movements' rewards does not do what the whole does: with γ = "
-            "0.1 learning saves less, and slows the first movement less, than half-way from each "
-            "by itself to the whole.",
+            "A little of the other movements' rewards does not do what the whole task's reward "
+            "does: with γ = 0.1 learning saves less, and slows the first movement less, than "
+            "half-way from each by itself to the whole task's reward.",
             "one-tailed bootstrap tests over random tasks, of noiseless replays: the mean of γ = 0 "
             "and γ = 1 less that of γ = 0.1 is above 0, of the ticks that are saved and of those "
             "by which the first movement is longer",
@@ -158,20 +165,21 @@ def judge_claims(study, runs):
             ),
         ),
         "half-a-dose-saves-less": (
-            "Half of the other movements' rewards (γ = 0.5) saves less than the whole.",
+            "Half of the other movements' rewards (γ = 0.5) saves less than the whole task's "
+            "reward.",
             f"{of_saved}with γ = 1 more than 1 point more than 0.5",
             saves("all 1", "all 0.5"),
         ),
         "three-quarters-suffice": (
-            "The whole is more than it takes: with γ = 0.75 learning saves as much, to a point of "
-            "the initial solution's ticks. This is against the paper, which calls the reward of "
-            "the whole crucial.",
+            "The whole task's reward is more than it takes: with γ = 0.75 learning saves as much, "
+            "to a point of the initial solution's ticks. This is against the paper, which calls "
+            "the whole task's reward crucial.",
             f"{of_saved}with γ = 0.75 less than 1 point less than with γ = 1",
             saves("all 0.75", "all 1", -GAIN),
         ),
         "earlier-movements-count": (
             "Earlier movements' rewards count as well: where each movement is credited with later "
-            "ones alone, in full, learning saves less than with the whole.",
+            "ones alone, in full, learning saves less than with the whole task's reward.",
             f"{of_saved}with γ = 1 more than 1 point more where all movements count than where "
             "later ones alone do",
             saves("all 1", "later 1"),
@@ -182,24 +190,28 @@ def judge_claims(study, runs):
 LOOKS = {
     "all": {"label": "all movements count", "color": figures.PALETTE[0]},
     "later": {"label": "later ones alone", "color": figures.PALETTE[1], "linestyle": "--"},
-    "guesses": {"label": "guesses", "color": figures.GREY, "linestyle": ":"},
+    "random search": {"label": "random search", "color": figures.GREY, "linestyle": ":"},
 }
 """How a line is called and drawn, by what counts."""
 
 
 @figures.styled
 def draw(table):
-    """The measures by γ on random tasks, and how far postures lie apart on the paper's."""
+    """The measures by γ on random tasks, and the posture difference on the paper's."""
     figure, panels = figures.panels((2, 2), (figures.TWO, 4.6))
-    for axes, name in zip(panels, [*MEASURES, "apart"], strict=True):
-        rows = table[table.apart.notna() if name == "apart" else table.group == "random"]
+    for axes, name in zip(panels, [*MEASURES, "posture_difference"], strict=True):
+        rows = table[
+            table.posture_difference.notna()
+            if name == "posture_difference"
+            else table.group == "random"
+        ]
         for counted, of_kind in rows.groupby("counted", sort=False):
-            if counted == "guesses":
+            if counted == "random search":
                 axes.axhline(of_kind[name].iloc[0], **LOOKS[counted])
             else:
                 places = of_kind.assign(dose=of_kind.dose + 0.01 * (counted == "later"))
                 figures.means(axes, places, x="dose", y=name, **LOOKS[counted])
-        axes.set_ylabel(MEASURES.get(name, "postures apart"))
+        axes.set_ylabel(MEASURES.get(name, "posture difference"))
         axes.set_xlabel("γ")
     figures.letters(panels)
     figures.legend(figure, panels[0].get_legend_handles_labels()[0], 3)

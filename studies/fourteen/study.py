@@ -33,7 +33,7 @@ from coartic.analysis import (
 PLANNER = "receding-horizon"
 OTHERS = [
     "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "cma-es/goal-by-goal",
-    "random-search/climbing", "guesses", "corrective-alone/given",
+    "hill-climbing", "random-search", "corrective-alone/given",
 ]  # fmt: skip
 ARMS = ["one arm", "two arms"]
 MANY = ["fourteen-one/v1", "fourteen-two/v1"]
@@ -43,7 +43,7 @@ FIRST = 28
 """Tasks with two arms that were planned first."""
 GAIN = 1.0
 """Per cent. The question is at which horizon a further goal gains less than this; it is also what
-counts as equivalent to a printed reward."""
+counts as equivalent to a published reward."""
 
 
 def measure_plans(study):

@@ -162,7 +162,7 @@ def hand_path(path, goal):
 
 
 def stations(places):
-    """Points at equal distances along a way, shape ``(STATIONS, 2)``."""
+    """Points at equal distances along a path, shape ``(STATIONS, 2)``."""
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     lengths = np.concatenate([[0.0], steps.cumsum()])
     at = np.linspace(0, lengths[-1], STATIONS)
@@ -175,7 +175,7 @@ def turn(first, second):
 
 
 def bows(runs, model):
-    """Bow of each way between two others, turn to the next, turn from the last (left positive)."""
+    """Bow of each path between two others, turn to the next, turn from the last (left positive)."""
     rows = unmoved(runs, model, arms=1).map(bows_of_path).explode()
     return pd.DataFrame([*rows], rows.index)
 
@@ -185,8 +185,8 @@ def bows_of_path(path):
     chords = np.diff([hand_path(path, 1)[0], *path.task.goal_array], axis=0)
     rows = []
     for k in range(1, len(chords) - 1):
-        way = stations(hand_path(path, k + 1))
-        chord, away = way[-1] - way[0], way - way[0]
+        points = stations(hand_path(path, k + 1))
+        chord, away = points[-1] - points[0], points - points[0]
         bow = (chord[0] * away[:, 1] - chord[1] * away[:, 0]) / np.linalg.norm(chord)
         rows.append([bow.mean(), turn(chords[k], chords[k + 1]), turn(chords[k - 1], chords[k])])
     return rows

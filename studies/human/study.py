@@ -34,8 +34,8 @@ MARKS = {
 def measure_effects(study):
     """A row for each finding, model and test, in their order.
 
-    ``value`` with its interval, of ``tasks``; ``over_guesses``: by how much it exceeds that of
-    guesses, where solutions are picked from trials; ``of_test``, the verdict of the test,
+    ``value`` with its interval, of ``tasks``; ``over_random_search``: by how much it exceeds that
+    of random search, where solutions are picked from trials; ``of_test``, the verdict of the test,
     and ``verdict``, that of the finding; ``built_in``: it follows from how the model is built;
     ``because``: why a model is silent, or does not agree though its interval is beyond the bound.
     """
@@ -76,15 +76,16 @@ def judge_test(measured, model, test, level, silent):
     elif tasks >= FEWEST_TASKS and agrees != disagrees:
         verdict = "agrees" if agrees else "disagrees"
     if tasks and model in GROUPS["picked from trials"]:
-        both = [values, measured(name, "guesses")]
+        both = [values, measured(name, "random search")]
         *over, common = bootstrap(both, statistic, level)
         exceeds = min(side * over[1], side * over[2]) > 0 and common >= FEWEST_TASKS
         if verdict == "agrees" and not exceeds:
-            verdict, because = "undecided", "it is not shown to exceed guesses"
+            verdict, because = "undecided", "it is not shown to exceed random search"
     return {
         "measure": name, "bound": f"{word} {bound:g}",
         "value": value, "value_low": low, "value_high": high, "tasks": tasks,
-        "over_guesses": over[0], "over_guesses_low": over[1], "over_guesses_high": over[2],
+        "over_random_search": over[0],
+        "over_random_search_low": over[1], "over_random_search_high": over[2],
         "of_test": verdict, "because": because,
     }  # fmt: skip
 

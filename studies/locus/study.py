@@ -22,15 +22,15 @@ from coartic import load_task
 from coartic.analysis import beyond_p, figures, load, write_study
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 
-GUESSES = "guesses"  # which methods that select one of their trials have to exceed
+RANDOM_SEARCH = "random-search"  # which methods that select one of their trials have to exceed
 SELECTS = ["dual-process/EC1", "cma-es/bandit"]
 DRAWN = {  # methods in the figure, and their names
     "dual-process/EC1": "learner",
-    "guesses": "guesses",
+    "random-search": "random search",
     "cma-es/bandit": "CMA-ES",
-    "nullspace-qp/next-goal": "null-space QP",
+    "posture-qp/goals-ahead": "posture QP",
     "posture-based/two-goals": "postures for two goals",
-    "trajectory-optimisation/squared-changes": "squared changes",
+    "trajectory-optimisation/squared-displacement": "minimum squared displacement",
 }
 HEIGHTS = np.array([-1.5, -1.0, -0.5, 0.0, 0.5, 1.0])
 WEIGHTS = (HEIGHTS - HEIGHTS.mean()) / ((HEIGHTS - HEIGHTS.mean()) ** 2).sum()
@@ -52,14 +52,14 @@ def tabulate(runs):
     """Means over runs of a method on a task, ticks more than the corrective process takes.
 
     ``first``: for the first movement. ``total``: for all of them. ``first_p``: of the two-sided
-    bootstrap test of ``first`` against guesses, for methods that select a trial.
+    bootstrap test of ``first`` against random search, for methods that select a trial.
     """
     groups = runs.assign(row=runs.task + " " + runs.method).groupby("row", sort=False)
     table = groups[["method", "moving", "by"]].first().assign(runs=groups.size())
     first = dict(list(groups["first"]))
     table["first"] = groups["first"].mean()
     table["first_p"] = [
-        bootstrap_test(first[row], first[row.replace(method, GUESSES)], "two-sided").p
+        bootstrap_test(first[row], first[row.replace(method, RANDOM_SEARCH)], "two-sided").p
         if method in SELECTS else np.nan for row, method in table.method.items()
     ]  # fmt: skip
     return table.assign(total=groups.total.mean())
@@ -94,18 +94,20 @@ def regress(postures):
 def tabulate_slopes(runs):
     """How the posture at a goal follows its neighbour that moves, as :func:`regress` measures it.
 
-    ``p_holm`` is corrected over the tests of a method; ``p_guesses`` is of the test that postures
-    follow the neighbour more than those of guesses.
+    ``p_holm`` is corrected over the tests of a method; ``p_random_search`` is of the test that
+    postures follow the neighbour more than in random search.
     """
     rows = {}
     for (goal, moving), method in product(BESIDE, runs.method.unique()):
         kind = "anticipatory" if goal < moving else "carry-over"
         row = {"method": method, "goal": goal, "moving": moving, "kind": kind}
-        ours, guesses = (configurations_at(runs, who, goal, moving) for who in (method, GUESSES))
+        ours, random_search = (
+            configurations_at(runs, who, goal, moving) for who in (method, RANDOM_SEARCH)
+        )
         row |= {"runs": sum(map(len, ours)), **regress(ours)}
         if method in SELECTS:
             rng = np.random.default_rng([0, goal, moving])
-            row["p_guesses"] = beyond_p(ours, guesses, rng, contrast=WEIGHTS)
+            row["p_random_search"] = beyond_p(ours, random_search, rng, contrast=WEIGHTS)
         rows[f"ascending {method} goal {goal} of {moving} right"] = row
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
     names, p_holm = load_task("ascending").robot.joint_names, table.groupby("method").p_holm

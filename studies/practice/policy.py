@@ -6,7 +6,7 @@ change, and the arm moves there. An agent that has not practised is the correcti
 robot is the same wherever it stands and in a mirror, the policy sees all from the arm.
 
 It practises on tasks of the family beside this file that no instance names, one trial each, with
-noise on its changes, and is told the ticks of each subtask. After each batch it becomes likelier to
+noise on its changes, and uses the ticks of each subtask. After each batch it becomes likelier to
 make the changes that were better than expected (proximal policy optimisation: Schulman et al. 2017;
 advantages: Schulman et al. 2016). What expects sees no more, but for the number of the goal. The
 policy is then applied to a task that it has not met, without noise, once.
@@ -18,10 +18,10 @@ Settings were found on tasks drawn for development: 40 runs of 100,000 or 200,00
 to two goals ahead, nine of 600,000 with none to four. SD of the noise at first 0.1 to 0.8, at last
 0.05 or 0.1; λ 0 to 0.9; γ 0.9 or 1; batches of 256 to 2048 trials, parts of 512 to 4096 subtasks;
 step sizes 0.001 to 0.004; 2 to 8 epochs; clips 0.2 or 0.4; 32, 64 or 128 units; changes that grow
-with the way to go, its root, or not. A baseline that knows the number of the goal, the mirror and
-changes that grow gained most; the last settings differed by half a per cent, and the second half of
-600,000 trials gained one. Deterministic policy gradients diverged. The family was chosen with
-them: in a wider region, where most of a trial is driving, the first ones gained 3 %.
+with the distance to go, its root, or not. A baseline that knows the number of the goal, the mirror
+and changes that grow gained most; the last settings differed by half a per cent, and the second
+half of 600,000 trials gained one. Deterministic policy gradients diverged. The family was chosen
+with them: in a wider region, where most of a trial is driving, the first ones gained 3 %.
 """
 
 import hashlib
@@ -85,7 +85,7 @@ class Practised(Method):
         "Jordan, P. Abbeel (2016). High-dimensional continuous control using generalized advantage "
         "estimation. ICLR."
     )
-    told = frozenset(
+    information = frozenset(
         map(Information, ("goals", "corrective process", "reward by trial", "reward by subtask"))
     )
     stochastic = False
@@ -166,10 +166,10 @@ def reach(q, goal, radius, model, target=None):
     Robots are moved so that they have one goal, for which the kernel is fast.
     """
     shift = np.pad(goal, ((0, 0), (0, q.shape[1] - BASE)))
-    hands, there, looks = np.full(len(q), RIGHT), np.zeros((len(q), 2)), target is not None
+    hands, there, checks = np.full(len(q), RIGHT), np.zeros((len(q), 2)), target is not None
     targets = None if target is None else target - shift
     reached = reach_unchecked(
-        ROBOT, q - shift, hands, there, radius, targets, looks=looks, model=model
+        ROBOT, q - shift, hands, there, radius, targets, checks=checks, model=model
     )
     return reached._replace(q=reached.q + shift, corrected=reached.corrected + shift)
 
@@ -195,15 +195,15 @@ def seen_from(axes, vectors):
 def observe(q, posture, goals, ahead):
     """What agents at ``q`` see, shape ``(N, 22 + 3 * ahead)``, wherever they stand or in a mirror.
 
-    The shape of the ``posture`` that hits the next goal, the way to it, and from the posture's
-    upper arm the goals ahead, each with 1, or zeros where there is none. ``goals``, shape
+    The shape of the ``posture`` that hits the next goal, the displacement to it, and from the
+    posture's upper arm the goals ahead, each with 1, or zeros where there is none. ``goals``, shape
     ``(N, W, 2)``, are the next one and those in view beyond it, as many as there are.
     """
-    (axes, side), next_goal, way = from_arm(posture), goals[:, 0], q - posture
+    (axes, side), next_goal, displacement = from_arm(posture), goals[:, 0], q - posture
     bends = directions(side * posture[:, BENDS]).reshape(len(q), -1)
     shoulder = posture[:, :BASE] + ROBOT.right_shoulder - next_goal
-    along = np.hstack([seen_from(axes, way[:, :BASE]), side * way[:, ARM]])
-    length = np.linalg.norm(way, axis=1)[:, None]
+    along = np.hstack([seen_from(axes, displacement[:, :BASE]), side * displacement[:, ARM]])
+    length = np.linalg.norm(displacement, axis=1)[:, None]
     parts = [bends, seen_from(axes, shoulder) / 2, along, length]
     parts += [np.log(length + 0.05), along / (length + 0.05)]
     for n in range(1, ahead + 1):

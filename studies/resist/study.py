@@ -1,4 +1,4 @@
-"""Do goals whose posture resists their neighbours also impose theirs?
+"""Resistance and aggressiveness of goals: are they correlated?
 
     coartic run studies/resist/suite.toml --family-file studies/resist/neighbours.v1.toml
     python studies/resist/study.py results/resist
@@ -19,8 +19,8 @@ LEARNER, ALONE = "dual-process/EC1", "corrective-alone/given"
 METHODS = {
     LEARNER: "learner EC1",
     ALONE: "corrective process alone",
-    "nullspace-qp/none": "null-space control, current goal",
-    "nullspace-qp/next-goal": "null-space control, next goal",
+    "posture-qp/current-goal": "posture QP, current goal",
+    "posture-qp/goals-ahead": "posture QP, goals ahead",
     "trajectory-optimisation/path-length": "shortest-path plan",
 }
 """Names of the methods: the learner, reactive control, and the planner of the shortest path."""
@@ -29,12 +29,12 @@ PLACES = 3
 SHUFFLES = 999
 """Orders of the slopes of a task by which chance is estimated."""
 TONGUES = 0.5
-"""Of rank correlations. Of tongues resistance and aggression are said to be highly positively
+"""Of rank correlations. Of tongues resistance and aggressiveness are said to be highly positively
 correlated, without a number in the abstract: half of a perfect correlation is little for that."""
 
 
 def measure_tasks(study):
-    """Resistance against aggression: a row for each method on each task whose goals were moved.
+    """Resistance against aggressiveness: a row for each method on each task whose goals were moved.
 
     ``carried`` and ``ahead``: mean slopes of postures on the goals before and after them. ``rho``:
     rank correlation over inner goals. ``chance``: its mean where the slopes are in any order.
@@ -88,14 +88,14 @@ def slope_sizes(postures, places):
 
 
 def correlate(carried, ahead):
-    """Rank correlation of resistance and aggression over the inner goals, of rows of slopes.
+    """Rank correlation of resistance and aggressiveness over the inner goals, of rows of slopes.
 
     A goal's resistance is minus the mean slope of its posture on its neighbours' places, its
-    aggression the mean slope of its neighbours' postures on its own.
+    aggressiveness the mean slope of its neighbours' postures on its own.
     """
     resistance = pd.DataFrame(-(carried[:, :-1] + ahead[:, 1:]) / 2)
-    aggression = pd.DataFrame((carried[:, 1:] + ahead[:, :-1]) / 2)
-    return resistance.rank(axis=1).corrwith(aggression.rank(axis=1), axis=1)
+    aggressiveness = pd.DataFrame((carried[:, 1:] + ahead[:, :-1]) / 2)
+    return resistance.rank(axis=1).corrwith(aggressiveness.rank(axis=1), axis=1)
 
 
 def correlate_by_chance(carried, ahead):
@@ -106,7 +106,8 @@ def correlate_by_chance(carried, ahead):
 
 
 def tabulate(tasks):
-    """Whether goals that resist also impose: means over tasks, of all and by links and base."""
+    """Correlation of resistance and aggressiveness: means over tasks, of all and by links and
+    base."""
     tasks = tasks.sort_values(
         "method", key=lambda names: names.map([*METHODS].index), kind="stable"
     )
@@ -127,24 +128,24 @@ def judge_claims(tasks):
 
     test = (
         "one-tailed bootstrap tests over random tasks of the rank correlation of resistance and "
-        "aggression over inner goals, less that of the same slopes in any order: below "
+        "aggressiveness over inner goals, less that of the same slopes in any order: below "
     )
     return judge({
-        "learner-yields-where-it-imposes": (
-            "In what the learner learns, goals that impose their posture on their neighbours also "
-            "yield to them: resistance and aggression are less correlated than by chance. Of "
-            "tongues it is said that they are highly positively correlated.",
+        "learner-aggressiveness-without-resistance": (
+            "In what the learner learns, goals with high aggressiveness have low resistance: the "
+            "two are less correlated than by chance. Of tongues it is said that they are highly "
+            "positively correlated.",
             f"{test}0 for the learner, by replays",
             below(LEARNER),
         ),
-        "reaction-yields-where-it-imposes": (
-            "So it is where nothing is learned or planned: resistance and aggression are less "
+        "reaction-aggressiveness-without-resistance": (
+            "So it is where nothing is learned or planned: resistance and aggressiveness are less "
             "correlated than by chance in the corrective process alone.",
             f"{test}0 for the corrective process",
             below(ALONE),
         ),
         "not-as-in-tongues": (
-            "In no method are resistance and aggression correlated as they are said to be in "
+            "In no method are resistance and aggressiveness correlated as they are said to be in "
             "tongues: not in the learner, nor in the planner of the shortest path, nor in reactive "
             "control.",
             f"{test}{TONGUES:g} for every method",

@@ -1,4 +1,4 @@
-"""The protocols of the study: models of people practise, are told, and are measured.
+"""The protocols of the study: models of people practise, are informed, and are measured.
 
     python studies/tell-apart/protocols.py [SPLIT] [FOLDER]
 
@@ -26,8 +26,8 @@ from coartic import (
     parse_task,
 )
 from coartic.baselines.evolution import EvolutionStrategy
-from coartic.baselines.nullspace_qp import NextGoal, NullspaceQP
 from coartic.baselines.posture_based import TwoGoals
+from coartic.baselines.posture_qp import GoalsAhead, PostureQP
 from coartic.baselines.receding_horizon import RecedingHorizon
 from coartic.method import Information, Session
 
@@ -91,7 +91,7 @@ def look(task, movements):
 
 def plan(task, method, seed=0, **parameters):
     """What a planner or controller of the package does."""
-    session = Session(task, seed, method.told, trusted=True)
+    session = Session(task, seed, method.information, trusted=True)
     return look(task, method(method.Parameters(**parameters)).solve(session).solution)
 
 
@@ -101,7 +101,7 @@ def learned(task, seed, start):
     return [look(task, run.solution) for run in runs]
 
 
-def told_next(before, task, q, hands, g, movements):
+def informed_next(before, task, q, hands, g, movements):
     """Movements in which the posture at goal ``g`` is corrected for the goal after it.
 
     The corrective process finds from the posture how the robot would hit the next goal, before
@@ -116,8 +116,8 @@ def told_next(before, task, q, hands, g, movements):
     shift -= process(q, hands[g + 1], before.goals[g + 1])
     back = process(q + shift / 2, hands[g], task.goals[g]) - process(q, hands[g], task.goals[g])
     first = next(n for n, movement in enumerate(movements) if movement.goal == g + 1)
-    told = Movement(g + 1, hands[g], "learned", q + back)
-    return [*movements[:first], told, *(m for m in movements[first:] if m.goal != g + 1)]
+    informed = Movement(g + 1, hands[g], "learned", q + back)
+    return [*movements[:first], informed, *(m for m in movements[first:] if m.goal != g + 1)]
 
 
 def evolve(cost, point, rng):
@@ -161,8 +161,8 @@ PLANNERS = {
         task, RecedingHorizon, horizon=len(task.goals) - 1, **EFFORT
     ),
     "planner, next goal": lambda task: plan(task, TwoGoals),
-    "control, next goal": lambda task: plan(task, NextGoal),
-    "control, this goal": lambda task: plan(task, NullspaceQP),
+    "control, next goal": lambda task: plan(task, GoalsAhead),
+    "control, this goal": lambda task: plan(task, PostureQP),
 }
 
 
@@ -212,8 +212,8 @@ def change_goals(task, seed):
             anew=np.mean([np.sum((q[g] - seen[-1][0][g]) ** 2) for q in (one, other)]),
             ticks_anew=(ticks + more) / 2,
         )  # fmt: skip
-        told = told_next(task, after, before[g], hands, g, practised)
-        yield row("learner, told", before, learned(after, 10 * seed + 1, told))
+        informed = informed_next(task, after, before[g], hands, g, practised)
+        yield row("learner, informed", before, learned(after, 10 * seed + 1, informed))
         cost = objective(after, cost.hands)
         best = evolve(cost, point, np.random.default_rng(10 * seed + 1))
         yield row("CMA-ES", evolved, [hit(after, cost, point) for point in best])

@@ -38,7 +38,7 @@ def share_by_task(changes):
         **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
         drift=shares["same"] / shares.square, from_anew=np.log10(shares.anew / shares.among) / 2,
         first=(shares.ticks_1 - shares.ticks_10000) / shares.cases,
-        behind=100 * (shares.ticks_10000 / shares.ticks_anew - 1),
+        gap=100 * (shares.ticks_10000 / shares.ticks_anew - 1),
     )  # fmt: skip
 
 
@@ -46,7 +46,7 @@ def tabulate(changes, starts, steps):
     """Means over tasks with intervals, a row for each measure of a model."""
     shares = share_by_task(changes)
     columns = [*(f"share_{n}" for n in AFTER), "shift", "half", "drift", "from_anew", "first",
-               "behind"]  # fmt: skip
+               "gap"]  # fmt: skip
     tables = [means(shares, ["distance", "model"], columns)]
     starts = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
     tables.append(means(starts, ["model", "trials"], ["ratio"]))
@@ -81,12 +81,12 @@ def judge_claims(changes, starts, steps):
             rule + "the shift of as much practice without a change, projected, below 0.5",
             mean_beyond("The share is {}", shares["drift"]["learner"], HALF, "less"),
         ),
-        "told-learner-between": (
-            "A learner whose corrective process is told the next goal shifts in part at once.",
+        "informed-learner-between": (
+            "A learner whose corrective process uses the next goal shifts in part at once.",
             rule + "share at once above 0.1 and below 0.9",
             all_of(
-                mean_beyond("The share is {}", shares["share_1"]["learner, told"], 0.1),
-                mean_beyond("it is {}", shares["share_1"]["learner, told"], 0.9, "less"),
+                mean_beyond("The share is {}", shares["share_1"]["learner, informed"], 0.1),
+                mean_beyond("it is {}", shares["share_1"]["learner, informed"], 0.9, "less"),
             ),
         ),
         "planner-shift-is-seen": (
@@ -103,7 +103,7 @@ def judge_claims(changes, starts, steps):
         "learner-ends-as-well": (
             "It ends as well in ticks.",
             rule + "less than 2 % more ticks than learning anew",
-            mean_beyond("It needs {} % more", shares["behind"]["learner"], 2, "less"),
+            mean_beyond("It needs {} % more", shares["gap"]["learner"], 2, "less"),
         ),
         "starts-keep-learners-apart": (
             "Learners who practised from different starts stay apart when tested from a third, and "
@@ -142,8 +142,8 @@ def people_needed(learner, planner, noise, items, planned, rng):
     """Fewest people of whom 90 % of experiments tell what they are; NaN beyond 200.
 
     A person's score is the mean over ``items``, of which a share is ``planned``: the planner's
-    score or the learner's, with a ``noise`` (SD) each. All learners, or all planners, are told if a
-    one-tailed test rejects half-way between; a mixture if tests reject both.
+    score or the learner's, with a ``noise`` (SD) each. All learners, or all planners, are
+    distinguished if a one-tailed test rejects half-way between; a mixture if tests reject both.
     """
     middle = (learner + planner) / 2
     nulls = {0: [middle], 1: [middle]}.get(planned, [learner, planner])
@@ -197,7 +197,7 @@ def draw(table):
     blue, _, _, red, _, sky = figures.PALETTE
     for model, words, color, up in (
         ("planner, all goals", "planner: all of it at once", blue, 0.05),
-        ("learner, told", "learner whose corrective process\nis told the next goal", sky, 0.25),
+        ("learner, informed", "learner whose corrective process\nuses the next goal", sky, 0.25),
         ("learner", "learner by trial and error: none of it at once", red, -0.09),
     ):
         row = table.loc[f"change 0.5 {model}"]

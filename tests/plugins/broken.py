@@ -25,7 +25,7 @@ class Good(Method):
     name = "test/good"
     title = "Keeps every law"
     citation = "None (2026)."
-    told = CORRECTIVE
+    information = CORRECTIVE
 
     def solve(self, session):
         return Result(by_correction(session))
@@ -76,7 +76,7 @@ class Remembers(Good):
 
 class Spendthrift(Good):
     name = "test/spendthrift"
-    told = CORRECTIVE | {Information.REWARD_BY_TRIAL}
+    information = CORRECTIVE | {Information.REWARD_BY_TRIAL}
 
     def solve(self, session):
         solution = by_correction(session)
@@ -95,7 +95,7 @@ class Peeks(Good):
 
 class Overdeclares(Good):
     name = "test/overdeclares"
-    told = CORRECTIVE | {Information.JACOBIAN}
+    information = CORRECTIVE | {Information.JACOBIAN}
 
 
 class Unhelpful(Good):
@@ -113,14 +113,14 @@ class Taker(Good):
     name = "test/taker"
 
     def solve(self, session):
-        return Result((), {"goals": len(session.hand_over(Information.CORRECTIVE_PROCESS).goals)})
+        return Result((), {"goals": len(session.reveal(Information.CORRECTIVE_PROCESS).goals)})
 
 
 class Freeloader(Good):
     """Has the corrective process do the work without declaring it."""
 
     name = "test/freeloader"
-    told = frozenset()
+    information = frozenset()
 
     def solve(self, session):
         hand = session.hands[-1]
@@ -132,7 +132,7 @@ class Forger(Good):
     """Writes into what it is shown."""
 
     name = "test/forger"
-    told = CORRECTIVE | {Information.REWARD_BY_TRIAL}
+    information = CORRECTIVE | {Information.REWARD_BY_TRIAL}
 
     def solve(self, session):
         solution = by_correction(session)

@@ -8,7 +8,7 @@ import pandas as pd
 from coartic import load_task
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
-from coartic.runs.card import MethodCard
+from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Cell, Plan
 
 MADE_WITH = {
@@ -47,7 +47,7 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
     return {
         "task": task, "method": method, "setting": "", "run": run, "status": status,
         "run_id": f"{method}-{run}", "reason": "", "reward": reward, "hands": "LRLR",
-        "told": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
+        "information": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
         "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
         "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
         "warm": run > 0, "together": 1,
@@ -59,7 +59,7 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
 def declared(method):
     """What a made-up method declares; planners are not stochastic."""
     stochastic = not method.startswith(("trajectory-optimisation", "corrective-alone"))
-    return MethodCard(method, method, "", (), (), stochastic, {}, "built in", "")
+    return MethodInfo(method, method, "", (), (), stochastic, {}, "built in", "")
 
 
 def plan_for(tasks, runs=None):

@@ -1,4 +1,4 @@
-"""The model as the paper prints it, in plain NumPy: slow and obvious.
+"""The model as the paper publishes it, in plain NumPy: slow and obvious.
 
 Movements are those of :mod:`analysis.verify`. Corrective process, execution and learner share the
 robot's formulas with the package and nothing of its kernels, which are tested against them; only a

@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from coartic import PAPER, Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
 from coartic.method import Session
-from coartic.optimisers import TOLD
+from coartic.optimisers import OPTIMISER_INFORMATION
 from coartic.tasks.optima import entries
 
 PAPER_CELLS = [
@@ -81,14 +81,14 @@ def sample(task, count, noise=0.3, seed=0):
 
 def solve(method, task, seed=0, **parameters):
     """What a method of this project finds, the execution of it, and the session."""
-    session = Session(task, seed, method.told, trusted=True)
+    session = Session(task, seed, method.information, trusted=True)
     result = method(method.Parameters(**parameters)).solve(session)
     return result, execute(task, result.solution), session
 
 
 def make_trials(task, hands, targets, model=PAPER):
     """Trials in a session of their own."""
-    return Session(task, 0, TOLD, model=model).trials(hands, targets)
+    return Session(task, 0, OPTIMISER_INFORMATION, model=model).trials(hands, targets)
 
 
 def shipped_optima():

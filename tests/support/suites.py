@@ -109,7 +109,7 @@ def traced_cells():
             ("ascending", ["dual-process/EC1", "trajectory-optimisation/path-length"]),
             ("descending", ["dual-process/EC1", "corrective-alone/given"]),
             ("two-armed-1", ["dual-process/EC3", "dual-process/EC4", "corrective-alone/given",
-                             "random-search/climbing"]),
+                             "hill-climbing"]),
         )
         for method in methods
     ]  # fmt: skip

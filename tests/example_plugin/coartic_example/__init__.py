@@ -14,7 +14,7 @@ class NearestHand(Method):
     name = "nearest-hand"
     title = "Corrective process with the nearest hand"
     citation = "An example of this package."
-    told = frozenset(
+    information = frozenset(
         {
             Information.GOALS,
             Information.FORWARD_KINEMATICS,

@@ -109,7 +109,7 @@ def test_the_slope_is_that_of_the_clipped_objective():
 @pytest.mark.parametrize("name", ["eight/v1/d000", "eight/v1/d001"])
 def test_the_trial_is_that_of_a_plain_loop(name):
     task = instance_of(read_family(practice.FAMILY), address_of(name))
-    session, total, q = Session(task, 0, practice.Practised.told), 0, np.array(task.q0)
+    session, total, q = Session(task, 0, practice.Practised.information), 0, np.array(task.q0)
     method = practice.Practised(practice.PracticeParameters(practice=TRIALS, agent=3))
     result, policy = method.solve(session), practice.recall(1, 3, TRIALS, PAPER)
     for number, goal in enumerate(task.goals):

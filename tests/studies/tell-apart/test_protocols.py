@@ -39,7 +39,7 @@ def test_tables_and_figure_of_some_of_the_tasks(study, monkeypatch):
     shares = tables["results"].share_1
     assert shares["change 0.5 planner, all goals"] == 1
     assert shares["change 0.5 learner"] == 0
-    assert abs(shares["change 0.5 learner, told"]) < 0.9
+    assert abs(shares["change 0.5 learner, informed"]) < 0.9
     assert len(tables["claims"]) == 9
     needed = tables["power"].people_learners  # where the models differ by nothing, nobody tells
     assert not needed["step same"] < 100
@@ -79,14 +79,14 @@ def test_share_at_once_by_other_code(protocols, monkeypatch, name):
         learner = [row for row in rows if row["model"] == "learner"][n]
         assert (first - before) @ (end - before) == 0.0 == learner["dot_1"]
         assert np.sum((end - before) ** 2) == pytest.approx(learner["square"], rel=1e-6)
-        # Told: half of the change of where the corrective process would go, brought back.
+        # Informed: half of the change of where the corrective process would go, brought back.
         hand, following = hands[g : g + 2]
         way = corrected(after, before, following, g + 1) - corrected(task, before, following, g + 1)
         way = corrected(task, before + way / 2, hand, g) - corrected(task, before, hand, g)
         parts = [m for m in practised.solution if m.goal <= g], [m for m in practised.solution
                                                                  if m.goal > g + 1]  # fmt: skip
-        told = [*parts[0], Movement(g + 1, hand, "learned", before + way), *parts[1]]
-        run = learn(after, practised.condition, seed=1, trials=300, start=told)
-        first, end = (execute(after, movements).hits[g] for movements in (told, run.solution))
-        row = [row for row in rows if row["model"] == "learner, told"][n]
+        informed = [*parts[0], Movement(g + 1, hand, "learned", before + way), *parts[1]]
+        run = learn(after, practised.condition, seed=1, trials=300, start=informed)
+        first, end = (execute(after, movements).hits[g] for movements in (informed, run.solution))
+        row = [row for row in rows if row["model"] == "learner, informed"][n]
         assert (first - before) @ (end - before) == pytest.approx(row["dot_1"], abs=1e-6)

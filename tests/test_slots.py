@@ -8,7 +8,7 @@ import pytest
 from coartic import PAPER, MotionModel, learn, learn_many, load_task
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import fail
-from coartic.motion.lanes import LANES
+from coartic.motion.slots import SLOTS
 from tests.support.suites import KNOWN, InProcess, run_and_write
 
 SOON_FAILED = MotionModel(max_iterations=60)
@@ -42,7 +42,7 @@ def assert_same(a, b):
 )
 def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
     task = load_task(task)
-    seeds = [*range(LANES), 17, *range(LANES, LANES + 3)]  # more than there are lanes, one twice
+    seeds = [*range(SLOTS), 17, *range(SLOTS, SLOTS + 3)]  # more than there are slots, one twice
     for trials in (1, 25):
         options = {"trials": trials, "model": model}
         together = learn_many(task, condition, seeds=seeds, jobs=1, **options)
@@ -50,7 +50,7 @@ def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
         some = learn_many(task, condition, seeds=seeds[::-7], jobs=2, **options)
         for run, same in zip(together[::-7], some, strict=True):
             assert_same(run, same)
-        for run in together[5 :: LANES // 3]:
+        for run in together[5 :: SLOTS // 3]:
             assert_same(run, learn(task, condition, seed=run.seed, **options))
     if model is SOON_FAILED:
         assert any(run.counters.failed_trials for run in together)
@@ -72,11 +72,11 @@ ALONE = Cell(load_task("ascending"), KNOWN["corrective-alone/given"])
 def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
     tables = []
     for number, executor in enumerate((InProcess(), Nobody())):
-        options = {"runs": LANES + 2, "trials": 3, "executor": executor}
+        options = {"runs": SLOTS + 2, "trials": 3, "executor": executor}
         tables.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
     assert (tables[0].status == "ok").all()
     assert tables[0].result.tolist() == tables[1].result.tolist()
-    assert [set(runs.together) for runs in tables] == [{1, 2, LANES}, {1}]
+    assert [set(runs.together) for runs in tables] == [{1, 2, SLOTS}, {1}]
 
 
 class Forges(InProcess):
@@ -84,7 +84,7 @@ class Forges(InProcess):
 
     def perform(self, jobs):
         for job, outcomes in super().perform(jobs):
-            if len(outcomes) == LANES:
+            if len(outcomes) == SLOTS:
                 fifth, seventh = (outcomes[run].parts["solution"] for run in (5, 7))
                 fifth[0] = replace(fifth[0], target=fifth[0].target[1:])
                 seventh.pop()
@@ -94,7 +94,7 @@ class Forges(InProcess):
 def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):
     """Of runs side by side each is executed by itself; those alone are performed again."""
     forged, honest = (
-        run_and_write(tmp_path / each.__name__, [LEARNER], runs=LANES, trials=3, executor=each())
+        run_and_write(tmp_path / each.__name__, [LEARNER], runs=SLOTS, trials=3, executor=each())
         for each in (Forges, InProcess)
     )
     assert forged.runs.result.tolist() == honest.runs.result.tolist()

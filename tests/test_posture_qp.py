@@ -8,13 +8,13 @@ from scipy.optimize import minimize
 
 from coartic import PAPER, Robot, execute, load_task
 from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade
-from coartic.baselines.nullspace_qp import (
+from coartic.baselines.posture_qp import (
     FACES,
     METHODS,
     Aim,
     Controller,
-    NextGoal,
-    NullspaceQP,
+    GoalsAhead,
+    PostureQP,
 )
 from coartic.method import MethodError, Session, outline_of
 from coartic.robot import directions
@@ -72,7 +72,7 @@ def test_a_failed_solve_is_an_outcome():
 
 
 @pytest.mark.parametrize(
-    ("method", "name"), [(NextGoal, "two-armed-2"), (NullspaceQP, "two-armed-1")]
+    ("method", "name"), [(GoalsAhead, "two-armed-2"), (PostureQP, "two-armed-1")]
 )
 def test_solutions_keep_the_rules(method, name):
     """Steps within m, locks kept, every goal hit without correction."""
@@ -100,7 +100,7 @@ def test_a_goal_behind_a_straight_arm_is_reached():
     """The gradient vanishes there: the corrective process does not leave (test_corrective)."""
     task = tiny_task(goals=[[2.5, 0.1], [3.0, 1.0]], hands=["right"])
     for locked in (("x", "y"), ("x",)):
-        _, execution, _ = solve(NextGoal, task.model_copy(update={"locked_base": locked}))
+        _, execution, _ = solve(GoalsAhead, task.model_copy(update={"locked_base": locked}))
         assert execution.completed
         assert execution.corrections == 0
 
@@ -110,7 +110,7 @@ def test_an_unreachable_goal_is_infeasible():
         update={"goals": ((3.0, 1.0), (9.0, 3.0)), "locked_base": ("x", "y")}
     )
     with pytest.raises(MethodError, match="goal 2: the left hand ends .* short of it") as caught:
-        solve(NextGoal, task, period=20)
+        solve(GoalsAhead, task, period=20)
     assert caught.value.outcome == "infeasible"
 
 
@@ -121,7 +121,7 @@ def test_every_sequence_keeps_the_best(method):
     task = tiny_task(goals=goals, initial_hands="RL", start=start)
     rewards = {}
     for hands in itertools.product(task.hands, repeat=2):
-        session = Session(task, 0, method.told, trusted=True)
+        session = Session(task, 0, method.information, trusted=True)
         alone = method().search(Controller(session, task, 20), [hands])
         rewards[hands] = execute(task, alone.solution).reward
     result, execution, _ = solve(method, task, period=20)
@@ -134,13 +134,13 @@ def test_every_sequence_keeps_the_best(method):
 
 
 def test_tasks_with_too_many_hand_sequences_are_refused():
-    assert NextGoal().why_not(outline_of(tiny_task())) is None
+    assert GoalsAhead().why_not(outline_of(tiny_task())) is None
     many = outline_of(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
-    assert "hand sequences" in NextGoal().why_not(many)
+    assert "hand sequences" in GoalsAhead().why_not(many)
 
 
 def controller(task):
-    return Controller(Session(task, 0, NextGoal.told, trusted=True), task, 5)
+    return Controller(Session(task, 0, GoalsAhead.information, trusted=True), task, 5)
 
 
 def miss(q, task, hand, goal):

@@ -1,4 +1,4 @@
-"""What the paper prints, entry by entry: against the code, the task files, and itself."""
+"""What the paper publishes, entry by entry: against the code, the task files, and itself."""
 
 import pytest
 
@@ -25,7 +25,7 @@ def constant(name):
 
 
 def rounding(entry):
-    """Half a unit of the last decimal that is printed; twice that of a difference."""
+    """Half a unit of the last decimal that is published; twice that of a difference."""
     if "difference_of" in entry:
         return sum(rounding(ENTRIES[name]) for name in entry["difference_of"])
     decimals = str(entry["value"]).partition(".")[2]
@@ -49,7 +49,7 @@ def test_constants_are_those_of_the_code():
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_tasks_are_as_printed(name):
+def test_tasks_are_as_published(name):
     task = load_task(name)
     (layout,), (posture,) = of(name, "layout"), of(name, "posture")
     along, across = (0, 1) if layout["same"] == "y" else (1, 0)
@@ -90,7 +90,7 @@ def test_constraints_hold_of_what_is_computed(name):
         kinds.add(kind := entry["kind"])
         if kind == "reward":
             assert "condition" not in entry
-            near = 0 if task.provenance["goals"].status == "printed" else 5
+            near = 0 if task.provenance["goals"].status == "published" else 5
             assert abs(reward(entry["hands"]) - entry["value"]) <= rounding(entry) + near
         elif kind == "order":
             assert reward(entry["hands"]) > reward(entry["than"]["hands"])

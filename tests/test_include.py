@@ -1,4 +1,4 @@
-"""Results beside others: the shipped ones, the parts of a suite, another person's folder."""
+"""Included runs: the shipped ones, the parts of a suite, another person's folder."""
 
 import hashlib
 import lzma
@@ -16,14 +16,14 @@ from coartic.analysis.sections import TABLES
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks import shipped, template
-from coartic.benchmarks.beside import put_beside
+from coartic.benchmarks.include import include_folders
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell
 from coartic.runs.store import RUNS_FILE, open_store, writing
 from tests.support.suites import KNOWN, InProcess, planned, run_and_write, same_results
 
-EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "nullspace-qp/none"
+EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "posture-qp/current-goal"
 OWN = Path(template.__file__)
 
 
@@ -47,8 +47,8 @@ def parts(tmp_path_factory):
 
 
 def joined(folders, out, cells=WHOLE, **options):
-    """What is performed where folders stand beside a plan of cells."""
-    whole = put_beside(planned(cells, **OPTIONS | options), folders, out)
+    """What is performed where a plan of cells includes folders."""
+    whole = include_folders(planned(cells, **OPTIONS | options), folders, out)
     return perform(whole, out, executor=InProcess())
 
 
@@ -144,11 +144,13 @@ def test_what_was_changed_is_not_copied(parts, tmp_path, said):
 
 
 def test_two_results_of_one_run(parts, tmp_path):
-    """They are named, and nothing is copied; a thinned one is the same result."""
-    thin, other = (shutil.copytree(parts[0], tmp_path / name) for name in ("thin", "other"))
-    with writing(thin) as store:
-        store.write([store.run(run_id).thin() for run_id in store.ids()])
-    assert joined([parts[0], thin], tmp_path / "same", LEFT).present == 3
+    """They are named, and nothing is copied; a downsampled one is the same result."""
+    downsampled, other = (
+        shutil.copytree(parts[0], tmp_path / name) for name in ("downsampled", "other")
+    )
+    with writing(downsampled) as store:
+        store.write([store.run(run_id).downsample() for run_id in store.ids()])
+    assert joined([parts[0], downsampled], tmp_path / "same", LEFT).present == 3
     with open_store(parts[0]) as store:
         first, second = (run for run in map(store.run, store.ids()) if run.rewards)
     with writing(other) as store:
@@ -185,10 +187,10 @@ def test_what_does_not_go_together(parts, tmp_path):
             tmp_path / "nowhere",
             "no folder .*nowhere.; .shipped. stands for",
         ),
-        (planned(LEFT, **OPTIONS), tmp_path / "whole", "cannot stand beside itself"),
+        (planned(LEFT, **OPTIONS), tmp_path / "whole", "cannot include itself"),
     ):
         with pytest.raises(CoarticError, match=said):
-            put_beside(plan, [folder], tmp_path / "whole")
+            include_folders(plan, [folder], tmp_path / "whole")
     assert not (tmp_path / "whole").exists()
 
 
@@ -211,7 +213,7 @@ def test_a_stranger_beside_others(parts, tmp_path):
     assert {cell.method.name for cell in plan.cells} == {"NAME"}
     out = tmp_path / "out"
     for present, done in ((4, plan.size), (4 + plan.size, 0)):
-        whole = put_beside(plan, parts[1:], out)
+        whole = include_folders(plan, parts[1:], out)
         report = perform(whole, out, executor=InProcess())
         assert (report.present, report.done) == (present, done)
     study = load(out)
@@ -220,7 +222,7 @@ def test_a_stranger_beside_others(parts, tmp_path):
     assert {"NAME", EC1} <= set(TABLES["methods"](study).method)
     more = plan_suite("paper", **select, runs=3, trials=20)
     with pytest.warns(UserWarning, match=rf"right has 2 runs of {EC1} on descending; 3 are asked"):
-        put_beside(more, parts[1:], tmp_path / "more")
+        include_folders(more, parts[1:], tmp_path / "more")
 
 
 def test_shipped_results(monkeypatch, tmp_path):
@@ -233,7 +235,7 @@ def test_shipped_results(monkeypatch, tmp_path):
             some = [name for name in plan.tasks if "/" not in name or name.endswith("7")]
             assert all(load_task(name) == plan.tasks[name] for name in some)  # as shipped today
             learned = store.runs().query("method == 'dual-process/EC1'").run_id
-            assert store.run(learned.iloc[0]).is_thin
+            assert store.run(learned.iloc[0]).is_downsampled
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped, but of comparison, "):
         shipped.open_shipped("quick")
     copy = shutil.copytree(Path(shipped.__file__).with_name("shipped"), tmp_path / "copy")
@@ -253,14 +255,14 @@ def test_packed_results_say_the_same(parts, tmp_path):
     shipped.pack(parts[0], tmp_path)
     content = (tmp_path / "paper.sqlite.xz").read_bytes()
     assert (tmp_path / "SHA256SUMS").read_text().split()[0] == hashlib.sha256(content).hexdigest()
-    (tmp_path / "thin").mkdir()
-    (tmp_path / "thin" / RUNS_FILE).write_bytes(lzma.decompress(content))
-    assert check_runs(tmp_path / "thin").wrong == []
-    full, thin = load(parts[0]), load(tmp_path / "thin")
+    (tmp_path / "downsampled").mkdir()
+    (tmp_path / "downsampled" / RUNS_FILE).write_bytes(lzma.decompress(content))
+    assert check_runs(tmp_path / "downsampled").wrong == []
+    full, downsampled = load(parts[0]), load(tmp_path / "downsampled")
     for name in ("learning", "ranking", "methods", "runtimes"):
-        before, after = TABLES[name](full), TABLES[name](thin)
+        before, after = TABLES[name](full), TABLES[name](downsampled)
         assert before.equals(after)
-    assert full.runs.best_trial.equals(thin.runs.best_trial)
+    assert full.runs.best_trial.equals(downsampled.runs.best_trial)
 
 
 @pytest.fixture
@@ -308,18 +310,18 @@ def test_results_are_packed_again_where_they_have_not_changed(
 @pytest.mark.usefixtures("in_this_process")
 def test_command(packed, parts, tmp_path, coartic):
     """A method is written by a command, run beside the shipped results, and there when that is
-    repeated; a colleague puts the folder beside another one, without the method's file."""
+    repeated; a colleague includes the folder with another one, without the method's file."""
     mine, out = tmp_path / "my_search.py", tmp_path / "out"
 
     assert coartic("new", "my-search", "--out", mine)[0] == 0
-    command = ("run", "paper", "--method-file", mine, "--beside", "shipped", "--out", out)
+    command = ("run", "paper", "--method-file", mine, "--include", "shipped", "--out", out)
     small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
     code, text, _ = coartic(*command, *small)
     assert (code, text[:16]) == (0, "8 runs (4 reused")
     assert coartic(*command, *small)[1].startswith("8 runs (8 reused)")
     assert set(load(out).runs.method) == {"my-search", *load(packed).runs.method}
     assert coartic("verify", out)[0] == 0
-    both = ("--beside", out, "--beside", parts[0], "--out", tmp_path / "both", *small)
+    both = ("--include", out, "--include", parts[0], "--out", tmp_path / "both", *small)
     code, text, _ = coartic("run", "paper", "--methods", "EC1", *both)
     assert (code, text[:19]) == (0, "10 runs (10 reused)")
     for wrong, said in (

@@ -1,4 +1,4 @@
-"""The declaration of a method without its code, and where its code is."""
+"""MethodInfo: the declaration of a method without its code, and where its code is."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ BUILT_IN = "built in"
 
 
 @dataclass(frozen=True)
-class MethodCard:
+class MethodInfo:
     """The declaration of a method, its origin, and where its code is."""
 
     name: str
     title: str
     citation: str
-    told: tuple[str, ...]
+    information: tuple[str, ...]
     secondary: tuple[str, ...]
     stochastic: bool
     """Whether the seed matters; the others are run once."""
@@ -91,11 +91,11 @@ class MethodCard:
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Readers of method files, which this process does not import, by :attr:`MethodCard.where`."""
+"""Readers of method files, which this process does not import, by :attr:`MethodInfo.where`."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
-    """The answer of a method to :class:`MethodCard`, as plain data. Raises CoarticError."""
+    """The answer of a method to :class:`MethodInfo`, as plain data. Raises CoarticError."""
     if question == "rules":
         config = method.Parameters.model_config
         wanted = {key: config.get(key) for key in ("extra", "frozen")}
@@ -106,8 +106,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     except ValidationError as error:
         names = list(method.Parameters.model_fields)
         wrong, listed = explain_inline(error, names), ", ".join(names) or "none"
-        words = f"method {method.name!r}: {wrong} (its parameters: {listed})"
-        raise CoarticError(words) from None
+        text = f"method {method.name!r}: {wrong} (its parameters: {listed})"
+        raise CoarticError(text) from None
     if question == "complete":
         return json.loads(json.dumps(typed.model_dump(mode="json")))
     task = Outline(*outline)._replace(hands=tuple(outline[3]))
@@ -120,18 +120,18 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         ) from None
 
 
-def card_of(method: type[Method], origin: str, where: str, code: str) -> MethodCard:
-    """The card of a method that is imported from ``where``."""
+def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
+    """The info of a method that is imported from ``where``."""
     fields = method.Parameters.model_fields.items()
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in fields
     }
-    return MethodCard(
+    return MethodInfo(
         name=method.name,
         title=method.title,
         citation=method.citation,
-        told=tuple(sorted(item.value for item in method.told)),
+        information=tuple(sorted(item.value for item in method.information)),
         secondary=tuple(method.secondary),
         stochastic=method.stochastic,
         defaults=json.loads(json.dumps(defaults, default=str)),

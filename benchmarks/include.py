@@ -1,5 +1,4 @@
-"""Results of other folders beside those of a plan: the shipped ones, another machine's, another
-person's.
+"""Include runs of other folders: the shipped ones, another machine's, another person's.
 
 They go together where suite, seed, trial budget, the tasks of a name and the code of a method are
 the same. Versions of coartic and of libraries and machines may differ. Every solution of another
@@ -22,7 +21,7 @@ from coartic.benchmarks.shipped import SHIPPED, open_shipped
 from coartic.benchmarks.worker import Job, Outcome
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.runs.card import MethodCard
+from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Cell, Plan, hash_of
 from coartic.runs.run import PREFIXES, Run
 from coartic.runs.store import Store, open_store, writing
@@ -35,7 +34,7 @@ _SCORED = (
 """Columns of ``results`` that follow from the solutions of a run."""
 
 
-def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
+def include_folders(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
     """Return the plan with the runs that other folders hold, which are copied into ``out``.
 
     ``shipped`` names the shipped results. Performed in ``out``, the plan makes those of its own
@@ -53,7 +52,7 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
                 sources[name] = stack.enter_context(open_shipped(plan.suite))
                 continue
             if folder_named(name).resolve() == out.resolve():
-                raise CoarticError(f"{name} cannot stand beside itself: choose another --out")
+                raise CoarticError(f"{name} cannot include itself: choose another --out")
             if not folder_named(name).exists():
                 message = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 raise CoarticError(message)
@@ -181,7 +180,7 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
 
 
 def check_scores(
-    name: str, method: MethodCard, runs: Sequence[Run], results: Mapping[str, str]
+    name: str, method: MethodInfo, runs: Sequence[Run], results: Mapping[str, str]
 ) -> None:
     """Score runs of one cell again, side by side.
 

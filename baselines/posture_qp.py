@@ -1,4 +1,5 @@
-"""Prioritised nullspace control by quadratic programmes, with a view to the next goal or not.
+"""Posture QP: prioritised quadratic programmes that lead to postures for the current goal, or with
+goals ahead in view.
 
 The controller keeps a **posture** for the current goal and for each goal that it looks ahead to.
 Both the postures and the control steps are answers of one cascade (:mod:`coartic.baselines.
@@ -10,7 +11,7 @@ polygon in the unit circle, the disc is
 
 linear in the change x of the joints, where ρ is the distance of the polygon's sides from c.
 
-- A posture has its hand in its goal's disc. Of all such postures it is the one that makes the way
+- A posture has its hand in its goal's disc. Of all such postures it is the one that makes the path
   from posture to posture shortest in the metric of the reward, which is Euclidean in joint space.
 - A control step has the hand in a disc about the goal that shrinks from where the hand is towards
   the goal's own; the joints prefer to go straight to the posture. So the hand comes nearer all the
@@ -19,8 +20,8 @@ linear in the change x of the joints, where ρ is the distance of the polygon's 
 Postures are found once for each goal to come and kept up by a step of the same kind at every
 control step. The objective decides which posture hits the current goal:
 
-- none: the nearest to where the robot stands when the last goal is hit;
-- next goal: the posture from which the way on to the next goal's posture is shortest, too
+- current goal: the nearest to where the robot stands when the last goal is hit;
+- goals ahead: the posture from which the path on to the next goal's posture is shortest, too
   (coarticulation by concurrent subgoals of lower priority). The next goal's posture is itself
   chosen with a view to the goal after it.
 
@@ -28,21 +29,21 @@ Tuned on thirty development instances (``d000`` to ``d009`` of families one-arme
 aligned), and on nothing else: 12 settings of the controller as it is, tabled here, and before
 that some 50 of a prototype (other first postures, 8 to 24 faces, control steps of 1 to 10 ticks,
 posture steps of 0.05 to 0.2 and gains of 0.1 to 0.7 for them, horizons, weights). Mean gap to
-the best path known of ``next-goal``, one setting changed at a time, * the value used:
+the best path known of ``goals-ahead``, one setting changed at a time, * the value used:
 
 =========================  ====================================================================
 hand comes nearer, at      0: 2.2 %, 0.03*: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
 this share of even pace    1: 6.9 %
-weight of ways to come     0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 2.6 %
+weight of paths to come    0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 2.6 %
 (share at 0.1)
 goals ahead (same)         none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
 =========================  ====================================================================
 
 On the same instances the corrective process alone with its best hand sequence has 24.8 %; half of
 the joint rates of the step before, kept (smoothness is no part of the reward), 20.5 % where
-``none`` has 20.1 %. A controller whose
-level 1 moves the hand straight to the goal's centre, with the least rates at every step, had
-43.6 % with the next goal as level 2 and 60 % without one.
+``current-goal`` has 20.1 %. A controller whose level 1 moves the hand straight to the goal's
+centre, with the least rates at every step, had 43.6 % with the next goal as level 2 and 60 %
+without one.
 
 The remaining gap is local: postures are found by descent from where the robot is, and another
 branch of the inverse kinematics may be far shorter (35 % on the worst of the thirty). First
@@ -71,7 +72,7 @@ from coartic.tasks.task import beyond_reach, letters_of
 FACES = 16
 """Sides of the polygon that stands for a goal's disc; it leaves out 2 % of the radius at most."""
 GOALS_AHEAD = 2
-"""Goals after the current one that have a posture under ``next-goal``."""
+"""Goals after the current one that have a posture under ``goals-ahead``."""
 
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
 _INSET = float(directions(np.pi / FACES)[0])
@@ -81,9 +82,9 @@ _STALL_STEPS = 50  # without coming nearer by a tenth of a control step
 _CLOSING = 0.03  # of the even pace at which the hand has to come nearer
 _POSTURE_STEPS = 400  # at most, when a posture is first looked for
 _POSTURE_STEP = 0.1  # longest of them, length unit and rad: longer ones end far off
-_POSTURE_GAIN = 0.5  # of the way to the preferred one in one of them: 1 may swing
+_POSTURE_GAIN = 0.5  # of the path to the preferred one in one of them: 1 may swing
 _POSTURE_TOLERANCE = 1e-3  # of such a step, length unit and rad
-_SHORTEST = 0.02  # way whose share still counts, length unit and rad
+_SHORTEST = 0.02  # path whose share still counts, length unit and rad
 
 
 class Aim(NamedTuple):
@@ -94,7 +95,7 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """The way to one goal."""
+    """The path to one goal."""
 
     movement: Movement
     ticks: int
@@ -125,7 +126,7 @@ class Controller:
         """Indices of the joints that are not locked."""
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
-        """The way to the first aim's goal, from where the leg before ended or from the start.
+        """The path to the first aim's goal, from where the leg before ended or from the start.
 
         Raises StuckError if the hand does not get there, MethodError if the solver fails.
         """
@@ -153,11 +154,11 @@ class Controller:
                 )
             if waypoints:
                 self.sweep(q, aims, postures)
-            way = (postures[0] - q)[self.moving]
-            steps = max(1.0, float(np.linalg.norm(way)) / length)
+            displacement = (postures[0] - q)[self.moving]
+            steps = max(1.0, float(np.linalg.norm(displacement)) / length)
             rows, outside = self.faces(q, aims[0])
             shrunk = outside.max() * (1.0 - _CLOSING / steps)
-            rates = self.solve(length * rows, outside - shrunk, way / (steps * length))
+            rates = self.solve(length * rows, outside - shrunk, displacement / (steps * length))
             rates /= max(1.0, float(np.linalg.norm(rates)))
             q = self.add(q, length * rates)
             waypoints.append(q)
@@ -192,7 +193,7 @@ class Controller:
         return postures
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Move each posture, in place, towards where the ways to and from it are shortest.
+        """Move each posture, in place, towards where the paths to and from it are shortest.
 
         The sum of two distances is least where their ends, each weighted by the inverse of its
         distance, have their mean (Weiszfeld 1937). Returns the largest change's norm.
@@ -253,24 +254,24 @@ class Controller:
         return float(np.hypot(*error))
 
 
-class NullspaceParameters(Parameters):
+class PostureQPParameters(Parameters):
     """Parameters of the controller."""
 
     period: Annotated[int, Field(ge=1, le=20)] = 5
     """Ticks from one control step to the next."""
 
 
-class NullspaceQP(Method):
-    """The controller without a secondary objective; base of those with one."""
+class PostureQP(Method):
+    """Posture QP for the current goal; base of the controller with goals ahead."""
 
-    name = "nullspace-qp/none"
-    title = "Prioritised nullspace QP"
+    name = "posture-qp/current-goal"
+    title = "Posture QP, current goal"
     citation = (
         "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
         "robot manipulators. International Journal of Robotics Research; as quadratic programs "
         "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics. "
     )
-    told = frozenset(
+    information = frozenset(
         {
             Information.GOALS,
             Information.FORWARD_KINEMATICS,
@@ -279,7 +280,7 @@ class NullspaceQP(Method):
         }
     )
     stochastic = False
-    Parameters = NullspaceParameters
+    Parameters = PostureQPParameters
     quick: ClassVar[dict[str, Any]] = {"period": 20}
 
     def why_not(self, task: Outline) -> str | None:
@@ -291,8 +292,8 @@ class NullspaceQP(Method):
         return (Aim(hands[goal], goal),)
 
     def solve(self, session: Session) -> Result:
-        """Simulate the hand sequences and hand over the best one's paths."""
-        task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
+        """Simulate the hand sequences and return the best one's paths."""
+        task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = Controller(session, task, self.parameters.period)
         ordered = [hand for hand in HANDS if hand in task.hands]
         with session.solving():
@@ -313,8 +314,8 @@ class NullspaceQP(Method):
         legs: dict[Any, Leg | StuckError] = {}  # sequences share their beginnings
         stuck: list[StuckError] = []
         while heap:
-            ticks, changes, index, way = heapq.heappop(heap)
-            hands, goal = candidates[index], len(way)
+            ticks, changes, index, path = heapq.heappop(heap)
+            hands, goal = candidates[index], len(path)
             if goal == len(hands):
                 details = {
                     "sequences": len(candidates),
@@ -322,32 +323,32 @@ class NullspaceQP(Method):
                     "simulated_movements": len(legs),
                     "solves": controller.solves,
                 }
-                return Result(tuple(leg.movement for leg in way), details)
+                return Result(tuple(leg.movement for leg in path), details)
             plan = tuple(self.aims(hands, g) for g in range(goal + 1))
             if plan not in legs:
                 try:
-                    legs[plan] = controller.leg(way[-1] if way else None, plan[-1])
+                    legs[plan] = controller.leg(path[-1] if path else None, plan[-1])
                 except StuckError as error:
                     legs[plan] = error
             leg = legs[plan]
             if isinstance(leg, StuckError):
                 stuck.append(leg)
             else:
-                heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*way, leg)))
+                heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*path, leg)))
         raise MethodError("infeasible", str(stuck[0]))
 
 
-class NextGoal(NullspaceQP):
-    """Level 2 approaches the posture in which the next goal is hit."""
+class GoalsAhead(PostureQP):
+    """Level 2 approaches a posture chosen with a view to the two goals that follow."""
 
-    name = "nullspace-qp/next-goal"
-    title = "Prioritised nullspace QP, next goal as lower priority"
-    citation = NullspaceQP.citation + (
+    name = "posture-qp/goals-ahead"
+    title = "Posture QP, goals ahead"
+    citation = PostureQP.citation + (
         "K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen (2004), Coarticulation in Markov "
         "decision processes, NIPS; B. Thibodeau, S. Hart, D. Karuppiah, J. Sweeney, O. Brock "
         "(2004), Cascaded filter approach to multi-objective control, ICRA."
     )
-    told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
+    information = PostureQP.information | {Information.SECONDARY_OBJECTIVES}
     secondary = ("coarticulation: posture at the next goal",)
 
     def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
@@ -355,4 +356,4 @@ class NextGoal(NullspaceQP):
         return tuple(Aim(hand, g) for g, hand in enumerate(hands))[goal : goal + 1 + GOALS_AHEAD]
 
 
-METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, NextGoal)
+METHODS: tuple[type[PostureQP], ...] = (PostureQP, GoalsAhead)

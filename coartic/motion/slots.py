@@ -1,10 +1,10 @@
 """Many arms side by side: the arrays on which the compiled kernels work.
 
-A lane holds one arm that moves or is corrected. Each quantity is a row over lanes, and the
-innermost loop of a kernel runs over lanes, so that the compiler makes vector instructions of
-it; the number of links belongs to the type of the rows, so that the loops over links are
-unrolled before. No operation mixes lanes and none is reordered or fused: what a lane gives
-does not depend on its neighbours, on their number or on the width of the vectors.
+A slot holds one arm that moves or is corrected. Each quantity is a row over slots, and the
+innermost loop of a kernel runs over slots, so that the compiler makes vector instructions of it;
+the number of links belongs to the type of the rows, so that the loops over links are unrolled
+before. No operation mixes slots and none is reordered or fused: what a slot gives does not depend
+on its neighbours, on their number or on the width of the vectors.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from coartic.motion.compiled import chain_by, inlined, inner, record_type
 from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, Arm, Robot
 
-LANES = 72
-"""Most lanes at once: they and their rows stay in the innermost cache."""
-_VECTOR = 8  # lanes that vectors hold; LANES is a multiple of it
+SLOTS = 72
+"""Most slots at once: they and their rows stay in the innermost cache."""
+_VECTOR = 8  # slots that vectors hold; SLOTS is a multiple of it
 GOING = 0.0
-"""Fate of a lane that has not ended."""
+"""Status of a slot that has not ended."""
 
 
-class Lanes(NamedTuple):
-    """Lanes and who is in them."""
+class Slots(NamedTuple):
+    """Slots and the arms in them."""
 
     at: Any
     """The rows, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
     corrected: Any
-    """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``. Only to be
+    """The rows of an arm that is corrected: the same memory, shape ``(rows, SLOTS)``. Only to be
     copied: some are integers."""
     moved: Any
     """The rows of an arm that moves."""
@@ -78,12 +78,12 @@ def run_type(width: int) -> np.dtype[np.void]:
     return record_type(fields)
 
 
-def lanes_for(robot: Robot) -> Lanes:
-    """Lanes for either arm of a robot; shorter ones end in links of length 0."""
+def slots_for(robot: Robot) -> Slots:
+    """Slots for either arm of a robot; shorter ones end in links of length 0."""
     record, corrected, moved = layout(links_for(robot))
     at = np.zeros(1, record)
-    rows = at.view(np.float64).reshape(-1, LANES)
-    return Lanes(at, rows[corrected], rows[moved])
+    rows = at.view(np.float64).reshape(-1, SLOTS)
+    return Slots(at, rows[corrected], rows[moved])
 
 
 @cache
@@ -92,7 +92,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     joints = (BASE_DOF + links,)
     corrected = {"q": joints}  # base x and y, then the joints of the arm
     shared = {
-        "run": (),  # which is in the lane: its index
+        "run": (),  # index of the run in the slot
         "first": (),  # index in a configuration of the first joint of its arm
         "links": (),  # of its arm
         "length": (links,),
@@ -108,11 +108,11 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "distance": (),  # from start to target; its square, before the arm sets off
         **dict.fromkeys(("step", "last", "slowness", "bend", "clearance"), ()),
     }
-    passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
+    passing = {"x": (links + 1,), "y": (links + 1,), "status": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing
     kinds = dict.fromkeys(("run", "first", "links"), np.int64)
     record = np.dtype(
-        [(name, kinds.get(name, np.float64), (*shape, LANES)) for name, shape in shapes.items()]
+        [(name, kinds.get(name, np.float64), (*shape, SLOTS)) for name, shape in shapes.items()]
     )
     first, last = height(corrected), height(corrected | shared)
     return record, slice(last), slice(first, last + height(moved))
@@ -124,67 +124,67 @@ def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
 
 
 @inlined
-def seat(at: Any, lane: int, run: int, arm: Any, goal: Any) -> None:
-    """Copy links, shoulder and goal of a run's arm into a lane."""
-    at.run[lane], at.first[lane], at.links[lane] = run, arm.first, len(arm.links)
-    at.shoulder[0, lane] = arm.shoulder_x
-    at.shoulder[1, lane] = arm.shoulder_y
-    at.goal[0, lane], at.goal[1, lane] = goal[0], goal[1]
+def assign_slot(at: Any, slot: int, run: int, arm: Any, goal: Any) -> None:
+    """Copy links, shoulder and goal of a run's arm into a slot."""
+    at.run[slot], at.first[slot], at.links[slot] = run, arm.first, len(arm.links)
+    at.shoulder[0, slot] = arm.shoulder_x
+    at.shoulder[1, slot] = arm.shoulder_y
+    at.goal[0, slot], at.goal[1, slot] = goal[0], goal[1]
     for k in range(len(at.length)):
-        at.length[k, lane] = arm.links[k] if k < len(arm.links) else 0.0
+        at.length[k, slot] = arm.links[k] if k < len(arm.links) else 0.0
 
 
 @inlined
-def copy_arm(row: Any, lane: int, q: Any, arm: Any) -> None:
-    """Copy the base and an arm's joints of a configuration into a lane."""
-    row[0, lane] = q[0]
-    row[1, lane] = q[1]
+def copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
+    """Copy the base and an arm's joints of a configuration into a slot."""
+    row[0, slot] = q[0]
+    row[1, slot] = q[1]
     for k in range(len(row) - BASE_DOF):
-        row[BASE_DOF + k, lane] = q[arm.first + k] if k < len(arm.links) else 0.0
+        row[BASE_DOF + k, slot] = q[arm.first + k] if k < len(arm.links) else 0.0
 
 
 @inlined
-def board(at: Any, lane: int, run: int, q: Any, arm: Any, goal: Any) -> None:
-    """Put an arm into a lane, where the robot is in configuration ``q``."""
-    seat(at, lane, run, arm, goal)
-    copy_arm(at.q, lane, q, arm)
+def load(at: Any, slot: int, run: int, q: Any, arm: Any, goal: Any) -> None:
+    """Load an arm into a slot, where the robot is in configuration ``q``."""
+    assign_slot(at, slot, run, arm, goal)
+    copy_arm(at.q, slot, q, arm)
 
 
 @inlined
-def depart(at: Any, lane: int, run: int, q: Any, target: Any, arm: Any, goal: Any) -> None:
-    """Put an arm into a lane that the robot is to move from ``q`` to ``target``."""
-    seat(at, lane, run, arm, goal)
-    copy_arm(at.start, lane, q, arm)
-    copy_arm(at.target, lane, target, arm)
+def start(at: Any, slot: int, run: int, q: Any, target: Any, arm: Any, goal: Any) -> None:
+    """Load an arm into a slot to start a movement from ``q`` to ``target``."""
+    assign_slot(at, slot, run, arm, goal)
+    copy_arm(at.start, slot, q, arm)
+    copy_arm(at.target, slot, target, arm)
     square = 0.0
     for j in range(len(q)):
         delta = target[j] - q[j]
         square += delta * delta
-    at.distance[lane] = square
+    at.distance[slot] = square
 
 
 @inlined
-def leave(at: Any, lane: int, q: Any) -> None:
-    """Copy the arm of a lane into ``q``."""
-    q[0] = at.q[0, lane]
-    q[1] = at.q[1, lane]
-    for k in range(at.links[lane]):
-        q[at.first[lane] + k] = at.q[BASE_DOF + k, lane]
+def store(at: Any, slot: int, q: Any) -> None:
+    """Store the arm of a slot in ``q``."""
+    q[0] = at.q[0, slot]
+    q[1] = at.q[1, slot]
+    for k in range(at.links[slot]):
+        q[at.first[slot] + k] = at.q[BASE_DOF + k, slot]
 
 
 @inlined
-def fill(rows: Any, lane: int, last: int) -> None:
-    """Move rows of the last lane into one that has ended."""
-    if lane != last:
+def compact(rows: Any, slot: int, last: int) -> None:
+    """Compact: move rows of the last slot into one that has ended."""
+    if slot != last:
         for row in range(len(rows)):
-            rows[row, lane] = rows[row, last]
+            rows[row, slot] = rows[row, last]
 
 
 @inner
 def padded_count(count: int) -> int:
-    """Lanes in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
+    """Slots in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
 
-    A loop over whole vectors leaves no lanes over that would be worked on one by one.
+    A loop over whole vectors leaves no slots over that would be worked on one by one.
     """
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
@@ -199,16 +199,16 @@ def near(at: Any, count: int) -> bool:
 
 
 @inlined
-def winding(q: Any, lane: int) -> float:
+def winding(q: Any, slot: int) -> float:
     """Bound on the angle of every link of an arm, rad: all its joints' together."""
     total = 0.0
     for k in range(len(q) - BASE_DOF):
-        total += abs(q[BASE_DOF + k, lane])
+        total += abs(q[BASE_DOF + k, slot])
     return total
 
 
 def chains_by(cos: Any, sin: Any) -> Any:
-    """Forward kinematics of every lane, by these functions."""
+    """Forward kinematics of every slot, by these functions."""
 
     @inner
     def chains(at: Any, count: int) -> None:
@@ -225,7 +225,7 @@ _far_chains = chains_by(cosine, sine)
 
 @inner
 def place(at: Any, count: int, is_near: bool) -> None:
-    """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
+    """Forward kinematics of every slot: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
     if is_near:
         _near_chains(at, padded_count(count))
     else:

@@ -1,8 +1,8 @@
-"""Tests against guesses: random targets, of which the best of many is selected.
+"""Tests against random search, which selects the best of many random targets.
 
 A method that selects its solution from trials by their rewards shows signatures that selection
-alone shows, and has to exceed those of guesses. A folder may have guesses of several widths, and
-with every hand sequence: the one that shows most counts.
+alone shows, and has to exceed that of random search. A folder may have random search of several
+widths, and with every hand sequence: the one that shows most counts.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from statistics import fmean
 
 import numpy as np
 
-from coartic.analysis.methods import ALL_GUESSES
+from coartic.analysis.methods import RANDOM_SEARCHES
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study, cached
@@ -20,12 +20,12 @@ from coartic.analysis.topics.scores import BY_TRIAL, groups
 from coartic.robot import Array
 
 
-def guesses_on(study: Study, task: str) -> list[str]:
-    """Labels of the guesses that solved a task."""
+def random_search_on(study: Study, task: str) -> list[str]:
+    """Labels of the settings of random search that solved a task."""
     return [
         label
         for (name, label), cell in study.cells.items()
-        if name == task and cell.method in ALL_GUESSES and len(cell.good)
+        if name == task and cell.method in RANDOM_SEARCHES and len(cell.good)
     ]
 
 
@@ -35,13 +35,13 @@ def signature_of(study: Study, signature: str, task: str, label: str) -> Array:
     return SIGNATURES[signature].of(study.executed(task, label))
 
 
-def most_guessed(study: Study, signature: str, task: str) -> Array:
-    """A signature of the guesses that show most of it in the mean on a task, or over the instances
-    of its family, shape ``(n,)``; empty where they have none on the task."""
+def most_of_random_search(study: Study, signature: str, task: str) -> Array:
+    """A signature of the random search that shows most of it in the mean on a task, or over the
+    instances of its family, shape ``(n,)``; empty where it has none on the task."""
     family, shown = study.tasks[task].family, dict[str, dict[str, Array]]()
     for each, other in study.tasks.items():
         if each == task or (family is not None and other.family == family):
-            for label in guesses_on(study, each):
+            for label in random_search_on(study, each):
                 if len(values := signature_of(study, signature, each, label)):
                     shown.setdefault(label, {})[each] = values
     most = max(shown.values(), key=lambda of: fmean(map(np.mean, of.values())), default={})
@@ -50,19 +50,27 @@ def most_guessed(study: Study, signature: str, task: str) -> Array:
 
 def selects(study: Study, label: str) -> bool:
     """Whether a method's solution may be one of many trials, selected by its reward."""
-    return label.partition(" ")[0] not in ALL_GUESSES and groups(study)[label] == BY_TRIAL
+    return label.partition(" ")[0] not in RANDOM_SEARCHES and groups(study)[label] == BY_TRIAL
 
 
-def guesses_beside(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """The guesses whose postures lie farthest apart in the same two contexts; None without any."""
-    return max(every_guess_beside(study, contexts), key=lambda pair: pair.apart, default=None)
+def random_search_for(study: Study, contexts: TwoContexts) -> TwoContexts | None:
+    """The random search with the largest posture difference between the same two contexts; None
+    without any."""
+    return max(
+        every_random_search_for(study, contexts),
+        key=lambda pair: pair.posture_difference,
+        default=None,
+    )
 
 
-def every_guess_beside(study: Study, contexts: TwoContexts) -> list[TwoContexts]:
-    """Return the guesses in the same two contexts that made as many trials as the method."""
+def every_random_search_for(study: Study, contexts: TwoContexts) -> list[TwoContexts]:
+    """Return random search, by setting, in the same two contexts with as many trials as the
+    method."""
     names, pairs = [task.name for task in contexts.tasks], []
     for label in (
-        each for each in guesses_on(study, names[0]) if each in guesses_on(study, names[1])
+        each
+        for each in random_search_on(study, names[0])
+        if each in random_search_on(study, names[1])
     ):
         most, wanted = (
             [study.cells[name, who].runs.trials.fillna(0).max() for name in names]
@@ -75,11 +83,11 @@ def every_guess_beside(study: Study, contexts: TwoContexts) -> list[TwoContexts]
 
 
 def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
-    """P of the test that a method's postures lie further apart than those of guesses.
+    """P of the test that a method's posture difference exceeds that of random search.
 
-    NaN for a method that selects nothing, and without guesses that made as many trials.
+    NaN for a method that selects nothing, and without random search that made as many trials.
     """
     if not selects(study, contexts.method):
         return math.nan
-    guesses = guesses_beside(study, contexts)
-    return math.nan if guesses is None else contexts.p_beyond(guesses)
+    random_search = random_search_for(study, contexts)
+    return math.nan if random_search is None else contexts.p_beyond(random_search)

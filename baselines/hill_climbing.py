@@ -1,0 +1,91 @@
+"""Hill climbing: Gaussian noise and drawn hands, a (1+1) hill climber for each hand sequence.
+
+A sequence has a centre, at first the configurations of the corrective process **A**
+alone, which take the first trial of the sequence. A trial perturbs all explored joints of the
+centre at once; any better one moves the centre to the configurations in which it hit the goals, as
+in the learner (leaving its targets was tried and is no better). Hands are explored as the learner
+does, with ε for each goal around the best sequence known. The SD and ε are the learner's, untuned.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.baselines.uninformed import Attempts, UninformedParameters
+from coartic.method import Method, Result, Session
+from coartic.optimisers import OPTIMISER_INFORMATION
+from coartic.robot import Array
+from coartic.tasks.task import letters_of
+
+_EPSILON = 0.2  # probability of a random hand, for each goal
+_MOST_DRAWN = 128  # trials that are drawn before they are made, at most
+
+
+class HillClimbing(Method):
+    """A (1+1) hill climber per hand sequence."""
+
+    name = "hill-climbing"
+    title = "Hill climbing, (1+1) for each hand sequence"
+    citation = (
+        "H.-G. Beyer, H.-P. Schwefel (2002). Evolution strategies: a comprehensive "
+        "introduction. Natural Computing."
+    )
+    information = OPTIMISER_INFORMATION
+    Parameters = UninformedParameters
+
+    def solve(self, session: Session) -> Result:
+        """Draw hands around the best sequence known, make a trial around its centre, draw again."""
+        first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
+        attempts = Attempts(session, self.parameters)
+        most, ahead = len(letters) ** session.goals_count, 1
+        masks: dict[str, NDArray[np.bool_]] = {}  # explored joints, (G, dof)
+        centres: dict[str, Array] = {}  # their values, (G, dof); NaN for the other joints
+        rewards: dict[str, float] = {}  # a trial with more moves the centre
+        hopeless: set[str] = set()  # A alone does not complete them, ever
+
+        def draw() -> str:
+            """Hands around the best; uniformly random where none has succeeded."""
+            while True:
+                chosen = list(attempts.hands or letters[0] * session.goals_count)
+                for goal in range(len(chosen)):
+                    if not attempts.hands or rng.random() < _EPSILON:
+                        chosen[goal] = letters[rng.integers(len(letters))]
+                if (hands := "".join(chosen)) not in hopeless:
+                    return hands
+
+        with session.solving():
+            while attempts.left > 0 and len(hopeless) < most:
+                # The next draws are known until a centre moves, which is rare: they are tried
+                # together, and what was drawn beyond the trial that moves one is drawn again.
+                drawn, noise, states = list[str](), list[Array](), [rng.bit_generator.state]
+                while len(drawn) < min(ahead, attempts.left):
+                    hands = draw() if attempts.trials_made else first
+                    if hands not in centres:
+                        break
+                    drawn.append(hands)
+                    noise.append(rng.standard_normal(masks[hands].sum()))
+                    states.append(rng.bit_generator.state)
+                if drawn:
+                    than = np.array([rewards[hands] for hands in drawn])
+                    targets = np.array([centres[hands] for hands in drawn])
+                    explored = np.array([masks[hands] for hands in drawn])
+                    targets[explored] += self.parameters.sigma * np.concatenate(noise)
+                    attempt = attempts.by_targets(drawn, targets, until=than)
+                    tried = len(attempt.rewards)
+                    rng.bit_generator.state = states[tried]
+                    hands, ahead = drawn[tried - 1], min(2 * ahead, _MOST_DRAWN)
+                    if attempt.rewards[-1] > rewards[hands]:
+                        ahead = tried
+                else:
+                    masks[hands], rewards[hands] = attempts.explored(hands), -np.inf
+                    attempt = attempts.by_correction(hands)
+                    if attempt.rewards[-1] == -np.inf:
+                        hopeless.add(hands)
+                if attempt.rewards[-1] > rewards[hands]:
+                    centres[hands] = np.where(masks[hands], attempt.reached[-1], np.nan)
+                    rewards[hands] = float(attempt.rewards[-1])
+        return attempts.result(sequences=len(centres))
+
+
+METHODS: tuple[type[Method], ...] = (HillClimbing,)
