@@ -14,8 +14,8 @@ from typing import Any
 from coartic import __version__
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.words import latex, slugs
+from coartic.internal.text import one_line
 from coartic.runs.method_info import BUILT_IN, MethodInfo
-from coartic.text import one_line
 
 THE_PAPER = "shah2013"
 STATISTICS = "efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"

@@ -21,7 +21,7 @@ from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
-from coartic.inputs import brief_value
+from coartic.internal.limits import brief_value
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from coartic import Task
+from coartic.internal.text import one_line
 from coartic.learner import conditions
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.runs.plan import SEARCH
-from coartic.text import one_line
 
 LEARNER = METHOD_PREFIX
 """Beginning of the paper's learner's id; the exploration condition follows."""

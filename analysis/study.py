@@ -21,7 +21,8 @@ from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictio
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
-from coartic.files import folder_named
+from coartic.internal.files import folder_named
+from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
@@ -30,7 +31,6 @@ from coartic.runs.run import execute_all
 from coartic.runs.store import explain_errors, open_store
 from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
-from coartic.text import counted, unknown
 
 CellKey = tuple[str, str]
 """Name of a task, and label of a method: its id with its setting."""

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from coartic.text import one_line
+from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
     from coartic import Task

@@ -15,7 +15,7 @@ from coartic.benchmarks.provenance import current_environment
 from coartic.benchmarks.registry import current_code
 from coartic.benchmarks.worker import Job, Outcome, fail
 from coartic.errors import CoarticError
-from coartic.text import error_line
+from coartic.internal.text import error_line
 
 WORKERS_S = 600.0  # that runs wait while no worker is connected
 _PAUSE_S = 0.05  # between looks at what is done

@@ -24,12 +24,12 @@ from coartic import (
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.worker import Job
+from coartic.internal.text import counted
 from coartic.method import METERED
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Specification
 from coartic.runs.run import Run
 from coartic.tasks.task import check_task
-from coartic.text import counted
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0

@@ -20,12 +20,12 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.shipped import SHIPPED, open_shipped
 from coartic.benchmarks.worker import Job, Outcome
 from coartic.errors import CoarticError
-from coartic.files import folder_named
+from coartic.internal.files import folder_named
+from coartic.internal.text import counted
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Cell, Plan, hash_of
 from coartic.runs.run import PREFIXES, Run
 from coartic.runs.store import Store, open_store, writing
-from coartic.text import counted
 
 _SCORED = (
     *(f"{prefix}{name}" for prefix in PREFIXES.values() for name in ("reward", "hands")),

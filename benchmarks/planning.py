@@ -10,7 +10,7 @@ from typing import Any
 from coartic import CoarticError, Task
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
-from coartic.inputs import (
+from coartic.internal.limits import (
     MOST_RUNS,
     MOST_SECONDS,
     MOST_SEED,

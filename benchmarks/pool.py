@@ -32,12 +32,12 @@ from typing import Any
 
 from coartic.benchmarks.worker import Job, Outcome, answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
-from coartic.files import write_atomically
-from coartic.interruption import blocked_signals
+from coartic.internal.files import write_atomically
+from coartic.internal.interruption import blocked_signals
+from coartic.internal.text import error_line, plain
+from coartic.internal.threads import ONE_THREAD, begin_worker, end_group, environment, threads_for
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
-from coartic.text import error_line, plain
-from coartic.threads import ONE_THREAD, begin_worker, end_group, environment, threads_for
 
 _POLL_S = 0.2  # between looks for answers and at limits
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 import coartic
+from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.threads import ONE_THREAD, threads_for
 from coartic.motion.sources import FINGERPRINT, PACKAGE
-from coartic.text import LONGEST_LINE, plain
-from coartic.threads import ONE_THREAD, threads_for
 
 _LIBRARIES = (
     "casadi",

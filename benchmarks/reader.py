@@ -20,10 +20,10 @@ from typing import Any
 from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.pool import CONTEXT, start_process
 from coartic.errors import CoarticError
+from coartic.internal.text import LONGEST_LINE, error_line, plain
+from coartic.internal.threads import begin_worker, end_group
 from coartic.method import Information, Method
 from coartic.runs.method_info import MethodInfo, answer, load_file, method_info, methods_in
-from coartic.text import LONGEST_LINE, error_line, plain
-from coartic.threads import begin_worker, end_group
 
 _LIMIT_S = 300.0  # of an answer: libraries may take long to import
 _LONGEST_ANSWER = 2**24  # bytes

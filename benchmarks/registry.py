@@ -21,12 +21,12 @@ from pydantic import TypeAdapter
 from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.reader import begin_reader, methods_of_module
 from coartic.errors import CoarticError
-from coartic.inputs import check_file
+from coartic.internal.text import LONGEST_LINE, error_line, plain
+from coartic.internal.toml_files import check_file
 from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
 from coartic.method import Method
 from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info, methods_in
 from coartic.runs.plan import SEARCH
-from coartic.text import LONGEST_LINE, error_line, plain
 
 ENTRY_POINTS = "coartic.methods"
 RESERVED = (METHOD_PREFIX, SEARCH)

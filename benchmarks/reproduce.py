@@ -12,11 +12,11 @@ from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError, SolutionError
-from coartic.inputs import brief_value
+from coartic.internal.limits import brief_value
+from coartic.internal.text import plain, unknown
 from coartic.method import Meter
 from coartic.runs.run import PARTS, Run, execute_all
 from coartic.runs.store import RUNS_FILE, open_store
-from coartic.text import plain, unknown
 from coartic.trajectories import Trajectory, trajectory
 
 

@@ -24,12 +24,12 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError
-from coartic.files import folder_named
-from coartic.inputs import brief_value
+from coartic.internal.files import folder_named
+from coartic.internal.limits import brief_value
+from coartic.internal.text import counted, unknown
 from coartic.runs.plan import Plan, Specification, trials_in
 from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
-from coartic.text import counted, unknown
 
 _EXECUTORS = {
     "jobs": "Local(jobs) of coartic.benchmarks.pool",

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.benchmarks.worker import Job, Outcome
+from coartic.internal.text import LONGEST_REASON, plain
 from coartic.motion.solution import Execution, other_arm_travel
 from coartic.runs.run import Run, Score, execute_all
 from coartic.tasks.task import hands_of
-from coartic.text import LONGEST_REASON, plain
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:

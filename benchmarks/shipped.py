@@ -17,7 +17,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from coartic.errors import CoarticError
-from coartic.files import folder_named
+from coartic.internal.files import folder_named
 from coartic.runs.store import RUNS_FILE, Store, open_content, open_store, writing
 
 SHIPPED = "shipped"

@@ -16,24 +16,16 @@ from pydantic_core import PydanticCustomError
 
 from coartic import ABLATIONS, CONDITIONS, CoarticError, Task, builtin_tasks, load_task, parse_task
 from coartic.benchmarks.registry import Registry
-from coartic.inputs import (
-    MOST_CELLS,
-    MOST_RUNS,
-    MOST_SECONDS,
-    MOST_TRIALS,
-    FileData,
-    brief_value,
-    error_saying,
-    explain_file,
-    read_toml,
-)
+from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_TRIALS, brief_value
+from coartic.internal.text import Line, unknown
+from coartic.internal.toml_files import read_toml
+from coartic.internal.validation import FileData, error_saying, explain_file
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
 from coartic.runs.plan import Cell
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import Family, instance_of, named_by, shipped_families
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
-from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"

@@ -22,6 +22,7 @@ from pydantic import Field, PlainValidator, TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
+from coartic.internal.text import error_line
 from coartic.method import (
     Information,
     Meter,
@@ -36,7 +37,6 @@ from coartic.motion.solution import Movement
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import SEARCH, Specification, run_seed
 from coartic.runs.run import PARTS, Times
-from coartic.text import error_line
 
 _log = logging.getLogger(__name__)  # which is heard where a method is checked
 

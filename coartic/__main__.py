@@ -1,6 +1,6 @@
 """``coartic`` and ``python -m coartic``: the command line."""
 
-from coartic.interruption import catch_signals, end_if_interrupted
+from coartic.internal.interruption import catch_signals, end_if_interrupted
 
 
 def main() -> None:

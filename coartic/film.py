@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
-from coartic.files import check_output, write_output
+from coartic.internal.files import check_output, write_output
 
 if TYPE_CHECKING:
     from coartic.trajectories import Trajectory

@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.estimates import Estimate, mean
-from coartic.inputs import MOST_CELLS, brief_value, check_limits, real_array
+from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
+from coartic.internal.text import unknown
 from coartic.method import Method, MethodError, Session
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.initial import initial_reward
@@ -40,7 +41,6 @@ from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.families import LOCKED, instance_names, shipped_families
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import MOST_GOALS, Split, Task, as_task, parse_task
-from coartic.text import unknown
 
 if TYPE_CHECKING:
     from coartic.sb3 import RobotEnvs

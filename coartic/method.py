@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
-from coartic.inputs import in_sentences
+from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands, too_many_sequences

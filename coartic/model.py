@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from coartic.inputs import brief_value, check_limits
+from coartic.internal.limits import brief_value, check_limits
 
 
 class MotionModel(NamedTuple):

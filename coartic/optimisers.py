@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from coartic.errors import CoarticError
-from coartic.inputs import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
+from coartic.internal.limits import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
+from coartic.internal.text import counted
 from coartic.learner.learning import TRIALS
 from coartic.method import (
     BudgetError,
@@ -39,7 +40,6 @@ from coartic.robot import HANDS, Array
 from coartic.tasks.families import instance_names
 from coartic.tasks.optima import KnownOptimum, best_shipped
 from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
-from coartic.text import counted
 
 if TYPE_CHECKING:  # workers do without pandas
     import pandas as pd

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
-from coartic.inputs import in_sentences
-from coartic.text import short_repr
+from coartic.internal.text import short_repr
+from coartic.internal.validation import in_sentences
 
 Hand = Literal["left", "right"]
 """Which hand: ``"left"`` or ``"right"``."""

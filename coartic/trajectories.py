@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import SolutionError
-from coartic.inputs import check_limits
+from coartic.internal.limits import check_limits
+from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import path_points
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, hands_of
-from coartic.text import short_repr
 
 if TYPE_CHECKING:
     import pandas as pd

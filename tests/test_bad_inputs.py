@@ -14,9 +14,9 @@ from coartic.analysis.sections import FIGURES, TABLES
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER, load_suite, select_cells
+from coartic.internal.text import did_you_mean
 from coartic.tasks.families import FAMILY_FOLDER, read_family
 from coartic.tasks.task import TASK_FOLDER
-from coartic.text import did_you_mean
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from coartic import CoarticError
-from coartic.files import LISTING, make_folder, publish, write_atomically, write_output
+from coartic.internal.files import LISTING, make_folder, publish, write_atomically, write_output
 
 
 def content(folder):

@@ -21,7 +21,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.words import capital, estimate, p_value
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
-from coartic.text import unknown
+from coartic.internal.text import unknown
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""

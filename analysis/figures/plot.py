@@ -19,8 +19,8 @@ from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import RECONSTRUCTED, id_of
 from coartic.errors import CoarticError
-from coartic.inputs import brief_value
-from coartic.text import one_line
+from coartic.internal.limits import brief_value
+from coartic.internal.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
 

@@ -14,8 +14,8 @@ from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.published import RUNS
 from coartic.analysis.words import NO_BREAK, listed, marked
 from coartic.errors import CoarticError
+from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
-from coartic.text import error_line, one_line
 
 Made = TypeVar("Made")
 

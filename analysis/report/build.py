@@ -31,7 +31,7 @@ from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.ranking import differences
 from coartic.analysis.words import id_of, listed, number
-from coartic.files import check_inside, make_folder, publish
+from coartic.internal.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
 HERE = Path(__file__).parent

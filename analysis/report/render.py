@@ -27,7 +27,7 @@ from coartic.analysis.words import (
     number,
     slugs,
 )
-from coartic.text import one_line
+from coartic.internal.text import one_line
 
 TONES = {
     "supported": "good",

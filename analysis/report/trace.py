@@ -14,8 +14,8 @@ from coartic.analysis.methods import name_of
 from coartic.analysis.report.render import columns_of, guarded, is_number, texts_of
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.words import NONE, marked, number
+from coartic.internal.text import plain
 from coartic.runs.plan import hash_of, label_of
-from coartic.text import plain
 
 
 def tables_of(folder: Path) -> dict[str, Path]:

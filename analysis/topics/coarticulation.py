@@ -42,8 +42,8 @@ from coartic.analysis.topics.scores import failed_runs
 from coartic.analysis.words import marked, number, p_value
 from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL
+from coartic.internal.text import counted
 from coartic.robot import HANDS, Array
-from coartic.text import counted
 
 SAME = 1e-9
 """Postures with no larger difference, length units and rad, are the same: it is rounding."""

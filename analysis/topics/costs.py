@@ -21,7 +21,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.words import capital, interval, number
 from coartic.errors import CoarticError
-from coartic.inputs import brief_value
+from coartic.internal.limits import brief_value
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")

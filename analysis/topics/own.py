@@ -14,7 +14,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import ranking, scores
 from coartic.analysis.words import interval, listed, marked, number, p_value
 from coartic.estimates import standard_deviation
-from coartic.text import counted
+from coartic.internal.text import counted
 
 MOST_NAMED = 3
 """Methods from files, and tasks, that a sentence names."""

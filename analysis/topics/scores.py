@@ -21,8 +21,8 @@ from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_
 from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
 from coartic.analysis.words import marked, number, tally
 from coartic.estimates import standard_deviation
+from coartic.internal.text import counted
 from coartic.method import Information
-from coartic.text import counted
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward of each trial",

@@ -13,7 +13,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.words import capital, interval, listed, marked, number
 from coartic.estimates import LEVEL, mean
-from coartic.text import counted
+from coartic.internal.text import counted
 
 MOST_TASKS = 4
 """Tasks on which a sentence names the best setting."""

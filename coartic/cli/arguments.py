@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from coartic.errors import CoarticError
-from coartic.files import folder_named
-from coartic.inputs import check_limits
+from coartic.internal.files import folder_named
+from coartic.internal.limits import check_limits
 
 if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry

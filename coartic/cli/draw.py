@@ -11,7 +11,7 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
-from coartic.text import counted
+from coartic.internal.text import counted
 
 _PICTURED = 12
 """Tasks of a picture, at most."""
@@ -29,7 +29,7 @@ def draw(
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
-    from coartic.files import publish, write_output
+    from coartic.internal.files import publish, write_output
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
@@ -101,7 +101,7 @@ def play(
     import webbrowser
 
     from coartic import load_task
-    from coartic.files import write_output
+    from coartic.internal.files import write_output
     from coartic.play.page import play_page
 
     chosen = [] if task is None else given.tasks_meant([task])

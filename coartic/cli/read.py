@@ -13,10 +13,10 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import complain, say, say_pairs, show_frame
 from coartic.errors import CoarticError
-from coartic.files import folder_named
-from coartic.inputs import MOST_RUNS
-from coartic.interruption import interruptible
-from coartic.text import counted, one_line, unknown
+from coartic.internal.files import folder_named
+from coartic.internal.interruption import interruptible
+from coartic.internal.limits import MOST_RUNS
+from coartic.internal.text import counted, one_line, unknown
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study

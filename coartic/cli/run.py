@@ -13,11 +13,11 @@ from coartic.cli import arguments as given
 from coartic.cli.read import exit_if_parts_failed, say_answers
 from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
-from coartic.files import folder_named
-from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
-from coartic.interruption import interruptible
-from coartic.text import counted, one_line, unknown
-from coartic.threads import MOST_JOBS
+from coartic.internal.files import folder_named
+from coartic.internal.interruption import interruptible
+from coartic.internal.limits import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.internal.text import counted, one_line, unknown
+from coartic.internal.threads import MOST_JOBS
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
@@ -335,7 +335,7 @@ def new(
     from coartic.benchmarks import template
     from coartic.benchmarks.reader import check_declaration
     from coartic.benchmarks.registry import add_methods, registry
-    from coartic.files import write_output
+    from coartic.internal.files import write_output
     from coartic.runs.method_info import method_info
 
     path = Path(given.file_name(name)) if out is None else out

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, TextIO
 
-from coartic.text import counted, one_line
+from coartic.internal.text import counted, one_line
 
 if TYPE_CHECKING:
     import pandas as pd

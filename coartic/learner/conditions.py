@@ -18,9 +18,10 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError
-from coartic.inputs import brief_value, in_sentences
+from coartic.internal.limits import brief_value
+from coartic.internal.text import short_repr, unknown
+from coartic.internal.validation import in_sentences
 from coartic.robot import HANDS, Hand
-from coartic.text import short_repr, unknown
 
 if TYPE_CHECKING:
     from coartic.method import Outline

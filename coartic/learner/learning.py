@@ -11,7 +11,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from coartic.errors import NotApplicableError
-from coartic.inputs import MOST_TRIALS, brief_value, check_limits
+from coartic.internal.limits import MOST_TRIALS, brief_value, check_limits
+from coartic.internal.threads import threads_for
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
     COUNTED,
@@ -39,7 +40,6 @@ from coartic.motion.solution import Movement, hands_in, movements_by_goal
 from coartic.motion.trials import trials_on
 from coartic.robot import HANDS
 from coartic.tasks.task import Task, TaskLike, as_task, check_hands, letters_of
-from coartic.threads import threads_for
 
 TRIALS = 10_000  # trials of one run (published)
 _MOST_SEED = 2**128 - 1  # seeds of runs are hashes

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
+from coartic.internal.text import short_repr
 from coartic.learner.conditions import ExplorationCondition
 from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.solution import Execution, Movement, execute, hands_in
 from coartic.robot import Array
 from coartic.tasks.task import Task
-from coartic.text import short_repr
 
 CORRECTIONS = "corrections"
 """Detail of a stored run: corrective movements in trial 0 and in each tenth of the others."""

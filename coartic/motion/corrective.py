@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, inlined, inner, joint_lever, shared
 from coartic.motion.movement import check_goal, configuration, largest_square
@@ -32,7 +33,6 @@ from coartic.motion.slots import (
 )
 from coartic.motion.trigonometry import LARGEST
 from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
-from coartic.text import short_repr
 
 _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # statuses of a slot
 

@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Mapping
 from functools import lru_cache
 
 from coartic.errors import NotApplicableError
-from coartic.inputs import brief_value
+from coartic.internal.limits import brief_value
 from coartic.model import PAPER, MotionModel
 from coartic.motion.reach import compiled_task
 from coartic.motion.solution import Execution, Movement, execute, execute_many

@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.inputs import real_array
+from coartic.internal.limits import real_array
+from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.compiled import entry, fill_row, inner, shared
@@ -39,7 +40,6 @@ from coartic.motion.slots import (
     winding,
 )
 from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
-from coartic.text import short_repr
 
 # Distance kept clear beyond what the bounds ask for, which is more where positions are rounded by
 # more: a joint's share of how far from 0 they, and the angles of the arm times its length, can be.

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.internal.threads import in_parts
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, fill_row, inlined, shared
 from coartic.motion.corrective import correct_slots
@@ -24,7 +25,6 @@ from coartic.motion.robot_parameters import arm_of, robot_parameters_for
 from coartic.motion.slots import SLOTS, load, runs_for, slots_for, start
 from coartic.robot import Array, Robot
 from coartic.tasks.task import Task
-from coartic.threads import in_parts
 
 IDLE, CHECK, MOVE, REPEAT = range(4)
 """How a run acts next: not at all; it checks whether its hand is in the goal; it moves to its

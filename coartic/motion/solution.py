@@ -18,7 +18,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from coartic.errors import SolutionError
-from coartic.inputs import brief_value
+from coartic.internal.limits import brief_value
+from coartic.internal.text import counted, short_repr
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import correct, explain_failure
 from coartic.motion.movement import LARGEST_ENTRY, configuration, follow, move
@@ -26,7 +27,6 @@ from coartic.motion.outside import note_trials
 from coartic.motion.reach import CompiledTask, compiled_task, reach_all
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, letters_of
-from coartic.text import counted, short_repr
 
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coartic.inputs import brief_value, real_array
+from coartic.internal.limits import brief_value, real_array
 from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.reach import CompiledTask, reach_all
 from coartic.motion.solution import Movement, hold_base

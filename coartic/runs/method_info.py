@@ -17,10 +17,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from coartic.errors import CoarticError
-from coartic.inputs import explain_inline
+from coartic.internal.text import error_line, plain
+from coartic.internal.validation import explain_inline
 from coartic.method import Method, Outline, outline_of
 from coartic.tasks.task import Task
-from coartic.text import error_line, plain
 
 BUILT_IN = "built in"
 """Origin of this project's methods."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, TypeAdapter
 
-from coartic.inputs import MOST_RUNS
+from coartic.internal.limits import MOST_RUNS
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.model import PAPER
 from coartic.runs.method_info import MethodInfo

@@ -30,13 +30,14 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from coartic.errors import CoarticError
-from coartic.inputs import MOST_TRIALS, explain_inline
+from coartic.internal.limits import MOST_TRIALS
+from coartic.internal.text import one_line, plain
+from coartic.internal.validation import explain_inline
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import Plan, Specification, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
 from coartic.tasks.task import Task
-from coartic.text import one_line, plain
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from coartic.errors import TaskError
-from coartic.inputs import brief_value
+from coartic.internal.limits import brief_value
+from coartic.internal.text import unknown
 from coartic.tasks.families import instance
 from coartic.tasks.task import Task, read_task, shipped_tasks
-from coartic.text import unknown
 
 
 def builtin_tasks() -> tuple[str, ...]:

@@ -29,7 +29,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
-from coartic.inputs import MOST_CELLS, FileData, check_limits, error_saying, explain_file, read_toml
+from coartic.internal.limits import MOST_CELLS, check_limits
+from coartic.internal.text import Line, counted, unknown
+from coartic.internal.toml_files import read_toml
+from coartic.internal.validation import FileData, error_saying, explain_file
 from coartic.model import PAPER
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
@@ -44,7 +47,6 @@ from coartic.tasks.task import (
     address_of,
     parse_task,
 )
-from coartic.text import Line, counted, unknown
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}

@@ -20,18 +20,13 @@ import numpy as np
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from coartic.errors import CoarticError, TaskError
-from coartic.files import folder_named, write_output
-from coartic.inputs import (
-    FileData,
-    brief_value,
-    error_saying,
-    explain_file,
-    read_toml,
-    real_array,
-)
+from coartic.internal.files import folder_named, write_output
+from coartic.internal.limits import brief_value, real_array
+from coartic.internal.text import Line, counted, did_you_mean, short_repr
+from coartic.internal.toml_files import read_toml
+from coartic.internal.validation import FileData, error_saying, explain_file
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
-from coartic.text import Line, counted, did_you_mean, short_repr
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")

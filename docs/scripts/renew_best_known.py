@@ -20,13 +20,13 @@ import numpy as np
 from coartic import CoarticError, Movement, Task, execute
 from coartic.analysis.optima import from_runs, restrictions
 from coartic.analysis.study import Study, load
-from coartic.files import write_atomically
+from coartic.internal.files import write_atomically
+from coartic.internal.text import one_line
 from coartic.runs.plan import SEARCH
 from coartic.runs.store import open_store
 from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import BASE, BEST_KNOWN, essence
 from coartic.tasks.task import address_of
-from coartic.text import one_line
 
 MOST = 40
 """Instances of each family."""

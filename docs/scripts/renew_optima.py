@@ -10,10 +10,10 @@ from typing import Any
 from coartic import CoarticError
 from coartic.analysis.optima import from_runs, restrictions
 from coartic.analysis.study import Study, load
-from coartic.files import write_atomically
+from coartic.internal.files import write_atomically
+from coartic.internal.text import one_line
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import DATA, entries, essence
-from coartic.text import one_line
 
 OTHER_SEARCH = "trajectory-optimisation/path-length"
 

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from coartic.inputs import check_limits
-from coartic.interruption import ENDING
+from coartic.internal.interruption import ENDING
+from coartic.internal.limits import check_limits
 
 MOST_JOBS = 10_000
 ONE_THREAD = dict.fromkeys(

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from coartic.errors import CoarticError
-from coartic.text import plain
+from coartic.internal.text import plain
 
 LISTING = ".coartic-files"
 """In a folder: the files that a command wrote into it, a path a line."""

@@ -1,43 +1,23 @@
-"""What users hand in: files, read bounded, what is wrong with them in words, and how much a plan
-may ask for."""
+"""Data of files that users write, and sentences for what is wrong with them."""
 
 from __future__ import annotations
 
-import numbers
 import re
-import stat
-import tomllib
 from collections.abc import Iterable, Sequence
 from functools import wraps
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
-from coartic.errors import CoarticError
-from coartic.text import LONGEST_LINE, counted, did_you_mean, plain, short_repr
+from coartic.internal.limits import brief_value
+from coartic.internal.text import counted, did_you_mean, plain, short_repr
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from pydantic_core import ErrorDetails
 
 T = TypeVar("T")
 
-MOST_CELLS = 10_000
-"""Most cells of a suite: sixty times the largest one shipped."""
-MOST_RUNS = 1_000_000
-"""Most runs of a cell."""
-MOST_TRIALS = 10_000_000
-"""Most trials of a run: a thousand times the paper's; their rewards are kept."""
-MOST_SECONDS = 1_000_000
-"""Most seconds of a run: eleven days; the system's clocks of waiting end at twice that."""
-MOST_SEED = 2**63 - 1
-MOST_BYTES = 10_000_000
-"""Most bytes of a file of tasks, suites or methods: a hundred times the largest one shipped."""
-WIDTHS = (1e-9, 100.0)
-"""Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
 
 _SHOWN = 20  # problems of one file
 _PLAINER = {
@@ -90,67 +70,6 @@ class FileData(BaseModel):
 
     def __str__(self) -> str:
         return repr(self)
-
-
-def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
-    """The content of a TOML file. Raises ``error`` for one that cannot be used."""
-    check_file(path, error=error)
-    shown = plain(str(path), LONGEST_LINE)
-    try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError:
-        raise error(f"{shown}: is not a text file in UTF-8") from None
-    except OSError as failure:
-        raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
-    except (ValueError, RecursionError) as failure:  # TOMLDecodeError is a ValueError
-        raise error(f"{shown}: is not valid TOML: {plain(str(failure), 80)}") from None
-
-
-def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) -> None:
-    """Raises ``error`` for what cannot be read or is no file, such as a pipe or a device, and for
-    a file of more than :data:`MOST_BYTES`."""
-    shown = plain(str(path), LONGEST_LINE)
-    try:
-        found = Path(path).stat()
-    except (OSError, ValueError) as failure:  # ValueError: a NUL in the name
-        reason = getattr(failure, "strerror", None) or failure
-        raise error(f"{shown}: cannot be read: {reason}") from None
-    if not stat.S_ISREG(found.st_mode):
-        kind = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
-        raise error(f"{shown}: cannot be read: it is {kind}, not a file")
-    if found.st_size > MOST_BYTES:
-        raise error(f"{shown}: has {found.st_size} bytes; it may have {MOST_BYTES} at most")
-
-
-def check_limits(name: str, value: Any, least: float, most: float) -> None:
-    """Raises ValueError for what is no number from ``least`` to ``most``, or, where ``least`` is
-    an ``int``, no whole one."""
-    whole = isinstance(least, int)
-    kind = numbers.Integral if whole else numbers.Real
-    is_number = isinstance(value, kind) and not isinstance(value, bool)
-    if not is_number or not least <= float(value) <= most:
-        raise ValueError(
-            f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
-            f"from {least:{'' if whole else 'g'}} to {most:{'_' if isinstance(most, int) else 'g'}}"
-        )
-
-
-def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Numbers as an array of the shape that they have. Raises ValueError for anything else."""
-    import numpy as np  # which the command line's help does without
-
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        raise ValueError(f"{name} has rows of different lengths") from None
-    if array.dtype.kind not in "uif":
-        raise ValueError(f"{name} is {brief_value(value)}; needed are real numbers")
-    return array.astype(np.float64, copy=False)
-
-
-def brief_value(value: object) -> str:
-    """A value as it would be written in Python, as one short printable line."""
-    return plain(repr(value), 80)
 
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:

@@ -1,0 +1,57 @@
+"""Limits on what a plan may ask for, and checks of the numbers that users give."""
+
+from __future__ import annotations
+
+import numbers
+from typing import TYPE_CHECKING, Any
+
+from coartic.internal.text import plain
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+MOST_CELLS = 10_000
+"""Most cells of a suite: sixty times the largest one shipped."""
+MOST_RUNS = 1_000_000
+"""Most runs of a cell."""
+MOST_TRIALS = 10_000_000
+"""Most trials of a run: a thousand times the paper's; their rewards are kept."""
+MOST_SECONDS = 1_000_000
+"""Most seconds of a run: eleven days; the system's clocks of waiting end at twice that."""
+MOST_SEED = 2**63 - 1
+MOST_BYTES = 10_000_000
+"""Most bytes of a file of tasks, suites or methods: a hundred times the largest one shipped."""
+WIDTHS = (1e-9, 100.0)
+"""Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
+
+
+def check_limits(name: str, value: Any, least: float, most: float) -> None:
+    """Raises ValueError for what is no number from ``least`` to ``most``, or, where ``least`` is
+    an ``int``, no whole one."""
+    whole = isinstance(least, int)
+    kind = numbers.Integral if whole else numbers.Real
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    if not is_number or not least <= float(value) <= most:
+        raise ValueError(
+            f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
+            f"from {least:{'' if whole else 'g'}} to {most:{'_' if isinstance(most, int) else 'g'}}"
+        )
+
+
+def real_array(name: str, value: Any) -> NDArray[np.float64]:
+    """Numbers as an array of the shape that they have. Raises ValueError for anything else."""
+    import numpy as np  # which the command line's help does without
+
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ValueError(f"{name} has rows of different lengths") from None
+    if array.dtype.kind not in "uif":
+        raise ValueError(f"{name} is {brief_value(value)}; needed are real numbers")
+    return array.astype(np.float64, copy=False)
+
+
+def brief_value(value: object) -> str:
+    """A value as it would be written in Python, as one short printable line."""
+    return plain(repr(value), 80)

@@ -1,0 +1,42 @@
+"""Read TOML files of users, of a bounded size."""
+
+from __future__ import annotations
+
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from coartic.errors import CoarticError
+from coartic.internal.limits import MOST_BYTES
+from coartic.internal.text import LONGEST_LINE, plain
+
+
+def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
+    """The content of a TOML file. Raises ``error`` for one that cannot be used."""
+    check_file(path, error=error)
+    shown = plain(str(path), LONGEST_LINE)
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError:
+        raise error(f"{shown}: is not a text file in UTF-8") from None
+    except OSError as failure:
+        raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
+    except (ValueError, RecursionError) as failure:  # TOMLDecodeError is a ValueError
+        raise error(f"{shown}: is not valid TOML: {plain(str(failure), 80)}") from None
+
+
+def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) -> None:
+    """Raises ``error`` for what cannot be read or is no file, such as a pipe or a device, and for
+    a file of more than :data:`MOST_BYTES`."""
+    shown = plain(str(path), LONGEST_LINE)
+    try:
+        found = Path(path).stat()
+    except (OSError, ValueError) as failure:  # ValueError: a NUL in the name
+        reason = getattr(failure, "strerror", None) or failure
+        raise error(f"{shown}: cannot be read: {reason}") from None
+    if not stat.S_ISREG(found.st_mode):
+        kind = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
+        raise error(f"{shown}: cannot be read: it is {kind}, not a file")
+    if found.st_size > MOST_BYTES:
+        raise error(f"{shown}: has {found.st_size} bytes; it may have {MOST_BYTES} at most")
