@@ -2,8 +2,7 @@
 #   make benchmark   the paper's experiments, all methods beside them, and the report
 #   make test        the test suite
 # make benchmark FULL=1 adds the ablations and the search for the optima. make docs builds the
-# site; make findings and make studies make the numbers in it anew; make paper prints the two
-# articles.
+# site; make findings and make studies make the numbers in it again.
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= results
@@ -15,7 +14,7 @@ STORED := comparison ablations families
 FAMILIES := one-armed two-armed aligned redundancy long
 STUDIES ?= $(notdir $(wildcard studies/[a-z]*))
 
-.PHONY: benchmark test check format docs shipped findings studies paper speed release-check setup clean
+.PHONY: benchmark test check format docs shipped findings studies speed release-check setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -82,10 +81,6 @@ studies: $(READY)
 	  $(BIN)/python studies/$$study/study.py $(OUT)/$$study || exit; \
 	done
 	$(BIN)/python docs/make_findings.py
-
-# The two articles, docs/paper.md and docs/ahead.md, as PDF; it needs Chromium.
-paper: $(READY)
-	$(BIN)/python docs/print_paper.py
 
 setup: $(READY)
 

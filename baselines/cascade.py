@@ -5,7 +5,7 @@ Level 1, an inequality task, as nearly as it can be met::
     min  s² + λ² |x|²     subject to   A x + s >= b,       |x_i| <= L
     s, x
 
-Level 2, of all changes that fall short of it no more than that, the nearest to the preferred z::
+Level 2, the change nearest to the preferred z among the changes that meet level 1 as nearly::
 
     min  |x - z|²         subject to   A x >= b - s⁺ - ε,  |x_i| <= L
      x

@@ -25,7 +25,7 @@ class GivenHands(Method):
     stochastic = False
 
     def solve(self, session: Session) -> Result:
-        """One trial, the targets found by **A** as it goes."""
+        """Make one trial in which **A** finds the target of each goal as it comes."""
         hands = session.find_initial_hands()
         with session.solving():
             execution = session.trial(corrective_movements(hands))
@@ -48,7 +48,8 @@ class BestHands(Method):
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """One trial per sequence; of equal ones the one with the fewest changes of hand."""
+        """Make one trial for each hand sequence; of equal rewards keep the one with the fewest
+        changes of hand."""
         completed: list[tuple[int, int, Execution]] = []
         for hands in sequences_with(session.hands, session.goals_count, session.task_name):
             if session.trials_left == 0:

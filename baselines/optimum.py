@@ -35,7 +35,7 @@ class OptimumParameters(Parameters):
     """The restriction, how long to search, and the budget of the proof."""
 
     other_arm: Literal["free", "still"] = "free"
-    """Whether the arm that is not chosen may move."""
+    """``still``: the arm that is not chosen does not move."""
     base: Literal["task", "y", "xy"] = "task"
     """Base coordinates that are locked: those of the task, or these in addition."""
     nodes: Annotated[int, Field(ge=10, le=1000)] = 200

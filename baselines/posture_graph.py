@@ -115,10 +115,10 @@ class PostureGraph:
         return cls(task, layers, spent)
 
     def chains(self, most: int | None = None) -> list[Chain]:
-        """The cheapest chain of every hand sequence that has one, left before right.
+        """Return the cheapest chain of each hand sequence that has a chain, left before right.
 
-        ``most`` bounds their number: of the beginnings of sequences, goal by goal, the cheapest
-        are kept; none is lost while there are no more than that.
+        At most ``most`` beginnings of sequences are kept at each goal, the cheapest; with fewer
+        sequences than that none is lost.
         """
         start = dict.fromkeys(HANDS, np.array(self.task.q0)[None, :])
         kept = [Beginning((), start, np.zeros((1, 1)), ())]

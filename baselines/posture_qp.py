@@ -212,7 +212,7 @@ class Controller:
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """One Gauss-Newton step to the posture nearest to a preferred one that hits a goal.
+        """Make a Gauss-Newton step to the posture that hits a goal nearest to a preferred posture.
 
         Returns the posture and the norm of the change.
         """

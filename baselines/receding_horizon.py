@@ -56,7 +56,8 @@ class RecedingHorizonParameters(Parameters):
 
 
 class RecedingHorizon(Method):
-    """The shortest movements through the next goals, of which it makes the first."""
+    """Plan the shortest movements through the next goals, make the first of them, and plan
+    again."""
 
     name = "receding-horizon"
     title = "Receding-horizon planning of the shortest path"

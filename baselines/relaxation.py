@@ -56,7 +56,8 @@ _EXACT = {"tol_gap_abs": 1e-5, "tol_gap_rel": 1e-5, "tol_feas": 1e-7}
 
 
 class Relaxed(NamedTuple):
-    """The shortest path of the relaxation in a box, and multipliers; zeros where there is none."""
+    """Shortest path of the relaxation in a box, and its multipliers; zeros where the box has no
+    path."""
 
     q: Array
     """Configurations, shape ``(G, dof)``."""
@@ -69,15 +70,15 @@ class Relaxed(NamedTuple):
     forces: Array
     """λ of the hands at their goals, shape ``(G, 2)``."""
     iterations: int
-    """Of the solver."""
+    """Iterations of the solver."""
 
 
 class Relaxation:
-    """The cone programme of one hand sequence, whose parameters are the half-spaces of a box.
+    """Cone programme of one hand sequence; its parameters are the half-spaces of a box.
 
-    ``merged`` are the goals (0-based) that are hit without a movement, all of whose hands
-    are decided. A box has the intervals of the absolute link angles, shape ``(links, 2)``,
-    rad, of the chosen arms at the goals whose hand is decided, goal by goal.
+    ``merged`` are the goals (0-based) that are hit without a movement; their hands are all decided.
+    A box has the intervals of the absolute link angles, shape ``(links, 2)``, rad, of the chosen
+    arms at the goals whose hand is decided, goal by goal.
     """
 
     def __init__(
@@ -266,7 +267,7 @@ def split(box: Array, relaxed: Relaxed) -> tuple[Array, Array]:
 
 
 def value_of(variable: Any) -> Array:
-    """The value of a variable or of a multiplier; zeros where there is none."""
+    """Return the value of a variable or multiplier; zeros where the solver gives no value."""
     if variable.value is None:
         return np.zeros(variable.shape)
     return np.array(variable.value, dtype=np.float64)

@@ -117,7 +117,7 @@ class PathPlan:
     """The outcome of a solve."""
 
     instance: Instance
-    """That was solved."""
+    """The instance that was solved."""
     converged: bool
     reason: str
     """IPOPT's return status."""

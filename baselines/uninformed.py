@@ -51,7 +51,7 @@ class Attempts:
         return explored_joints(self._session, hands)
 
     def by_correction(self, hands: str) -> Trials:
-        """One trial by **A** alone."""
+        """Make one trial by **A** alone."""
         shape = (1, self._session.goals_count, self._session.dof)
         return self.by_targets(hands, np.full(shape, np.nan))
 

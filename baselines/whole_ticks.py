@@ -33,7 +33,8 @@ class TickPlan:
     """A plan in whole steps."""
 
     steps: tuple[int, ...]
-    """Movement steps to each goal; 0 where the goal is hit as its turn comes."""
+    """Movement steps to each goal; 0 where the hand is in the goal when the goal becomes
+    current."""
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
 
@@ -87,11 +88,9 @@ class Rounding:
     def plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """The plan itself, and shortest plans in which some goals are hit as their turn comes.
-
-        Worth it where the path grows by less than the ticks it saves. It only grows with
-        further such goals, so that sets are left out of which all ticks that could be saved
-        leave more than is ``worth`` it.
+        """Yield the plan itself, and shortest plans in which some goals are hit without a movement.
+        Such a plan pays if its path grows by less than the ticks that it saves. The path only grows
+        with further such goals, so sets are left out that cannot save what is ``worth`` it.
         """
         goals = len(self._instance.hands)
         able = mergeable(task, self._instance.hands)

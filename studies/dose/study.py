@@ -1,4 +1,4 @@
-"""How much of the whole-task reward is needed?
+"""Measure how much of the whole-task reward coarticulation needs.
 
     coartic run studies/dose/suite.toml
     python studies/dose/study.py results/dose
@@ -32,11 +32,11 @@ MEASURES = {
     "first": "first movement slower (ticks)",
     "saved": "ticks saved (%)",
 }
-"""What is measured of each run, with the words of its axis."""
+"""Measures of each run, with the label of its axis."""
 SHARED = ("ascending", "descending")
 """Tasks of the paper that have the first goal in common, and no others."""
 TICK = 1.0
-"""What a movement can lose to rounding alone: claims about its ticks have to show more."""
+"""Ticks that a movement can lose to rounding alone: claims about its ticks have to show more."""
 GAIN = 1.0
 """Per cent of the ticks of the initial solution that count as a gain, set before the runs."""
 
@@ -66,7 +66,8 @@ def measure_runs(study):
 
 
 def tabulate(study, runs):
-    """What is learned by γ: means over random tasks, or over the runs on one of the paper's."""
+    """Tabulate the gains of learning by γ: means over random tasks, or over the runs on a task of
+    the paper."""
     every = pd.concat([runs[runs.family.notna()].assign(group="random"), runs])
     every["row"] = every.group + " " + every.kind
     unit = every.run.where(every.family.isna(), 0)  # random tasks count alike, whatever their runs
@@ -81,8 +82,9 @@ def tabulate(study, runs):
 def tabulate_posture_difference(study, runs):
     """Posture difference at the goal that two tasks of the paper share, by γ.
 
-    ``posture_difference``: length unit and rad mixed. ``posture_difference_p``: of the permutation
-    test that there is none. ``beyond_p``: of the test that it is no larger than in random search.
+    ``posture_difference``: length unit and rad mixed. ``posture_difference_p``: p of the
+    permutation test that there is no difference. ``beyond_p``: p of the test that the difference is
+    no larger than in random search.
     """
     random_search = TwoContexts(
         *(study.executed(task, RANDOM_SEARCH) for task in SHARED), 1, "right"
@@ -192,7 +194,7 @@ LOOKS = {
     "later": {"label": "later ones alone", "color": figures.PALETTE[1], "linestyle": "--"},
     "random search": {"label": "random search", "color": figures.GREY, "linestyle": ":"},
 }
-"""How a line is called and drawn, by what counts."""
+"""Label and style of a line, by the movements whose rewards count."""
 
 
 @figures.styled
@@ -219,7 +221,7 @@ def draw(table):
 
 
 def measure(study):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     runs = measure_runs(study)
     return {"results": tabulate(study, runs), "claims": judge_claims(study, runs)}
 

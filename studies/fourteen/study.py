@@ -115,7 +115,7 @@ def tabulate_others(study):
 
 
 def tabulate_gains(study, plans):
-    """What each goal ahead gains on each task, as a share of a mean movement."""
+    """Tabulate the gain of each further goal ahead on each task, as a share of a mean movement."""
     rows = (plans.task + " h=" + plans.horizon.astype(str)).rename("row")
     return plans.set_index(rows)[["family", "task", "horizon", "ticks", "gain"]]
 
@@ -145,9 +145,9 @@ def signed_rank(gains, than):
 
 
 def tabulate_fourth(repeats):
-    """What the fourth goal ahead gains with two arms, by tasks and repeats: p of more than 1 %.
-
-    Of all tasks, of the first ones (i000 to i027), and of those that were added; then by repeat.
+    """Tabulate the gain of the fourth goal ahead with two arms, with p of the test that it exceeds
+    1 %: over all tasks, over the first tasks (i000 to i027), over the tasks added later, and by
+    repeat.
     """
     repeats = repeats.assign(gain=100 * repeats.gain)
     gains = repeats.groupby("task").gain.mean()
@@ -259,7 +259,7 @@ def draw(table):
 
 
 def measure(study):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     plans, repeats = measure_plans(study), measure_repeats(study)
     return {
         "results": tabulate(study, plans),

@@ -155,7 +155,7 @@ def draw(table):
 
 
 def measure(study):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     every = measure_plans(study)
     plans = average(every)
     repeats = {

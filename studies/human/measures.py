@@ -1,4 +1,4 @@
-"""What the findings of human.toml are put to: a function for each measure.
+"""Measures by which models are compared with the findings of human.toml, a function each.
 
 A measure takes the runs of all models (:func:`tidy`) and the name of one, and returns its values by
 task, as a Series or, of several numbers, a frame; tasks can have several rows. A statistic is made
@@ -17,7 +17,7 @@ import pandas as pd
 from coartic import Task, corrective_trial, trajectory
 
 MODELS = tomllib.loads(Path(__file__).with_name("human.toml").read_text("utf-8"))["models"]
-"""What is compared with people, by name: methods with their parameters."""
+"""Models that are compared with people, by name: methods with their parameters."""
 BESIDE = {
     "learner, begun": MODELS["learner"] | {"parameters": {"trials": 100}},
     "learner, replayed, begun": MODELS["learner, replayed"] | {"parameters": {"trials": 100}},
@@ -25,7 +25,7 @@ BESIDE = {
     "least jerk, stopping": MODELS["least jerk"] | {"parameters": {"stop": 1}},
     "any goals ahead": {"method": "receding-horizon"},
 }
-"""What some of them are compared with: the learner after a hundredth of its practice, plans that
+"""Further models that some measures need: the learner after a hundredth of its practice, plans that
 stop at each goal, all points of the planner's curve."""
 STATIONS = 100
 """Points at equal distances along a hand's path."""
@@ -71,7 +71,8 @@ def tidy(study):
 
 
 def unmoved(runs, model, arms):
-    """A model's paths by task, on tasks with so many arms and few goals, none of which moves."""
+    """Return a model's paths by task, on tasks with this number of arms and few goals whose goals
+    are not moved."""
     short = (runs.moved == 0) & (runs.goals < LONG)
     ours = runs[short & (runs.model == model) & (runs.arms == arms)]
     return ours.set_index("task").path
@@ -253,13 +254,14 @@ def excess_of_first(runs, model):
 
 
 def near_tie_repeats(runs, model):
-    """Whether the hand stays the same in each near tie, 0 or 1; NaN if all tasks have few."""
+    """Return for each near tie whether the hand stays the same, 0 or 1; NaN if all tasks have
+    few."""
     repeats = unmoved(runs, model, arms=2).map(repeats_of_path).explode().dropna().astype(float)
     return repeats if len(repeats) >= FEWEST_TIES else repeats * np.nan
 
 
 def repeats_of_path(path):
-    """Whether the hand stays the same, of each goal that both hands reach as soon alone."""
+    """Return whether the hand stays the same at each goal that both hands reach as soon alone."""
     repeats = []
     for goal in range(2, len(path.hands) + 1):
         few, many = np.sort([ticks_alone(path, goal, hand) for hand in ("left", "right")])

@@ -63,7 +63,7 @@ def by_model(words):
 
 
 def judge_test(measured, model, test, level, silent):
-    """One test of a finding put to a model; ``silent``: why nothing follows for the model."""
+    """Apply one test of a finding to a model; ``silent``: why nothing follows for the model."""
     name, (side, word) = test["measure"], (1, "above") if "above" in test else (-1, "below")
     bound, statistic = test[word], MEASURES[name][1]
     values = pd.Series() if silent else measured(name, model)
@@ -158,7 +158,7 @@ def draw(table):
 
 
 def measure(study):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     effects = measure_effects(study)
     return {"results": tabulate(effects), "effects": effects}
 

@@ -34,7 +34,7 @@ DRAWN = {  # methods in the figure, and their names
 }
 HEIGHTS = np.array([-1.5, -1.0, -0.5, 0.0, 0.5, 1.0])
 WEIGHTS = (HEIGHTS - HEIGHTS.mean()) / ((HEIGHTS - HEIGHTS.mean()) ** 2).sum()
-"""Of values at these heights, whose weighted sum is then the slope of least squares."""
+"""Weights of values at these heights; the weighted sum is the least-squares slope."""
 BESIDE = [(1, 2), (3, 2), (2, 3), (2, 1)]  # a goal, and its neighbour that moves
 
 
@@ -92,9 +92,10 @@ def regress(postures):
 
 
 def tabulate_slopes(runs):
-    """How the posture at a goal follows its neighbour that moves, as :func:`regress` measures it.
+    """Tabulate how the posture at a goal follows a neighbouring goal that moves, as :func:`regress`
+    measures it.
 
-    ``p_holm`` is corrected over the tests of a method; ``p_random_search`` is of the test that
+    ``p_holm`` is corrected over the tests of a method; ``p_random_search`` is p of the test that
     postures follow the neighbour more than in random search.
     """
     rows = {}
@@ -129,7 +130,7 @@ def draw(table):
 
 
 def measure(study):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     runs = measure_runs(study)
     return {"results": tabulate(runs), "slopes": tabulate_slopes(runs)}
 

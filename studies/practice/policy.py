@@ -41,7 +41,7 @@ from coartic.tasks.families import read_family
 
 FAMILY = Path(__file__).with_name("eight.v1.toml")
 COURSE = 327_680
-"""Trials in the course of which noise and step size fall."""
+"""Trials over which noise and step size fall."""
 KEPT_AFTER = (20_480, 81_920, COURSE)
 """Numbers of trials after which a policy is kept in passing."""
 BATCH, PART, EPOCHS, UNITS = 512, 1024, 4, 64
@@ -64,7 +64,7 @@ BENDS = slice(ARM.start + 1, ARM.stop)
 
 
 class PracticeParameters(Parameters):
-    """What the agent sees, how much it has practised, and which agent it is."""
+    """Parameters of an agent: how many goals it sees, how much it has practised, and its number."""
 
     ahead: Annotated[int, Field(ge=0, le=7)] = 1
     """Goals in view beyond the one to be hit."""
@@ -75,7 +75,7 @@ class PracticeParameters(Parameters):
 
 
 class Practised(Method):
-    """One trial of a policy that has practised on other tasks."""
+    """Make one trial by a policy that has practised on other tasks."""
 
     name = "practice/policy"
     title = "Policy practised on other tasks"
@@ -125,17 +125,17 @@ class Practised(Method):
 
 
 class Subtask(NamedTuple):
-    """What N arms see and do at a goal."""
+    """Observations and actions of N arms at a goal."""
 
     seen: np.ndarray
     """Observations, shape ``(N, O)``."""
     mean: np.ndarray
-    """What the policy would do, shape ``(N, 6)``; with noise it is ``action``."""
+    """Mean action of the policy, shape ``(N, 6)``; with noise added it is ``action``."""
     action: np.ndarray
     target: np.ndarray
-    """Where the arms moved to, shape ``(N, dof)``."""
+    """Configurations to which the arms moved, shape ``(N, dof)``."""
     reached: tuple[Reached, ...]
-    """What came of both postures in the head, and of the movement."""
+    """Outcomes of both imagined postures, and of the movement."""
 
 
 def trial(policy, q, goals, ahead, radius, model, noise=None):
@@ -193,11 +193,13 @@ def seen_from(axes, vectors):
 
 
 def observe(q, posture, goals, ahead):
-    """What agents at ``q`` see, shape ``(N, 22 + 3 * ahead)``, wherever they stand or in a mirror.
+    """Return the observations of agents at ``q``, shape ``(N, 22 + 3 * ahead)``, the same wherever
+    they stand and in a mirror image.
 
-    The shape of the ``posture`` that hits the next goal, the displacement to it, and from the
-    posture's upper arm the goals ahead, each with 1, or zeros where there is none. ``goals``, shape
-    ``(N, W, 2)``, are the next one and those in view beyond it, as many as there are.
+    The shape of the ``posture`` that hits the next goal, the displacement to it, and the goals
+    ahead as seen from the posture's upper arm, each with 1, or zeros where no goal is left.
+    ``goals``, shape ``(N, W, 2)``, are the next one and those in view beyond it, as many as there
+    are.
     """
     (axes, side), next_goal, displacement = from_arm(posture), goals[:, 0], q - posture
     bends = directions(side * posture[:, BENDS]).reshape(len(q), -1)

@@ -212,7 +212,7 @@ def repeat_plans(study):
 
 
 def measure(study):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     gaps = measure_gaps(study)
     return {
         "results": tabulate(gaps),

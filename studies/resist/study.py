@@ -29,8 +29,9 @@ PLACES = 3
 SHUFFLES = 999
 """Orders of the slopes of a task by which chance is estimated."""
 TONGUES = 0.5
-"""Of rank correlations. Of tongues resistance and aggressiveness are said to be highly positively
-correlated, without a number in the abstract: half of a perfect correlation is little for that."""
+"""Bound on rank correlations. Resistance and aggressiveness of tongue movements are said to be
+highly positively correlated, without a number in the abstract; half of a perfect correlation is a
+low bound for that."""
 
 
 def measure_tasks(study):
@@ -175,7 +176,7 @@ def draw(table):
 
 
 def measure(study):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     tasks = measure_tasks(study)
     return {"results": tabulate(tasks), "claims": judge_claims(tasks)}
 

@@ -90,13 +90,13 @@ def look(task, movements):
 
 
 def plan(task, method, seed=0, **parameters):
-    """What a planner or controller of the package does."""
+    """Return the solution of a planner or controller of the package."""
     session = Session(task, seed, method.information, trusted=True)
     return look(task, method(method.Parameters(**parameters)).solve(session).solution)
 
 
 def learned(task, seed, start):
-    """What the learner does after :data:`AFTER` trials from a first solution."""
+    """Return what the learner has learned after :data:`AFTER` trials from a first solution."""
     runs = (learn(task, condition(task), seed=seed, trials=n, start=start) for n in AFTER)
     return [look(task, run.solution) for run in runs]
 
@@ -121,10 +121,9 @@ def informed_next(before, task, q, hands, g, movements):
 
 
 def evolve(cost, point, rng):
-    """CMA-ES from a point; the best points after :data:`AFTER` trials, the first of which tries it,
-    but after :data:`EVOLVED` in place of the last.
-
-    It begins anew from the best point where it has converged.
+    """Run CMA-ES from a point, which the first trial tries. Returns the best points after
+    :data:`AFTER` trials, with :data:`EVOLVED` in place of the last. Where it has converged it
+    begins again from the best point.
     """
     size = 4 + int(3 * np.log(len(point)))
     strategy = EvolutionStrategy(point, NOISE, size, rng)

@@ -1,4 +1,4 @@
-"""What would tell trial and error from planning?
+"""Measure which experiment would distinguish trial and error from planning.
 
     python studies/tell-apart/protocols.py      # five minutes of one core
     python studies/tell-apart/study.py          # results, power, claims, figure.svg, README.md
@@ -139,11 +139,11 @@ def judge_claims(changes, starts, steps):
 
 
 def people_needed(learner, planner, noise, items, planned, rng):
-    """Fewest people of whom 90 % of experiments tell what they are; NaN beyond 200.
-
-    A person's score is the mean over ``items``, of which a share is ``planned``: the planner's
-    score or the learner's, with a ``noise`` (SD) each. All learners, or all planners, are
-    distinguished if a one-tailed test rejects half-way between; a mixture if tests reject both.
+    """Return the fewest people with whom 90 % of experiments classify them correctly; NaN beyond
+    200. A person's score is the mean over ``items``; a share ``planned`` of the items has the
+    planner's score, the rest the learner's, each with ``noise`` (SD). All learners, or all
+    planners, are distinguished if a one-tailed test rejects half-way between; a mixture if tests
+    reject both.
     """
     middle = (learner + planner) / 2
     nulls = {0: [middle], 1: [middle]}.get(planned, [learner, planner])
@@ -216,7 +216,7 @@ def draw(table):
 
 
 def measure(changes, starts, steps):
-    """The tables, each of which becomes a CSV file of its name."""
+    """Return the tables by name; each becomes a CSV file."""
     makers = {"results": tabulate, "claims": judge_claims, "power": find_power}
     return {name: make(changes, starts, steps) for name, make in makers.items()}
 
