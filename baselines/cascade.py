@@ -20,6 +20,8 @@ which the tests state the same programmes, takes 20 to 100 times as long.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import daqp
 import numpy as np
 
@@ -37,8 +39,19 @@ SLACK = 1e-6
 """Length unit: where limits bind, level 2 would be left with a single point."""
 
 
-def solve_cascade(rows: Array, least: Array, preferred: Array) -> tuple[Array, int]:
-    """Changes of the joints, shape ``(joints,)``, and the solver's iterations.
+class Solution(NamedTuple):
+    """Solution of both levels."""
+
+    changes: Array
+    """Changes of the joints, shape ``(joints,)``."""
+    first: Array
+    """Changes that level 1 alone would make, shape ``(joints,)``."""
+    iterations: int
+    """Iterations of the solver."""
+
+
+def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
+    """Solve both levels.
 
     ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
     ``(m,)``; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver fails.
@@ -49,7 +62,7 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> tuple[Array, i
     short = max(0.0, float(first[0])) + SLACK
     weights = np.diag([2.0] * joints)
     changes, further = solve_level(2, weights, -2.0 * preferred, rows, least - short)
-    return changes, count + further
+    return Solution(changes, first[1:], count + further)
 
 
 def solve_level(

@@ -8,13 +8,13 @@ from scipy.optimize import minimize
 
 from coartic import PAPER, Robot, execute, load_task
 from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade
+from coartic.baselines.controllers import Aim
 from coartic.baselines.posture_qp import (
     FACES,
     METHODS,
-    Aim,
-    Controller,
+    CurrentGoal,
     GoalsAhead,
-    PostureQP,
+    PostureController,
 )
 from coartic.method import MethodError, Session, outline_of
 from coartic.robot import directions
@@ -54,8 +54,9 @@ def test_both_levels_of_a_disc_are_as_another_solver_has_them(far, preferred, bi
     moved = bound = 0
     for rows, least, wanted in problems(20, 4, far, preferred):
         short, nearest = stated(rows, least, wanted)
-        changes, iterations = solve_cascade(rows, least, wanted)
+        changes, first, iterations = solve_cascade(rows, least, wanted)
         assert iterations > 0
+        assert (least - rows @ first).max() < short + 1e-6
         assert np.abs(changes).max() <= LIMIT + 1e-9
         assert (least - rows @ changes).max() < short + 1e-6
         np.testing.assert_allclose(changes, nearest, atol=1e-4)
@@ -72,7 +73,7 @@ def test_a_failed_solve_is_an_outcome():
 
 
 @pytest.mark.parametrize(
-    ("method", "name"), [(GoalsAhead, "two-armed-2"), (PostureQP, "two-armed-1")]
+    ("method", "name"), [(GoalsAhead, "two-armed-2"), (CurrentGoal, "two-armed-1")]
 )
 def test_solutions_keep_the_rules(method, name):
     """Steps within m, locks kept, every goal hit without correction."""
@@ -122,7 +123,7 @@ def test_every_sequence_keeps_the_best(method):
     rewards = {}
     for hands in itertools.product(task.hands, repeat=2):
         session = Session(task, 0, method.information, trusted=True)
-        alone = method().search(Controller(session, task, 20), [hands])
+        alone = method().search(PostureController(session, task, 20), [hands])
         rewards[hands] = execute(task, alone.solution).reward
     result, execution, _ = solve(method, task, period=20)
     chosen = tuple(movement.hand for movement in result.solution)
@@ -140,7 +141,7 @@ def test_tasks_with_too_many_hand_sequences_are_refused():
 
 
 def controller(task):
-    return Controller(Session(task, 0, GoalsAhead.information, trusted=True), task, 5)
+    return PostureController(Session(task, 0, GoalsAhead.information, trusted=True), task, 5)
 
 
 def miss(q, task, hand, goal):

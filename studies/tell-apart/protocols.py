@@ -27,7 +27,7 @@ from coartic import (
 )
 from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.posture_based import TwoGoals
-from coartic.baselines.posture_qp import GoalsAhead, PostureQP
+from coartic.baselines.posture_qp import CurrentGoal, GoalsAhead
 from coartic.baselines.receding_horizon import RecedingHorizon
 from coartic.method import Information, Session
 
@@ -161,7 +161,7 @@ PLANNERS = {
     ),
     "planner, next goal": lambda task: plan(task, TwoGoals),
     "control, next goal": lambda task: plan(task, GoalsAhead),
-    "control, this goal": lambda task: plan(task, PostureQP),
+    "control, this goal": lambda task: plan(task, CurrentGoal),
 }
 
 

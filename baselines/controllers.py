@@ -1,0 +1,222 @@
+"""Controllers of a hand by prioritised quadratic programmes, and the search over hand sequences.
+
+A controller takes control steps of ``period`` ticks until the hand is in its goal. Each step is the
+answer of the cascade (:mod:`coartic.baselines.cascade`): level 1 is for the hand, level 2 for what
+the joints prefer. Every hand sequence is simulated as far as it can still be the best.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from coartic import Movement, Task
+from coartic.baselines.cascade import Solution, solve_cascade
+from coartic.baselines.posture_graph import HandSequence
+from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
+from coartic.motion.initial import changes_of_hand
+from coartic.motion.movement import follow
+from coartic.robot import HANDS, Array, Hand
+from coartic.tasks.task import beyond_reach, letters_of
+
+_HIT_MARGIN = 1e-9  # the scorer's interpolation along the path rounds
+_STALL_STEPS = 50  # without coming nearer by a tenth of a control step
+_BINDS = 1e-3  # least difference of joint changes by which a level binds, in control steps
+
+
+class Aim(NamedTuple):
+    """A goal and the hand that is to hit it."""
+
+    hand: Hand
+    goal: int  # 0-based
+
+
+class Leg(NamedTuple):
+    """The path to one goal."""
+
+    movement: Movement
+    ticks: int
+    q: Array
+    """Configuration in which the goal is hit, shape ``(dof,)``."""
+    memory: Any
+    """Memory of the controller when the goal is hit, with which the next leg goes on."""
+    steps: NDArray[np.int64]
+    """Numbers of control steps: all, and those in which level 1 and level 2 bind."""
+
+
+class StuckError(Exception):
+    """The hand does not reach the goal."""
+
+
+@dataclass
+class Controller(ABC):
+    """The control loop on one task; the session counts what it spends."""
+
+    session: Session
+    task: Task
+    period: int
+    """Ticks from one control step to the next."""
+    solves: int = 0
+    """Quadratic programmes solved so far."""
+
+    def __post_init__(self) -> None:
+        locked = ["xy".index(coordinate) for coordinate in self.task.locked_base]
+        self.moving = np.delete(np.arange(self.task.robot.dof), locked)
+        """Indices of the joints that are not locked."""
+        self.length = self.session.model.step * self.period
+        """Joint-space length of a control step."""
+
+    @abstractmethod
+    def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
+        """Return the memory at the beginning of a leg; ``memory`` is that of the leg before, or
+        None."""
+
+    @abstractmethod
+    def step(
+        self, q: Array, aims: tuple[Aim, ...], memory: Any, first: bool
+    ) -> tuple[Solution, Array, Any]:
+        """Return the changes of a control step, the changes that the joints prefer, both in control
+        steps, and the memory after the step; ``first``: it is the first step of a leg."""
+
+    def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
+        """Return the path to the first aim's goal, from the end of the leg before or the start.
+
+        Raises StuckError if the hand does not get there, MethodError if the solver fails.
+        """
+        (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
+        model, radius = self.session.model, self.task.radius
+        short = beyond_reach(self.task, hand, self.task.goals[goal], model.correction_tolerance)
+        if short > radius:
+            raise StuckError(
+                f"{name} ends {short:.3g} short of it with the base "
+                f"locked in {' and '.join(self.task.locked_base)}"
+            )
+        q = start = self.session.q0 if before is None else before.q
+        waypoints: list[Array] = []
+        memory = self.begin(q, aims, None if before is None else before.memory)
+        nearest, since, steps = np.inf, 0, np.zeros(3, dtype=np.int64)
+        while (distance := self.distance(q, aims[0])) > radius - _HIT_MARGIN:
+            if distance < nearest - 0.1 * self.length:
+                nearest, since = distance, 0
+            since += 1
+            if since > _STALL_STEPS:
+                raise StuckError(
+                    f"{name} is still {distance:.3g} from its centre "
+                    f"after {len(waypoints)} control steps and comes no nearer"
+                )
+            solution, preferred, memory = self.step(q, aims, memory, not waypoints)
+            rates = solution.changes
+            binds = [np.abs(rates - other).max() > _BINDS for other in (preferred, solution.first)]
+            steps += 1, *binds
+            q = self.add(q, self.length * rates / max(1.0, float(np.linalg.norm(rates))))
+            waypoints.append(q)
+        path = np.array(waypoints or [start])
+        followed = follow(
+            self.task.robot, start, path, hand, self.task.goals[goal], radius, model=model
+        )
+        self.session.spend(forward_kinematics=followed.evaluations)
+        movement = Movement(goal + 1, hand, "path", path[-1], waypoints=path)
+        return Leg(movement, followed.ticks, followed.q, memory, steps)
+
+    def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
+        """Solve the cascade; the session counts the iterations."""
+        solution = solve_cascade(rows, least, preferred)
+        self.solves += 2
+        self.session.spend(solver_iterations=solution.iterations)
+        return solution
+
+    def error(self, q: Array, aim: Aim) -> Array:
+        """Return the vector from a hand to its goal's centre, shape ``(2,)``, length unit."""
+        return np.asarray(
+            self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
+        )
+
+    def distance(self, q: Array, aim: Aim) -> float:
+        """Return the distance of a hand from its goal's centre, length unit."""
+        return float(np.hypot(*self.error(q, aim)))
+
+    def add(self, q: Array, change: Array) -> Array:
+        """Return the configuration ``q`` with the joints that are not locked changed."""
+        result = q.copy()
+        result[self.moving] += change
+        return result
+
+
+class ControlParameters(Parameters):
+    """Parameters of a controller."""
+
+    period: Annotated[int, Field(ge=1, le=20)] = 5
+    """Ticks from one control step to the next."""
+
+
+class Control(Method):
+    """A controller under every hand sequence; base of the methods that control a hand."""
+
+    stochastic = False
+    Parameters = ControlParameters
+    quick: ClassVar[dict[str, Any]] = {"period": 20}
+    controller: ClassVar[type[Controller]]
+    goals_ahead: ClassVar[int] = 0
+    """Goals after the current one that the controller heeds."""
+
+    def why_not(self, task: Outline) -> str | None:
+        """Return why there are too many sequences to simulate, if there are."""
+        return task.too_many_sequences
+
+    def solve(self, session: Session) -> Result:
+        """Simulate the hand sequences and return the best one's paths."""
+        task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
+        controller = self.controller(session, task, self.parameters.period)
+        ordered = [hand for hand in HANDS if hand in task.hands]
+        with session.solving():
+            candidates = list(itertools.product(ordered, repeat=len(task.goals)))
+            return self.search(controller, candidates)
+
+    def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
+        """Extend the sequence with the fewest ticks so far until one is complete.
+
+        No other can be better then, since ticks only add up. Of equal ones the one with
+        the fewest changes of hand is kept, then the first.
+        """
+        heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
+            (0, changes_of_hand(letters_of(hands)), index, ())
+            for index, hands in enumerate(candidates)
+        ]
+        heapq.heapify(heap)
+        legs: dict[Any, Leg | StuckError] = {}  # sequences share their beginnings
+        stuck: list[StuckError] = []
+        while heap:
+            ticks, changes, index, path = heapq.heappop(heap)
+            hands, goal = candidates[index], len(path)
+            if goal == len(hands):
+                steps, level_1, level_2 = np.sum([leg.steps for leg in path], axis=0).tolist()
+                details = {
+                    "sequences": len(candidates),
+                    "stuck_sequences": len(stuck),
+                    "simulated_movements": len(legs),
+                    "solves": controller.solves,
+                    "control_steps": steps,
+                    "level_1_binds": level_1,
+                    "level_2_binds": level_2,
+                }
+                return Result(tuple(leg.movement for leg in path), details)
+            aims = tuple(itertools.starmap(Aim, zip(hands, range(len(hands)), strict=True)))
+            plan = tuple(aims[g : g + 1 + self.goals_ahead] for g in range(goal + 1))
+            if plan not in legs:
+                try:
+                    legs[plan] = controller.leg(path[-1] if path else None, plan[-1])
+                except StuckError as error:
+                    legs[plan] = error
+            leg = legs[plan]
+            if isinstance(leg, StuckError):
+                stuck.append(leg)
+            else:
+                heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*path, leg)))
+        raise MethodError("infeasible", str(stuck[0]))

@@ -1,0 +1,150 @@
+"""Prioritised null-space control by quadratic programmes: the hand first, then the joints.
+
+At every control step level 1 of the cascade (:mod:`coartic.baselines.cascade`) moves the hand
+straight towards the centre of its goal, and level 2 chooses among the joint changes x that do so,
+which differ by motion in the null space of the hand's Jacobian J. With the unit vector u from the
+hand to the centre, both in control steps::
+
+    J x = v u,  that is  A = (J; -J),  b = (v u; -v u),      v = 1 / |J⁺ u|
+
+The pace v is that of the hand if the joints do nothing else. Whatever level 2 adds makes the joint
+step longer than a control step may be; then all of it is shortened, and the hand goes straight and
+slower. Level 2 takes the x nearest to
+
+- ``least-motion``: 0, so that x = v J⁺ u;
+- ``smooth``: the joint changes of the control step before;
+- ``next-goal-posture``: an even step towards a posture of the next goal, which would be there when
+  the hand is at its goal, and no longer than a control step. The corrective process finds the
+  posture from where the robot stands when the goal becomes current.
+
+Sources: Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987), Task-priority based redundancy control of
+robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011); the next goal as the objective of
+lower priority: K. Rohanimanesh et al. (2004), B. Thibodeau et al. (2004). Nothing was tuned.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coartic.baselines.cascade import Solution
+from coartic.baselines.controllers import Aim, Control, Controller
+from coartic.method import Information
+from coartic.robot import Array
+
+
+class HandController(Controller):
+    """Move the hand straight to its goal; base of the controllers with an objective.
+
+    The memory is the joint changes of the control step before, shape ``(joints,)``.
+    """
+
+    def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
+        """Return the changes of the last control step, zeros at the start."""
+        return np.zeros(len(self.moving)) if memory is None else memory
+
+    def step(
+        self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
+    ) -> tuple[Solution, Array, Array]:
+        """Move the hand by its pace, and the joints as near to what they prefer as that allows."""
+        jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
+        error = self.error(q, aims[0])
+        direction = error / np.linalg.norm(error)
+        pace = 1.0 / max(float(np.linalg.norm(np.linalg.pinv(jacobian) @ direction)), 1e-9)
+        steps = max(1.0, float(np.linalg.norm(error)) / (pace * self.length))
+        preferred = self.preferred(q, memory, steps)
+        rows = np.vstack([jacobian, -jacobian])
+        solution = self.solve(rows, rows @ np.linalg.pinv(jacobian) @ direction * pace, preferred)
+        return solution, preferred, self.remembered(solution, memory)
+
+    def preferred(self, q: Array, memory: Array, steps: float) -> Array:
+        """Return the changes that the joints prefer, with so many control steps to come."""
+        return np.zeros(len(self.moving))
+
+    def remembered(self, solution: Solution, memory: Array) -> Array:
+        """Return the memory after a step."""
+        return memory
+
+
+class SmoothController(HandController):
+    """Change the joint rates as little as the hand allows."""
+
+    def preferred(self, q: Array, memory: Array, steps: float) -> Array:
+        """Return the changes of the control step before."""
+        return memory
+
+    def remembered(self, solution: Solution, memory: Array) -> Array:
+        """Return the changes as they are made: no longer than a control step."""
+        return solution.changes / max(1.0, float(np.linalg.norm(solution.changes)))
+
+
+class NextGoalController(HandController):
+    """Approach a posture of the next goal. The memory is that posture, shape ``(dof,)``."""
+
+    def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
+        """Return the posture in which the corrective process hits the next goal from ``q``; ``q``
+        where there is no next goal, or the process does not converge."""
+        for hand, goal in aims[1:]:
+            correction = self.session.correct(q, hand, goal + 1)
+            if correction.converged:
+                return correction.q
+        return q
+
+    def preferred(self, q: Array, memory: Array, steps: float) -> Array:
+        """Return an even step towards the posture."""
+        path = (memory - q)[self.moving] / self.length
+        return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))
+
+
+class LeastMotion(Control):
+    """Null-space control with the least joint changes."""
+
+    name = "nullspace-qp/least-motion"
+    title = "Prioritised null-space QP, least motion"
+    citation = (
+        "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
+        "robot manipulators. International Journal of Robotics Research; as quadratic programs "
+        "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics."
+    )
+    information = frozenset(
+        {
+            Information.GOALS,
+            Information.FORWARD_KINEMATICS,
+            Information.JACOBIAN,
+            Information.REWARD_FORMULA,
+        }
+    )
+    secondary = ("least joint changes",)
+    controller = HandController
+
+
+class Smooth(LeastMotion):
+    """Null-space control with joint changes near those of the control step before."""
+
+    name = "nullspace-qp/smooth"
+    title = "Prioritised null-space QP, smooth"
+    information = LeastMotion.information | {Information.SECONDARY_OBJECTIVES}
+    secondary = ("joint changes near those of the control step before",)
+    controller = SmoothController
+
+
+class NextGoalPosture(LeastMotion):
+    """Null-space control towards a posture of the next goal."""
+
+    name = "nullspace-qp/next-goal-posture"
+    title = "Prioritised null-space QP, posture of the next goal"
+    citation = LeastMotion.citation + (
+        " With the next goal as lower priority: K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen "
+        "(2004), Coarticulation in Markov decision processes, NIPS; B. Thibodeau, S. Hart, D. "
+        "Karuppiah, J. Sweeney, O. Brock (2004), Cascaded filter approach to multi-objective "
+        "control, ICRA."
+    )
+    information = LeastMotion.information | {
+        Information.SECONDARY_OBJECTIVES,
+        Information.CORRECTIVE_PROCESS,
+    }
+    secondary = ("coarticulation: posture at the next goal",)
+    controller = NextGoalController
+    goals_ahead = 1
+
+
+METHODS: tuple[type[Control], ...] = (LeastMotion, Smooth, NextGoalPosture)

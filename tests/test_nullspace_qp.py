@@ -1,0 +1,107 @@
+"""Null-space control: each control step against its statement, and the paths that come of it."""
+
+import numpy as np
+import pytest
+
+from coartic import Robot, load_task
+from coartic.baselines.controllers import Aim
+from coartic.baselines.nullspace_qp import (
+    METHODS,
+    HandController,
+    LeastMotion,
+    Smooth,
+)
+from coartic.method import Session
+from tests.support.strategies import solve
+
+ROBOT = Robot()
+
+
+def stated(jacobian, velocity, preferred):
+    """The changes nearest to those preferred by which the hand moves as level 1 asks."""
+    import cvxpy as cp
+
+    x = cp.Variable(jacobian.shape[1])
+    nearest = cp.Minimize(cp.sum_squares(x - preferred))
+    cp.Problem(nearest, [jacobian @ x == velocity]).solve(cp.CLARABEL)
+    return x.value
+
+
+@pytest.mark.parametrize("locked", [(), ("y",), ("x", "y")])
+def test_a_step_is_the_nearest_to_the_preferred_that_moves_the_hand_straight(locked):
+    task = load_task("two-armed-2").model_copy(update={"locked_base": locked})
+    rng = np.random.default_rng(3)
+
+    class Preferring(HandController):
+        def preferred(self, q, memory, steps):
+            return memory
+
+    for _ in range(10):
+        controller = Preferring(Session(task, 0, LeastMotion.information, trusted=True), task, 5)
+        q, wanted = rng.uniform(-1, 1, ROBOT.dof), rng.normal(size=len(controller.moving)) / 3
+        (solution, preferred, _), aim = controller.step(q, (Aim("left", 2),), wanted, True), 2
+        jacobian = ROBOT.jacobian(q, "left")[:, controller.moving]
+        error = task.goal_array[aim] - ROBOT.forward_kinematics(q, "left")
+        least = np.linalg.pinv(jacobian) @ error
+        velocity = error / np.linalg.norm(least)  # the least changes are a control step long
+        np.testing.assert_allclose(preferred, wanted)
+        np.testing.assert_allclose(
+            solution.changes, stated(jacobian, velocity, wanted), rtol=0, atol=2e-3
+        )
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_the_hand_goes_straight_as_fast_as_a_step_in_joint_space_allows(method):
+    task = load_task("two-armed-1")
+    result, execution, session = solve(method, task, period=1)
+    assert execution.completed
+    assert execution.corrections == 0
+    q = task.q0
+    for movement, at_hit in zip(result.solution, execution.configurations, strict=True):
+        path = np.vstack([q, movement.waypoints])
+        steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+        assert steps.max() <= session.model.step * (1 + 1e-9)
+        assert np.quantile(steps, 0.1) > 0.99 * session.model.step  # singular postures are damped
+        places = ROBOT.forward_kinematics(path, movement.hand)
+        ahead = task.goal_array[movement.goal - 1] - places[0]
+        aside = (places - places[0]) @ (ahead[::-1] * (1, -1) / np.linalg.norm(ahead))
+        assert np.abs(aside).max() < 0.02
+        assert (path[:, 1] == task.q0[1]).all()  # the base is locked in y
+        q = at_hit
+
+
+def test_smooth_steps_are_near_the_step_before():
+    """Each as it is stated for the changes of the step before, as they were made."""
+    task, length = load_task("two-armed-1"), 0.05
+    free = np.delete(np.arange(ROBOT.dof), 1)
+    movement = solve(Smooth, task)[0].solution[2]
+    made = np.diff(movement.waypoints, axis=0)[:, free] / length
+    for k in range(1, len(made)):
+        q = movement.waypoints[k]
+        jacobian = ROBOT.jacobian(q, movement.hand)[:, free]
+        error = task.goal_array[2] - ROBOT.forward_kinematics(q, movement.hand)
+        velocity = error / np.linalg.norm(np.linalg.pinv(jacobian) @ error)
+        x = stated(jacobian, velocity, made[k - 1])
+        np.testing.assert_allclose(made[k], x / max(1, np.linalg.norm(x)), rtol=0, atol=5e-3)
+
+
+def test_the_next_goal_changes_the_posture_as_its_objective_asks():
+    tasks = [load_task(name) for name in ("ascending", "descending")]
+    assert [solve(method, tasks[0])[1].reward for method in METHODS] == [-326, -343, -304]
+    shifts = [
+        np.linalg.norm(np.subtract(*(solve(method, t)[1].configurations[0] for t in tasks)))
+        for method in METHODS
+    ]
+    assert shifts[0] == shifts[1] == 0
+    assert shifts[2] > 0.3
+
+
+def test_how_often_the_levels_bind_is_counted():
+    task = load_task("ascending")
+    for method in METHODS:
+        result, execution, _ = solve(method, task)
+        steps = result.details["control_steps"]
+        assert steps == sum(len(movement.waypoints) for movement in execution.movements)
+        assert 0 < result.details["level_1_binds"] <= steps
+        assert 0 <= result.details["level_2_binds"] <= steps
+    assert solve(LeastMotion, task)[0].details["level_2_binds"] == 0
