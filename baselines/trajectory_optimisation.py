@@ -2,9 +2,10 @@
 
 One method per cost. Path length is the task's own reward as a formula; the others are
 the smoothness objectives that informed accounts of coarticulation use: the sum of squared joint
-displacements (Jordan 1986, 1992), minimum acceleration, and minimum jerk (Flash & Hogan 1985), the
-last two over times that are free at a constant total. Each hand sequence is planned from the
-cheapest chain of a posture graph; the plan that is cheapest *by the method's own cost* is returned.
+displacements (Jordan 1986, 1992), minimum acceleration and minimum jerk of the joints, and minimum
+jerk of the hand (Flash & Hogan 1985), the last three over times that are free at a constant total.
+Each hand sequence is planned from the cheapest chain of a posture graph; the plan that is cheapest
+*by the method's own cost* is returned.
 """
 
 from __future__ import annotations
@@ -58,6 +59,17 @@ class SmoothParameters(TrajectoryParameters):
     stop: Literal[0, 1] = 0
     """1: the plan comes to a full stop at each goal, where velocities, for jerk accelerations too,
     are 0."""
+
+
+class HandJerkParameters(SmoothParameters):
+    """Fewer starts, as a plan by jerk of the hand takes some ten times as long."""
+
+    graphs: Annotated[int, Field(ge=1)] = 1
+    """Independent graphs, one or two starts for a hand sequence from each."""
+    chains: Annotated[int, Field(ge=1)] = 1
+    """Chains of all hand sequences, from as many further graphs as that takes."""
+    noisy_starts: Annotated[int, Field(ge=0)] = 0
+    """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
 
 
 def cheapest_plan(
@@ -124,7 +136,7 @@ class TrajectoryOptimisation(Method):
                     if not plan.converged:
                         reason = f"IPOPT, aimed inside the discs: {plan.reason}"
                         raise MethodError("solver-failed", reason)
-            if self.cost in ("acceleration", "jerk"):
+            if issubclass(self.Parameters, SmoothParameters):
                 solution = path_movements(session, task, aimed, spline(plan, SAMPLES))
             elif rounded is not None:
                 configurations, steps = rounded.configurations, rounded.steps
@@ -221,10 +233,20 @@ class Jerk(Acceleration):
         "confirmed mathematical model. Journal of Neuroscience."
     )
     secondary = ("minimum joint jerk",)
-    cost = "jerk"
+    cost: ClassVar[Cost] = "jerk"
 
 
-METHODS: tuple[type[Method], ...] = (PathLength, SquaredDisplacement, Acceleration, Jerk)
+class HandJerk(Jerk):
+    """Minimum jerk of the hand, after Flash & Hogan (1985), with a small weight on joint jerk."""
+
+    name = "trajectory-optimisation/hand-jerk"
+    title = "Trajectory optimisation, minimum hand jerk"
+    secondary = ("minimum jerk of the hand",)
+    cost = "hand-jerk"
+    Parameters = HandJerkParameters
+
+
+METHODS: tuple[type[Method], ...] = (PathLength, SquaredDisplacement, Acceleration, Jerk, HandJerk)
 
 
 def path_movements(

@@ -13,9 +13,11 @@ where f is one of the costs
     squared displacement Σ_g |Δ_g|²
     acceleration       ∫ |d²q/dt²|² dt,  from rest to rest, the goals hit at times t_g
     jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum, or equal
+    hand jerk          ∫ |d³p/dt³|² + w |d³q/dt³|² dt,  of the hand that is on its way to a goal
 
-The integrals are written out in the rates at the goals (:func:`segment_cost`), which are variables
-beside Δ.
+The integrals over joints are written out in the rates at the goals (:func:`segment_cost`), which
+are variables beside Δ. Jerk of the hand is a sum over Gauss-Legendre nodes; it leaves motion in the
+null space of the hand undecided, which the small weight w = ``JOINT_WEIGHT`` settles.
 
 One programme per robot, number of goals and cost is compiled once. The start, the goals and the
 hand sequence are its parameters. A locked base or an arm that is held is a variable bound, so that
@@ -51,16 +53,23 @@ MODEL_BASED = frozenset(
 )
 """Information of a planner with a model of the kinematics, besides its cost."""
 
-Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk"]
+Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
+JOINT_WEIGHT = 0.1
+"""Weight of joint jerk beside jerk of the hand, (length unit / rad)²."""
+_NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(6)  # on [-1, 1], of each segment
 
 _ONE_AT_A_TIME = RLock()
 """Held while CasADi builds a programme and IPOPT solves it, as two threads cannot do so at once."""
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
 # Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two
-# goals at once. Acceleration on two-armed-2 gets -322, -317, -315, -314 with 0.1, 0.05, 0.02,
-# 0.01; jerk gets -352 with any, and below 0.05 fails to converge for many hand sequences.
-_SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05}
-_RATES: dict[Cost, int] = {"acceleration": 1, "jerk": 2}  # derivatives that are variables
+# goals at once. With less, jerk fails to converge for many hand sequences of two-armed-2, and hand
+# jerk for two of 16.
+_SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05, "hand-jerk": 0.2}
+_RATES: dict[Cost, int] = {
+    "acceleration": 1,
+    "jerk": 2,
+    "hand-jerk": 2,
+}  # derivatives that are variables
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -171,6 +180,12 @@ class TrajectoryProblem:
             ends = [[(r[:, g], r[:, g + 1]) for r in rates] for g in range(goals)]
             costs = [segment_cost(cost, steps[:, g], durations[g], ends[g]) for g in range(goals)]
             objective = sum(costs, casadi.SX(0))
+            if cost == "hand-jerk":
+                objective = JOINT_WEIGHT * objective
+                for each in hands:
+                    chosen = right if each == "right" else 1 - right
+                    jerks = hand_jerks(robot, each, q0, steps, durations, rates)
+                    objective += casadi.dot(chosen, jerks)
         lower = [-np.inf] * len(limits)
         upper = [0.0] * len(limits)
         if order:
@@ -288,7 +303,7 @@ class TrajectoryProblem:
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
-    """Cost of the best segment between given end states, which is a polynomial.
+    """Cost of the best segment between given end states, which is a polynomial of the joints.
 
     ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals
     are written out in the end states, so that nothing is discretised.
@@ -307,6 +322,44 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     )
     bending = 9 * (casadi.sumsqr(a0) + casadi.sumsqr(a1)) - 6 * casadi.dot(a0, a1)
     return quadratic / time**3 + mixed / time**2 + bending / time
+
+
+def hand_jerks(
+    robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
+) -> Any:
+    """Integrals of the squared jerk of a hand over each segment, a column of as many.
+
+    The joints follow quintics between the end states, as for minimum jerk.
+    """
+    powers = np.arange(6)
+    q = [casadi.SX.sym(f"q{d}", robot.dof) for d in range(4)]  # and its derivatives
+    t = casadi.SX.sym("t")
+    third = robot.symbolic_hand(q[0] + q[1] * t + q[2] * t**2 / 2 + q[3] * t**3 / 6, hand)
+    for _ in range(3):
+        third = casadi.jacobian(third, t)
+    jerk = casadi.Function("jerk", q, [casadi.sumsqr(casadi.substitute(third, t, 0))])
+    integrals, here = [], q0
+    for g in range(steps.shape[1]):
+        step, time = steps[:, g], durations[g]
+        (v0, v1), (a0, a1) = ((r[:, g], r[:, g + 1]) for r in rates)
+        v0, v1, a0, a1 = v0 * time, v1 * time, a0 * time**2, a1 * time**2
+        coefficients = [
+            here, v0, a0 / 2,
+            10 * step - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
+            -15 * step + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
+            6 * step - 3 * (v0 + v1) - 0.5 * (a0 - a1),
+        ]  # fmt: skip
+        total = casadi.SX(0)
+        for node, weight in zip((1 + _NODES) / 2, _NODE_WEIGHTS / 2, strict=True):
+            derivatives = []
+            for d in range(4):
+                falling = np.prod([powers - k for k in range(d)], axis=0) * np.ones(6)
+                scale = falling * node ** np.maximum(powers - d, 0)
+                derivatives.append(sum(c * w for c, w in zip(coefficients, scale, strict=True)))
+            total += weight * jerk(*derivatives)
+        integrals.append(total / time**5)
+        here = here + step
+    return casadi.vertcat(*integrals)
 
 
 def trajectory_problem(

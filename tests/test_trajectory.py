@@ -12,14 +12,20 @@ from scipy.optimize import minimize
 from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import PostureGraph
 from coartic.baselines.trajectory_optimisation import METHODS, cheapest_plan, path_movements
-from coartic.baselines.trajectory_problem import Instance, segment_cost, spline, trajectory_problem
+from coartic.baselines.trajectory_problem import (
+    JOINT_WEIGHT,
+    Instance,
+    segment_cost,
+    spline,
+    trajectory_problem,
+)
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Session
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, solve
 
-ORDERS = {"acceleration": 2, "jerk": 3}
+ORDERS = {"acceleration": 2, "jerk": 3, "hand-jerk": 3}
 SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))
 
 
@@ -117,7 +123,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     assert np.all(moved[instance.held] == 0.0)
 
 
-@pytest.mark.parametrize("cost", ["acceleration", "jerk"])
+@pytest.mark.parametrize("cost", ["acceleration", "jerk", "hand-jerk"])
 def test_smooth_plans_are_smooth_and_pass_the_goals(cost):
     task = load_task("two-armed-2")
     hands = ("right", "left", "right", "right")
@@ -137,10 +143,15 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost):
     assert np.abs(path[1][0] - task.q0).max() < 1e-3
     # Integrated by differences, the cost is the plan's.
     order, total = ORDERS[cost], 0.0
-    for goal, piece in enumerate(pieces):
+    for goal, (piece, hand) in enumerate(zip(pieces, hands, strict=True)):
         points = np.vstack([path[goal][-1], piece])
+        of_hand = task.robot.forward_kinematics(points, hand)
+        parts = [(1.0, points)]
+        if cost == "hand-jerk":
+            parts = [(1.0, of_hand), (JOINT_WEIGHT, points)]
         h = plan.durations[goal] / 400
-        total += ((np.diff(points, n=order, axis=0) / h**order) ** 2).sum() * h
+        for weight, each in parts:
+            total += weight * ((np.diff(each, n=order, axis=0) / h**order) ** 2).sum() * h
     assert total == pytest.approx(plan.cost, rel=0.03)
 
 
