@@ -39,6 +39,7 @@ MODULES = (
     "coartic.baselines.random_search",
     "coartic.baselines.hill_climbing",
     "coartic.baselines.cma_es",
+    "coartic.baselines.nullspace_qp",
     "coartic.baselines.posture_qp",
     "coartic.baselines.posture_based",
     "coartic.baselines.trajectory_optimisation",

@@ -226,7 +226,7 @@ def test_the_objective_ends_with_the_trials(budget, trials, before):
 
 
 EXAMPLES = DOCS / "examples"
-PROGRAMS = {"ioh_logger", "choose_hands"}
+PROGRAMS = {"ioh_logger", "choose_hands", "catcma"}
 METHODS = [path for path in sorted(EXAMPLES.glob("*.py")) if path.stem not in PROGRAMS]
 
 
@@ -279,6 +279,19 @@ def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):
     found = min(cost.best_cost for cost in costs)
     assert float(ticks) == found <= 1.03 * costs[0].best_known
     assert objective("two-armed-2").hands != hands
+
+
+def test_targets_and_hands_are_minimised_together_by_catcma():
+    """It spends the budget, chooses hands itself, and betters the corrective process alone."""
+    pytest.importorskip("cmaes")
+    search = runpy.run_path(str(EXAMPLES / "catcma.py"))["search"]
+    cost, again = (search("two-armed-1", 400) for _ in range(2))
+    alone = coartic.objective("two-armed-1")
+    assert cost.evaluations + len(cost.hand_sequences) == 400
+    assert cost.best_hands in cost.hand_sequences
+    assert cost.best_cost < alone.best_cost
+    assert (cost.best_cost, cost.best_hands) == (again.best_cost, again.best_hands)
+    assert -execute("two-armed-1", cost.best_solution).reward == cost.best_cost
 
 
 def test_runs_in_the_format_of_iohprofiler(monkeypatch, tmp_path):
