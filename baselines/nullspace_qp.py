@@ -5,9 +5,10 @@ straight towards the centre of its goal, and level 2 chooses among the joint cha
 which differ by motion in the null space of the hand's Jacobian J. With the unit vector u from the
 hand to the centre, both in control steps::
 
-    J x = v u,  that is  A = (J; -J),  b = (v u; -v u),      v = 1 / |J⁺ u|
+    J x = v u,  that is  A = (J; -J),  b = (v u; -v u),      v = min(1 / |J⁺ u|, d)
 
-The pace v is that of the hand if the joints do nothing else. Whatever level 2 adds makes the joint
+The pace v is the hand's if the joints do nothing else, and never more than its distance d from the
+centre. Whatever level 2 adds makes the joint
 step longer than a control step may be; then all of it is shortened, and the hand goes straight and
 slower. Level 2 takes the x nearest to
 
@@ -45,12 +46,13 @@ class HandController(Controller):
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
     ) -> tuple[Solution, Array, Array]:
-        """Move the hand by its pace, and the joints as near to what they prefer as that allows."""
+        """Move the hand to its goal, the joints as near to what they prefer as that allows."""
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)
         pace = 1.0 / max(float(np.linalg.norm(np.linalg.pinv(jacobian) @ direction)), 1e-9)
-        steps = max(1.0, float(np.linalg.norm(error)) / (pace * self.length))
+        distance = float(np.linalg.norm(error)) / self.length
+        steps, pace = max(1.0, distance / pace), min(pace, distance)
         preferred = self.preferred(q, memory, steps)
         rows = np.vstack([jacobian, -jacobian])
         solution = self.solve(rows, rows @ np.linalg.pinv(jacobian) @ direction * pace, preferred)

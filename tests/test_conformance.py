@@ -55,6 +55,7 @@ TASKS = {
     "optimum/": ONE_GOAL,
     "receding-horizon": TWO_GOALS,
     "cma-es/bandit": FEW_TASKS,  # of both hands, as it chooses among hand sequences
+    "nullspace-qp/": SHORT_TASKS,
     "posture-qp/": SHORT_TASKS,
     "posture-based/": SHORT_TASKS,
     "trajectory-optimisation/path-length": TWO_GOALS,

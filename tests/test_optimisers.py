@@ -291,7 +291,7 @@ def test_targets_and_hands_are_minimised_together_by_catcma():
     assert cost.best_hands in cost.hand_sequences
     assert cost.best_cost < alone.best_cost
     assert (cost.best_cost, cost.best_hands) == (again.best_cost, again.best_hands)
-    assert -execute("two-armed-1", cost.best_solution).reward == cost.best_cost
+    assert -execute("two-armed-1", cost.solution).reward == cost.best_cost
 
 
 def test_runs_in_the_format_of_iohprofiler(monkeypatch, tmp_path):
