@@ -1,34 +1,29 @@
-"""Methods by id: those of this project, of installed plug-ins, and of the user's files.
+"""Methods by id: the built-in methods, and the methods of the user's files.
 
-Plug-ins are imported, which runs them; method files are imported by processes of their own.
+Processes of their own import method files (:mod:`coartic.benchmarks.reader`).
 """
 
 from __future__ import annotations
 
 import importlib
 import inspect
-import sys
 import threading
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 
 from pydantic import TypeAdapter
 
 from coartic.benchmarks.code_identity import code_of
-from coartic.benchmarks.reader import begin_reader, methods_of_module
+from coartic.benchmarks.reader import begin_reader
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, error_line, plain
+from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.toml_files import check_file
 from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
-from coartic.method import Method
-from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info, methods_in
+from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
 from coartic.runs.plan import SEARCH
 
-ENTRY_POINTS = "coartic.methods"
 RESERVED = (METHOD_PREFIX, SEARCH)
 """Ids that begin so have a meaning in every table: methods of this project alone have them."""
 NAMES = ("CMA-ES", "learner", "optimum")
@@ -54,20 +49,12 @@ _INFOS = TypeAdapter(list[MethodInfo])
 
 
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
-    """Every known method by id.
+    """Return every known method by id.
 
-    A plug-in that cannot be loaded is a warning. Raises CoarticError for a file that
-    cannot be loaded, holds no method, or takes an id that is reserved or already there.
+    Raises CoarticError for a file that cannot be loaded, holds no method, or takes an id that is
+    reserved or already there.
     """
     infos = dict(built_in())
-    for point in metadata.entry_points(group=ENTRY_POINTS):
-        origin = f"plug-in {point.dist.name if point.dist else point.value}"
-        try:  # a broken plug-in must not take the others with it
-            add_methods(infos, methods_of_plugin(point, origin))
-        except CoarticError as error:
-            warnings.warn(
-                f"{origin}: entry point {point.name!r} cannot be used: {error}", stacklevel=2
-            )
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
         add_methods(infos, methods_of_file(path))
     return infos
@@ -129,18 +116,3 @@ def methods_of_file(path: Path) -> Iterator[MethodInfo]:
     for info in _INFOS.validate_python(ask("", "methods")):
         READERS[str(path)] = ask
         yield replace(info, origin=shown, where=str(path))
-
-
-def methods_of_plugin(point: metadata.EntryPoint, origin: str) -> Iterator[MethodInfo]:
-    """The methods of an installed plug-in. Raises CoarticError."""
-    try:
-        target = point.load()
-    except (Exception, SystemExit) as error:
-        raise CoarticError(f"cannot be imported: {error_line(error)}") from None
-    if not inspect.isclass(target):
-        yield from methods_of_module(target, methods_in(target), origin, target.__name__)
-    elif issubclass(target, Method):
-        module = sys.modules[target.__module__]
-        yield from methods_of_module(module, [target], origin, module.__name__)
-    else:
-        raise CoarticError(f"{target!r} is not a subclass of coartic.method.Method")

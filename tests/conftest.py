@@ -165,7 +165,7 @@ def visited(browser):
 
 
 FIRST = (
-    *("test_conformance", "test_pool", "test_cli", "test_plugins", "test_harness", "test_dask"),
+    *("test_conformance", "test_pool", "test_cli", "test_method_files", "test_harness", "test_dask"),
     *("test_browser", "test_play_page", "test_report", "test_figures"),
 )
 """Modules that begin: those that start processes, then those that read one report and draw, so that

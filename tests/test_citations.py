@@ -99,9 +99,9 @@ def test_methods_of_others_cite_themselves():
     text = bibliography(
         {
             "cma-es/bold": declared(
-                "Bold & fast", "A. B. C_d (2020), me@here, 5 %\n of {x}.", "plug-in"
+                "Bold & fast", "A. B. C_d (2020), me@here, 5 %\n of {x}.", "mine.py"
             ),
-            "lab/silent": declared("Silent", "", "plug-in"),
+            "lab/silent": declared("Silent", "", "mine.py"),
             "dual-process/EC9": declared("Of another version", "Ours (2030)."),
         }
     )

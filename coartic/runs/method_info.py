@@ -40,7 +40,7 @@ class MethodInfo:
     defaults: dict[str, Any]
     """Its parameters; None for one that has no default."""
     origin: str
-    """``built in``, the distribution of a plug-in, or the path of a method file."""
+    """``built in``, or the path of a method file."""
     code: str
     """Hash of the code that its results come from."""
     where: str = field(default="", compare=False)

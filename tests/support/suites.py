@@ -16,7 +16,7 @@ from coartic.benchmarks.suites import Cell, load_suite, select_cells
 from coartic.benchmarks.worker import fail, perform_job
 
 ROOT = Path(__file__).parents[2]
-BROKEN = ROOT / "tests" / "plugins" / "broken.py"
+BROKEN = ROOT / "tests" / "methods" / "broken.py"
 KNOWN = registry()
 
 

@@ -1,11 +1,8 @@
-"""Methods and tasks from elsewhere: entry points, files, and the pages' examples."""
+"""Methods and tasks of the user's files, and the examples of the pages."""
 
-import json
 import re
-import shutil
 import signal
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -16,57 +13,28 @@ from coartic.benchmarks import scoring
 from coartic.benchmarks.registry import registry
 from tests.support.suites import ROOT
 
-EXAMPLE = ROOT / "tests" / "example_plugin"
-METHOD = EXAMPLE / "coartic_example" / "__init__.py"
+METHOD = ROOT / "tests" / "methods" / "nearest_hand.py"
 TEXT = METHOD.read_text(encoding="utf-8")
-
-
-@pytest.fixture
-def installed(monkeypatch, tmp_path):
-    """The example package, where and as an installer would leave it."""
-    site = tmp_path / "site"
-    shutil.copytree(METHOD.parent, site / METHOD.parent.name)
-    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    about = site / f"{METHOD.parent.name}-{project['version']}.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
-    )
-    ((group, points),) = project["entry-points"].items()
-    lines = [f"[{group}]", *(f"{name} = {where}" for name, where in points.items())]
-    (about / "entry_points.txt").write_text("\n".join(lines))
-    monkeypatch.syspath_prepend(site)
-
-
-@pytest.mark.usefixtures("installed", "in_this_process")
-def test_a_package_brings_a_method(coartic, tmp_path):
-    code, checked, _ = coartic("check", "nearest-hand")
-    assert code == 0, checked
-    assert "nearest-hand: 8 of 8 checks passed." in checked
-    assert "nearest-hand" in coartic("list")[1]
-    code, _, error = coartic(
-        "run", "paper", "--methods", "nearest-hand", "--tasks", EXAMPLE / "shelf.toml",
-        "--out", tmp_path / "out",
-    )  # fmt: skip
-    assert code == 0, error
-    (run,) = load(tmp_path / "out").runs.to_dict("records")
-    assert (run["method"], run["task"], run["status"]) == ("nearest-hand", "shelf", "ok")
-    assert run["information"] == "corrective process, forward kinematics, goals"
-    assert json.loads(run["parameters"]) == {"reluctance": 0.0}
-    assert run["forward_kinematics"] > run["jacobians"] > 0
 
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_file_brings_a_method(coartic, tmp_path):
+    own = ("--method-file", METHOD)
+    code, checked, _ = coartic("check", "nearest-hand", *own)
+    assert (code, "nearest-hand: 8 of 8 checks passed." in checked) == (0, True), checked
+    assert "nearest-hand" in coartic("list", *own)[1]
     code, _, error = coartic(
-        "run", "paper", "--methods", "nearest-hand", "--method-file", METHOD,
-        "--tasks", "two-armed-1,two-armed-2", "--out", tmp_path, "--jobs", "1",
+        "run", "paper", "--methods", "nearest-hand", *own, "--jobs", "1", "--out", tmp_path,
+        "--tasks", f"two-armed-1,{METHOD.with_name('shelf.toml')}",
     )  # fmt: skip
     assert code == 0, error
-    runs = load(tmp_path).runs
-    assert list(runs.status) == ["ok", "ok"]
-    again = ("reproduce", runs.run_id[0], "--in", tmp_path)
-    assert coartic(*again, "--method-file", METHOD)[1].endswith("identical.\n")
+    runs = load(tmp_path).runs.set_index("task")
+    assert runs.status.to_dict() == {"two-armed-1": "ok", "shelf": "ok"}
+    assert set(runs.information) == {"corrective process, forward kinematics, goals"}
+    assert set(runs.parameters) == {'{"reluctance": 0.0}'}
+    assert (runs.forward_kinematics > runs.jacobians).all()
+    again = ("reproduce", runs.run_id["shelf"], "--in", tmp_path)
+    assert coartic(*again, *own)[1].endswith("identical.\n")
     code, _, error = coartic(*again)
     assert code == 2
     assert "unknown method 'nearest-hand': pass --method-file" in error
@@ -161,25 +129,11 @@ def test_a_file_is_the_same_method_wherever_it_is(coartic, tmp_path, monkeypatch
     assert summaries == ["1 run", *["1 run (1 reused)"] * 3, "1 run"]
 
 
-@pytest.mark.filterwarnings("always")
-def test_a_broken_plugin_is_a_warning(coartic, tmp_path, monkeypatch):
-    """One bad package does not take the command line with it."""
-    monkeypatch.syspath_prepend(tmp_path)
-    info = tmp_path / "bad-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: bad\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[coartic.methods]\nbad = no_such_module:Method\n")
-    code, listed, error = coartic("list")
-    assert code == 0
-    assert "Warning: plug-in bad: entry point 'bad' cannot be used" in error
-    assert "dual-process/" in listed
-
-
 def test_the_pages_show_the_example_as_it_is():
     """Method and task of the how-to pages are those that the tests run."""
     pages = [ROOT / "docs" / "howto" / name for name in ("method.md", "task.md")]
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
     shown = re.findall(r"```(?:python|toml)\n(.*?)```", text, re.DOTALL)
     assert any(TEXT.strip() in block for block in shown)
-    task = (EXAMPLE / "shelf.toml").read_text(encoding="utf-8").strip()
+    task = METHOD.with_name("shelf.toml").read_text(encoding="utf-8").strip()
     assert any(task in re.sub(r"\n?# shelf.toml\n", "", block) for block in shown)
