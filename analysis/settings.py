@@ -14,9 +14,9 @@ from coartic.analysis.study import Study, cached
 def varied(study: Study) -> dict[str, list[str]]:
     """Parameters of each method that have several values on one task, by method."""
     values: dict[tuple[str, str, str], set[str]] = {}
-    several: dict[str, list[str]] = {cell.method.name: [] for cell in study.plan.cells}
-    for cell in study.plan.cells:
-        for key, value in cell.complete.items():
+    several: dict[str, list[str]] = {name: [] for name in study.declared}
+    for cell in (job.cell for job in study.plan):
+        for key, value in cell.parameters.items():
             values.setdefault((cell.method.name, cell.task.name, key), set()).add(repr(value))
     for (method, _, key), seen in values.items():
         if len(seen) > 1 and key not in several[method]:
@@ -40,10 +40,10 @@ def names_of_settings(study: Study) -> dict[str, str]:
     """Names of default settings by label, where settings are compared: ``learner EC1 (σ 0.05,
     default)``."""
     names = {}
-    for cell in study.plan.cells if compares_settings(study) else ():
+    for cell in (job.cell for job in study.plan) if compares_settings(study) else ():
         keys = varied(study)[cell.method.name]
         if keys and not cell.setting:
-            values = ", ".join(f"{key}={cell.complete[key]}" for key in keys)
+            values = ", ".join(f"{key}={cell.parameters[key]}" for key in keys)
             names[cell.label] = f"{name_of(f'{cell.label} {values}')[:-1]}, default)"
     return names
 

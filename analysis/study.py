@@ -7,7 +7,7 @@ study, in the packages beside this file; :func:`cached` makes such a function co
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from pathlib import Path
@@ -26,8 +26,9 @@ from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
-from coartic.runs.plan import Plan, label_of
-from coartic.runs.run import execute_all
+from coartic.runs.method_info import MethodInfo
+from coartic.runs.plan import Job, label_of, size_of
+from coartic.runs.record import execute_all
 from coartic.runs.store import explain_errors, open_store
 from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
@@ -114,21 +115,22 @@ def load(folder: str | Path) -> Study:
     with open_store(folder) as store:
         plan = store.plan()
         runs = store.runs()
-        if len(runs) < plan.size:
+        if len(runs) < size_of(plan):
             raise CoarticError(
-                f"{folder} has {len(runs)} of {counted(plan.size, 'run')}: it was interrupted. "
+                f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted. "
                 "Repeat the `coartic run` command, which does what is missing."
             )
         return Study(folder, plan, store.made_with(), tidy(runs, plan))
 
 
-def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
+def tidy(runs: pd.DataFrame, plan: Sequence[Job]) -> pd.DataFrame:
     """Return stored runs with columns for facts of their tasks, parameters and gaps.
 
     A parameter whose name is that of a stored column is left out: ``trials`` are those made,
     ``hands`` those of the solution.
     """
-    tasks, parameters = plan.tasks, {text: json.loads(text) for text in runs.parameters.unique()}
+    tasks = {job.cell.task.name: job.cell.task for job in plan}
+    parameters = {text: json.loads(text) for text in runs.parameters.unique()}
     best = {name: each.reward for name, each in best_known(runs, tasks.values()).items()}
     rows = [
         {
@@ -158,8 +160,8 @@ class Study:
     """The stored results of one folder."""
 
     folder: Path
-    plan: Plan
-    """Tasks, methods, parameters and number of runs of the suite."""
+    plan: Sequence[Job]
+    """The cells of the suite, with the seed and the number of runs of each."""
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     runs: pd.DataFrame
@@ -175,12 +177,18 @@ class Study:
     @property
     def suite(self) -> str:
         """Name of the suite that was run."""
-        return self.plan.suite
+        return self.plan[0].suite
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
         """The tasks as they were run, by name; titles that several share have the name besides."""
-        return {task.name: task for task in titled_apart(self.plan.tasks.values())}
+        tasks = {job.cell.task.name: job.cell.task for job in self.plan}
+        return {task.name: task for task in titled_apart(tasks.values())}
+
+    @cached_property
+    def declared(self) -> dict[str, MethodInfo]:
+        """The declarations of the methods that were run, by id."""
+        return {job.cell.method.name: job.cell.method for job in self.plan}
 
     @cached
     def sequences(self, task: str) -> pd.DataFrame:
@@ -207,7 +215,7 @@ class Study:
         groups = runs.groupby(names, sort=False).indices if len(runs) else {}
         return {
             (key[0], cell.label): CellRuns(*key, runs.iloc[groups.get(key, [])])
-            for cell in self.plan.cells
+            for cell in (job.cell for job in self.plan)
             for key in [(cell.task.name, cell.method.name, cell.setting)]
         }
 

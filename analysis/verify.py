@@ -45,14 +45,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
-MODEL = {  # how the paper is read: versions 1.0 and 1.1 stored it, and ids are hashes with it
-    "arrival_tick": 1, "corrective_arrival": False, "first_step": False, "whole_last_step": False,
-}  # fmt: skip
-LEARNER_RULES = {
-    "equal_distance": "random", "first_trial": "learns", "state": "previous-hand", "ties": "left",
-    "unknown_target": "corrects",
-}  # fmt: skip
-SCHEMAS = ("c66220d06e355337",)  # of format 4: see schema
+SCHEMA = "18345eb06ce51758"  # of format 5: see schema
 # Whatever a file says, it is checked in bounded time and memory.
 MOST_GOALS, LONGEST_TEXT = 100, 100_000  # of a task, and of what is stored of it in characters
 MOST_TRIALS, MOST_TICKS, MOST_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run, movement
@@ -110,7 +103,6 @@ def stored_task(definition: str, model: str) -> Any:
     need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
-    need(not hasattr(task, "penalty"), "its task has a penalty, which version 1.1.0 reads")
     need(1 <= len(task.goals) <= MOST_GOALS, "the task has too many goals")
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
     task.locked = ["xy".index(coordinate) for coordinate in task.locked_base]
@@ -244,18 +236,15 @@ def check_runs(folder: Path) -> Report:
 def check_all(db: sqlite3.Connection) -> Report:
     """Check the runs one by one, and that none is better than another proves possible."""
     db.execute("PRAGMA trusted_schema = OFF")
-    if hash_of(schema(db))[:16] not in SCHEMAS:
+    if hash_of(schema(db))[:16] != SCHEMA:
         foreign = "Tables or views are not as coartic makes them, so that they may say anything."
         return Report(0, 0, [foreign], ["The runs."])
-    if other := other_reading(db):
-        words = f"Runs were made under another reading of the paper, {other}"
-        return Report(0, 0, [f"{words}: version 1.1.0 of coartic checks them."], ["The runs."])
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
     wrong += [*check_cells(db)]
     runs = movements = unsolved = spent = 0
     rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
     query = """SELECT results.id AS number, * FROM results
-        LEFT JOIN settings ON settings.id = setting LEFT JOIN learning ON result_id = results.id"""
+        LEFT JOIN cells ON cells.id = cell LEFT JOIN learning ON result_id = results.id"""
     for row in db.execute(query):
         run, same, bound = row["run_id"], (row["definition"], row["model"]), row["proven_bound"]
         where, runs, unsolved = f"Run {run}", runs + 1, unsolved + (row["status"] != "ok")
@@ -299,38 +288,16 @@ def schema(db: sqlite3.Connection) -> list[list[str]]:
     ]
 
 
-def fixed(method: str) -> dict[str, Any]:
-    """Parameters of a method that versions 1.0 and 1.1 stored, and that have one value now."""
-    if method.startswith("posture-qp/"):
-        return {"modelling": "none"}
-    return LEARNER_RULES if method.startswith("dual-process/") else {}
-
-
-def other_reading(db: sqlite3.Connection) -> str:
-    """Another reading of the paper than this version's, as ``ties=right``, or nothing."""
-    for method, *texts in db.execute("SELECT method, model, parameters FROM settings"):
-        for text, now in zip(texts, (MODEL, fixed(method)), strict=True):
-            for name, value in json.loads(text).items():
-                if now.get(name, value) != value:
-                    return f"{name}={value}"
-    return ""
-
-
 def check_identity(row: Any) -> None:
-    """Raises ValueError where a run is not that of its setting: its id is a hash of task, method,
+    """Raises ValueError where a run is not that of its cell: its id is a hash of task, method,
     parameters, constants, budget, seed of the suite and number, and ends with that of the code."""
-    task, model = json.loads(row["definition"]), json.loads(row["model"])
-    asked = {
-        "task": task,
-        "method": row["method"],
-        "parameters": {**fixed(row["method"]), **json.loads(row["parameters"])},
-        "model": {**MODEL, **model},
-        "trial_budget": row["trial_budget"],
-    }
-    need(row["asked"] == hash_of(asked), "its task, method, parameters or model were changed")
-    need(row["task"] == task["name"], f"its task is not {row['task']}")
+    cell = {name: json.loads(row[name]) for name in ("parameters", "model")}
+    cell |= {"task": json.loads(row["definition"])}
+    cell |= {name: row[name] for name in ("method", "trial_budget")}
+    need(row["digest"] == hash_of(cell), "its task, method, parameters or model were changed")
+    need(row["task"] == cell["task"]["name"], f"its task is not {row['task']}")
     suite_seed, run = row["suite_seed"], row["run"]
-    digits = hashlib.sha256(f"{row['asked']} {suite_seed} {run}".encode()).hexdigest()[:16]
+    digits = hashlib.sha256(f"{row['digest']} {suite_seed} {run}".encode()).hexdigest()[:16]
     need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
     words = np.frombuffer(hashlib.sha256(row["task"].encode()).digest()[:16], "<u4").tolist()
     (state,) = np.random.SeedSequence(suite_seed, spawn_key=(*words, run)).generate_state(1, "u8")
@@ -341,25 +308,17 @@ def check_cells(db: sqlite3.Connection) -> Iterator[str]:
     """Cells that show other runs than they say, and runs that none shows, a sentence each."""
     for table, number, missing, _ in db.execute("PRAGMA foreign_key_check"):
         yield f"Row {number} of table {table} names a row of {missing} that is not there."
-    query = """SELECT position, variant, defaults, cells.parameters AS chosen,
-        settings.parameters AS complete, settings.definition AS executed, tasks.definition AS shown,
-        settings.code = methods.code AS same_code FROM cells
-        LEFT JOIN settings ON settings.id = setting LEFT JOIN tasks ON tasks.name = settings.task
-        LEFT JOIN methods ON methods.name = settings.method"""
-    for row in db.execute(query):
+    for row in db.execute("SELECT * FROM cells"):
         try:
-            chosen, defaults = json.loads(row["chosen"]), json.loads(row["defaults"])
-            setting = [
-                f"{k}={v}" for k, v in chosen.items() if k not in defaults or v != defaults[k]
-            ]
-            need(row["variant"] == ", ".join(setting), f"its parameters are not {row['variant']}")
-            need(chosen.items() <= json.loads(row["complete"]).items(), "it has other parameters")
-            need(json.loads(row["shown"]) == json.loads(row["executed"]), "it has another task")
-            need(row["same_code"], "its method has other code")
+            parameters, defaults = json.loads(row["parameters"]), json.loads(row["defaults"])
+            changed = {k: v for k, v in parameters.items() if k not in defaults or v != defaults[k]}
+            setting = ", ".join(f"{k}={v}" for k, v in changed.items())
+            need(row["setting"] == setting, f"its parameters are not {row['setting']}")
         except Exception as problem:
-            yield f"Row {row['position']} of table cells: {problem}."
-    if db.execute("SELECT count(*) > count(DISTINCT setting) FROM cells").fetchone()[0]:
-        yield "Two rows of table cells show the same runs."
+            yield f"Row {row['id']} of table cells: {problem}."
+    query = """SELECT task FROM plan JOIN cells ON cells.id = cell
+        GROUP BY task HAVING count(DISTINCT definition) > 1"""
+    yield from (f"Two tasks are called {name}." for (name,) in db.execute(query))
 
 
 def hash_of(content: Any) -> str:

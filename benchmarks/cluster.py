@@ -13,9 +13,11 @@ from typing import Any
 from coartic.benchmarks.pool import Local, Workers
 from coartic.benchmarks.provenance import current_environment
 from coartic.benchmarks.registry import current_code
-from coartic.benchmarks.worker import Job, Outcome, fail
+from coartic.benchmarks.worker import fail
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line
+from coartic.runs.plan import Job
+from coartic.runs.record import Outcome
 
 WORKERS_S = 600.0  # that runs wait while no worker is connected
 _PAUSE_S = 0.05  # between looks at what is done
@@ -50,7 +52,7 @@ class Dask:
         from distributed import CancelledError, KilledWorker, as_completed
 
         place = dict[Any, int]()  # jobs of a method follow each other: workers keep its process
-        jobs = sorted(jobs, key=lambda job: place.setdefault(job.method.key, len(place)))
+        jobs = sorted(jobs, key=lambda job: place.setdefault(job.cell.method.key, len(place)))
         try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
             job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
@@ -109,7 +111,7 @@ _kept = threading.local()
 def _remote(job: Job) -> list[Outcome]:
     """Perform a job on a worker's machine, in a process that ends with its limit."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
-    method = job.method
+    method = job.cell.method
     here = current_code(method.where, method.name)
     if here != method.code:
         text = f"method {method.name!r} has code {here} on a Dask worker and {method.code} where "

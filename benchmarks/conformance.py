@@ -6,7 +6,7 @@ another one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, pairwise
 from math import dist
 from pathlib import Path
@@ -23,12 +23,11 @@ from coartic import (
 )
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
-from coartic.benchmarks.worker import Job
 from coartic.internal.text import counted
 from coartic.method import METERED
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Specification
-from coartic.runs.run import Run
+from coartic.runs.plan import Job, cell_of
+from coartic.runs.record import Outcome, Run
 from coartic.tasks.task import check_task
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
@@ -54,102 +53,105 @@ def law(name: str, problems: Iterable[str], finding: str) -> Law:
 def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
-    """Every law of a method, in order, on the shipped tasks or on others; ``verbose`` shows what it
-    prints and logs, and where it crashes."""
+    """Return every law of a method, in order, on the shipped tasks or on others; ``verbose`` shows
+    what the method prints and logs, and where it crashes."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
     def applies(task: Task) -> bool:
         return info.why_not(task, parameters) is None
 
-    def job(task: Task, seed: int = 1, trial_budget: int | None = None) -> Job:
-        complete = info.complete(parameters)
-        specification = Specification(
-            task, info.name, info.code, info.information, complete, trial_budget
-        )
-        return Job(specification, info, seed, (0,), CHECK_LIMIT_S)
-
     laws = laws_of_declaration(info)
     tasks = list(filter(applies, tasks or map(load_task, builtin_tasks())))
     if not tasks:
         problem = "it applies to none of the shipped tasks, so nothing can be checked"
         return [*laws, Law("solution", False, problem)]
-    jobs, others = [job(task) for task in tasks], [job(task, seed=2) for task in tasks]
-    bounded = [job(task, trial_budget=BUDGET) for task in tasks]
-    last = [job(task) for task in filter(applies, [hopeless_task(tasks[0])])]
-    runs = perform_in_order([*jobs, *jobs, *others, *jobs, *bounded, *last], verbose=verbose)
-    names = [task.name for task in tasks]
-    first, again, other, after, budget = (dict(zip(names, runs, strict=False)) for _ in range(5))
-    hopeless = list(runs)
-    elsewhere = dict(zip(names[-1:], perform_in_order(jobs[-1:]), strict=True))
-
-    def changes(later: dict[str, Run], how: str) -> Iterator[str]:
-        for name, run in later.items():
-            yield from (f"{how.format(name)}: {each}" for each in compare_runs(first[name], run))
-
-    of_another_seed = changes(other, "declared not to be stochastic, but another seed on {}")
-    seed = "the same" if info.stochastic else "any"
-    rewards = ", ".join(f"{name} {run.reward}" for name, run in first.items())
+    jobs = {}
+    for kind, seed, budget in (
+        *(("first", 1, None), ("again", 1, None), ("other seed", 2, None)),
+        *(("after others", 1, None), ("budget", 1, BUDGET)),
+    ):
+        for task in tasks:
+            cell = cell_of(task, info, parameters, trial_budget=budget)
+            jobs[kind, task.name] = Job(cell, seed, (0,), CHECK_LIMIT_S)
+    for task in filter(applies, [hopeless_task(tasks[0])]):
+        jobs["hopeless", task.name] = Job(cell_of(task, info, parameters), 1, (0,), CHECK_LIMIT_S)
+    runs = dict(zip(jobs, perform_in_order([*jobs.values()], verbose=verbose), strict=True))
+    last = tasks[-1].name
+    runs["elsewhere", last] = next(perform_in_order([jobs["first", last]]))
     values = ", ".join(f"{key}={value}" for key, value in parameters.items())
-    used = {name for run in first.values() for name in run.used}
+    return [*laws, *laws_of_runs(info, runs, f" (checked with {values})" if values else "")]
+
+
+def laws_of_runs(
+    info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
+) -> Iterator[Law]:
+    """Yield the laws that the runs of a method keep or break; ``runs`` are by kind and task."""
+
+    def of_kind(kind: str) -> Iterator[tuple[str, Outcome]]:
+        return ((task, run.outcome) for (each, task), run in runs.items() if each == kind)
+
+    def changes(kind: str, how: str) -> Iterator[str]:
+        for task, _ in of_kind(kind):
+            for change in compare_runs(runs["first", task], runs[kind, task]):
+                yield f"{how.format(task)}: {change}"
+
+    first = dict(of_kind("first"))
+    rewards = ", ".join(f"{task} {runs['first', task].solution.reward}" for task in first)
+    yield law(
+        "solution",
+        (f"on {task}: {each.status}: {each.reason}" for task, each in first.items() if each.reason),
+        f"executed and scored on {rewards}{checked_with}",
+    )
+    by_seed = changes("other seed", "declared not to be stochastic, but another seed on {}")
+    yield law(
+        "determinism",
+        chain(
+            changes("again", "same seed on {}, same process"),
+            changes("elsewhere", "same seed on {}, another process"),
+            () if info.stochastic else by_seed,
+        ),
+        f"the same result under {'the same' if info.stochastic else 'any'} seed, in one process "
+        "and in another",
+    )
+    yield law(
+        "no hidden state",
+        changes("after others", "after other runs, {} with the same seed"),
+        "other runs in between change nothing",
+    )
+    yield law(
+        "limits",
+        (
+            f"a budget of {BUDGET} trials on {task}: {each.reason or each.meter}"
+            for task, each in of_kind("budget")
+            if each.status not in ("ok", "infeasible")
+            or (each.meter and each.meter.trials > BUDGET)
+        ),
+        f"keeps to a budget of {BUDGET} trials",
+    )
+    used = {name for each in first.values() for name in each.used}
     unused = {item.value for item in METERED if item.value in info.information} - used
-    ends = [f"gives {run.status}: {run.reason}" for run in hopeless]
-    return [
-        *laws,
-        law(
-            "solution",
-            (f"on {t}: {run.status}: {run.reason}" for t, run in first.items() if run.reason),
-            f"executed and scored on {rewards}" + (f" (checked with {values})" if values else ""),
+    undeclared = (
+        f"on {task}: {each.reason}"
+        for task, each in first.items()
+        if any(words in each.reason for words in _UNDECLARED)
+    )
+    never = [f"declared but never used: {', '.join(sorted(unused))}"] if unused else []
+    declared = f"declared and used: {', '.join(sorted(used)) or 'nothing'}"
+    yield law("information", [*undeclared, *never], declared)
+    hopeless = [each for _, each in of_kind("hopeless")]
+    yield law(
+        "failure",
+        (
+            f"on a task that nobody can complete it gives {each.status} {each.reason}; it should "
+            "give infeasible, with a reason"
+            for each in hopeless
+            if each.status not in ("infeasible", "solver-failed")
         ),
-        law(
-            "determinism",
-            chain(
-                changes(again, "same seed on {}, same process"),
-                changes(elsewhere, "same seed on {}, another process"),
-                () if info.stochastic else of_another_seed,
-            ),
-            f"the same result under {seed} seed, in one process and in another",
-        ),
-        law(
-            "no hidden state",
-            changes(after, "after other runs, {} with the same seed"),
-            "other runs in between change nothing",
-        ),
-        law(
-            "limits",
-            (
-                f"a budget of {BUDGET} trials on {name}: {run.reason or run.meter}"
-                for name, run in budget.items()
-                if run.status not in ("ok", "infeasible")
-                or (run.meter and run.meter.trials > BUDGET)
-            ),
-            f"keeps to a budget of {BUDGET} trials",
-        ),
-        law(
-            "information",
-            [
-                *(
-                    f"on {name}: {run.reason}"
-                    for name, run in first.items()
-                    if any(words in run.reason for words in _UNDECLARED)
-                ),
-                *[f"declared but never used: {', '.join(sorted(unused))}"] * bool(unused),
-            ],
-            f"declared and used: {', '.join(sorted(used)) or 'nothing'}",
-        ),
-        law(
-            "failure",
-            (
-                f"on a task that nobody can complete it gives {run.status} {run.reason}; it should "
-                "give infeasible, with a reason"
-                for run in hopeless
-                if run.status not in ("infeasible", "solver-failed")
-            ),
-            f"a task that nobody can complete {ends[0]}"
-            if ends
-            else "says beforehand that it does not apply to a task without a solution",
-        ),
-    ]
+        f"a task that nobody can complete gives {hopeless[0].status}: {hopeless[0].reason}"
+        if hopeless
+        else "says beforehand that it does not apply to a task without a solution",
+    )
 
 
 def laws_of_declaration(info: MethodInfo) -> list[Law]:

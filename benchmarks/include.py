@@ -7,9 +7,10 @@ folder is executed and scored again; that of the shipped ones is checked by the 
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -18,13 +19,11 @@ from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.shipped import SHIPPED, open_shipped
-from coartic.benchmarks.worker import Job, Outcome
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
-from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Cell, Plan, hash_of
-from coartic.runs.run import PREFIXES, Run
+from coartic.runs.plan import Job, hash_of
+from coartic.runs.record import PREFIXES, Run
 from coartic.runs.store import Store, open_store, writing
 
 _SCORED = (
@@ -34,7 +33,7 @@ _SCORED = (
 """Columns of ``results`` that follow from the solutions of a run."""
 
 
-def include_folders(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
+def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
     """Return the plan with the runs that other folders hold, which are copied into ``out``.
 
     ``shipped`` names the shipped results. Performed in ``out``, the plan makes those of its own
@@ -49,7 +48,7 @@ def include_folders(plan: Plan, folders: Sequence[str | Path], out: Path) -> Pla
         sources: dict[str, Store] = {}
         for name in map(str, folders):
             if name == SHIPPED:
-                sources[name] = stack.enter_context(open_shipped(plan.suite))
+                sources[name] = stack.enter_context(open_shipped(plan[0].suite))
                 continue
             if folder_named(name).resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot include itself: choose another --out")
@@ -69,72 +68,76 @@ def include_folders(plan: Plan, folders: Sequence[str | Path], out: Path) -> Pla
     return whole
 
 
-def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
+def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
     """Return the plan with the cells of the sources, each with the runs that the plan asks for and
-    those that follow in the sources without a gap. Raises CoarticError where sources contradict
+    the runs that follow in the sources without a gap. Raises CoarticError if sources contradict
     each other, or the plan where it asks for runs that no source has."""
     plans = {name: source.plan() for name, source in sources.items()}
     held = {
-        (plans[name].specifications[position].asked, number)
+        (plans[name][position].cell.digest, number)
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
-    own = dict(cells_of(plan))
+    own = {job.cell.digest: job for job in plan}
     # What a source has is not performed here, where the code of its method may be another.
     missing = [
-        cell
-        for asked, cell in own.items()
-        if not held.issuperset((asked, n) for n in range(cell.runs))
+        job for digest, job in own.items() if not held.issuperset((digest, n) for n in job.numbers)
     ]
-    parts = plans | {"this command": replace(plan, cells=tuple(missing))}
-    check_together(parts)
-    methods = {name: method for part in parts.values() for name, method in part.methods.items()}
-    cells: dict[str, Cell] = {}
-    for asked, cell in (pair for part in (plan, *plans.values()) for pair in cells_of(part)):
-        runs = own[asked].runs if asked in own else 0
-        while (asked, runs) in held:
+    parts = {**plans, "this command": missing}
+    check_together(
+        {name: part[0] for name, part in plans.items()} | {"this command": plan[0]}, parts
+    )
+    methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
+    jobs: dict[str, Job] = {}
+    for job in itertools.chain(plan, *plans.values()):
+        digest = job.cell.digest
+        runs = len(own[digest].numbers) if digest in own else 0
+        while (digest, runs) in held:
             runs += 1
         if runs:
-            cells.setdefault(asked, replace(cell, method=methods[cell.method.name], runs=runs))
+            cell = replace(job.cell, method=methods[job.cell.method.name])
+            jobs.setdefault(digest, replace(plan[0], cell=cell, numbers=range(runs)))
+    warn_of_gaps(plan, plans, jobs)
+    return list(jobs.values())
+
+
+def warn_of_gaps(
+    plan: Sequence[Job], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
+) -> None:
+    """Warn of sources that are not finished, and of sources that have fewer runs of a cell than the
+    plan asks for of its own."""
+    most = max(len(job.numbers) for job in plan)
+    own = {job.cell.digest for job in plan}
     for name, part in plans.items():
-        lacking, few = list[Cell](), list[Cell]()
-        for asked, cell in cells_of(part):
-            there = cells[asked].runs if asked in cells else 0
-            if there < cell.runs:
-                lacking.append(cell)
-            elif asked not in own and cell.method.stochastic and there < plan.runs:
-                few.append(cell)
+        lacking, few = list[Job](), list[Job]()
+        for job in part:
+            digest, method = job.cell.digest, job.cell.method
+            there = len(jobs[digest].numbers) if digest in jobs else 0
+            if there < len(job.numbers):
+                lacking.append(job)
+            elif digest not in own and method.stochastic and there < most:
+                few.append(job)
         if lacking:
             words = f"{name} is not finished: it lacks runs of {named(lacking)}"
             warnings.warn(
-                f"{words}, and gives those before the first that is missing", stacklevel=3
+                f"{words}, and gives those before the first that is missing", stacklevel=4
             )
         if few:
-            words = f"{counted(few[0].runs, 'run')} of {named(few)}; {plan.runs} are asked for here"
-            warnings.warn(f"{name} has {words}", stacklevel=3)
-    return replace(
-        plan,
-        runs=max(plan.runs, *(cell.runs for cell in cells.values())),
-        trials=max(part.trials for part in parts.values()),
-        cells=tuple(cells.values()),
-    )
+            words = (
+                f"{counted(len(few[0].numbers), 'run')} of {named(few)}; {most} are asked for here"
+            )
+            warnings.warn(f"{name} has {words}", stacklevel=4)
 
 
-def cells_of(plan: Plan) -> Iterator[tuple[str, Cell]]:
-    """The cells of a plan, each after the hash of its specification without the code."""
-    return zip(
-        (specification.asked for specification in plan.specifications), plan.cells, strict=True
-    )
+def named(jobs: Sequence[Job]) -> str:
+    """Name the cell of the first of some jobs, and count the others."""
+    others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
+    return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
-def named(cells: Sequence[Cell]) -> str:
-    """Name the first of some cells, and count the others."""
-    others = f" and of {counted(len(cells) - 1, 'other')}" if len(cells) > 1 else ""
-    return f"{cells[0].label} on {cells[0].task.name}{others}"
-
-
-def check_together(plans: Mapping[str, Plan]) -> None:
-    """Raises CoarticError where plans, by where they are from, say different things of one."""
+def check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]) -> None:
+    """Raises CoarticError if parts of a plan, by where they are from, say different things of one
+    thing; ``first`` has a job of each."""
     first_said: dict[str, tuple[str, object]] = {}
 
     def agree(where: str, what: str, value: object, hint: str = "") -> None:
@@ -142,26 +145,26 @@ def check_together(plans: Mapping[str, Plan]) -> None:
         if there != value:
             raise CoarticError(f"{what} is {there} in {origin} and {value} in {where}{hint}")
 
-    for where, plan in plans.items():
-        agree(where, "the suite", repr(plan.suite))
-        agree(where, "the seed", plan.seed)
-        agree(where, "the trial budget", plan.trial_budget)
-        for cell, specification in zip(plan.cells, plan.specifications, strict=True):
-            name, method = cell.task.name, cell.method
-            agree(where, f"task {name!r}", f"definition {hash_of(specification.definition)[:8]}")
-            hint = ": leave it out of one of them, or give it another name"
-            agree(where, f"method {method.name!r}", f"code {method.code}", hint)
-            cell_named = f"{cell.label} on {name}"
-            agree(where, f"the list of parameters of {cell_named}", sorted(cell.complete))
-            for key, value in cell.complete.items():
-                agree(where, f"{key} of {cell_named}", value)
+    for where, job in first.items():
+        agree(where, "the suite", repr(job.suite))
+        agree(where, "the seed", job.seed)
+        agree(where, "the trial budget", job.cell.trial_budget)
+    for where, cell in ((where, job.cell) for where, part in parts.items() for job in part):
+        name, method = cell.task.name, cell.method
+        agree(where, f"task {name!r}", f"definition {hash_of(cell.definition)[:8]}")
+        hint = ": leave it out of one of them, or give it another name"
+        agree(where, f"method {method.name!r}", f"code {method.code}", hint)
+        cell_named = f"{cell.label} on {name}"
+        agree(where, f"the list of parameters of {cell_named}", sorted(cell.parameters))
+        for key, value in cell.parameters.items():
+            agree(where, f"{key} of {cell_named}", value)
 
 
 def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
     """Copy the runs that a source was asked for and the target lacks, each scored again; ``origin``
-    says where those are from that the target has. Raises CoarticError where a run does not do what
+    says where the runs are from that the target has. Raises CoarticError if a run does not do what
     is stored of it, or the target has another result of it."""
-    methods, there = source.plan().methods, target.runs().set_index("run_id").result.to_dict()
+    there = target.runs().set_index("run_id").result.to_dict()
     for _, cell in source.runs().groupby(["task", "method", "setting"], sort=False):
         results = dict(zip(cell.run_id, cell.result, strict=True))
         for run_id in results.keys() & there.keys():
@@ -169,41 +172,28 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
                 continue
             run = source.run(run_id)
             if changes := compare_runs(target.run(run_id), run):  # beyond trials not kept
-                which = f"run {run.number} of {cell.method.iloc[0]} on {cell.task.iloc[0]}"
+                which = f"run {run.number} of {run.cell.method.name} on {run.cell.task.name}"
                 where = f"{origin[run_id]} and {name} ({run_id})"
                 raise CoarticError(f"{which} differs in {where}: {changes[0]}")
         runs = [source.run(run_id) for run_id in results if run_id not in there]
         if runs and name != SHIPPED:  # whose file is checked by its hash
-            check_scores(name, methods[cell.method.iloc[0]], runs, results)
+            check_scores(name, runs, results)
         target.write(runs)
         origin |= {run.id: name for run in runs}
 
 
-def check_scores(
-    name: str, method: MethodInfo, runs: Sequence[Run], results: Mapping[str, str]
-) -> None:
+def check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) -> None:
     """Score runs of one cell again, side by side.
 
-    Raises CoarticError where one does not come to what is stored of it, or to the hash of its
+    Raises CoarticError if a run does not come to what is stored of it, or to the hash of its
     result, which ``results`` has by id.
     """
-    specification = runs[0].specification
     stated = [
-        Outcome(
-            run.status,  # type: ignore[arg-type]  # the table takes no other
-            run.reason,
-            {part: list(score.movements) for part, score in run.scores.items()},
-            bound=run.bound,
-            details=run.details,
-            meter=run.meter,
-            rewards=run.rewards,
-        )
+        replace(run.outcome, parts={part: [*each.movements] for part, each in run.scores.items()})
         for run in runs
     ]
-    again = score(
-        Job(specification, method, runs[0].suite_seed, tuple(run.number for run in runs)), stated
-    )
-    for run, scored in zip(runs, again, strict=True):
+    job = replace(runs[0].job, numbers=[run.number for run in runs])
+    for run, scored in zip(runs, score(job, stated), strict=True):
         before, after = run.to_row(), scored.to_row()
         wrong = [
             f"{column} is {after[column]}, not {before[column]}"
@@ -212,7 +202,8 @@ def check_scores(
         ]
         if {run.result, scored.result} != {results[run.id]}:
             wrong.append("a joint, a tick or a trial was changed")
-        if not math.isclose(run.other_arm_travel or 0, scored.other_arm_travel or 0, abs_tol=1e-9):
+        travel = [each.solution.other_arm_travel or 0.0 for each in (run, scored)]
+        if not math.isclose(*travel, abs_tol=1e-9):
             wrong.append("the travel of the other arm is not as stored")
         if wrong:
             raise CoarticError(f"{name}: run {run.id} does not do what is stored of it: {wrong[0]}")

@@ -30,7 +30,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from coartic.benchmarks.worker import Job, Outcome, answer_of, fail, outcomes_from, perform_job
+from coartic.benchmarks.worker import answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
 from coartic.internal.files import write_atomically
 from coartic.internal.interruption import blocked_signals
@@ -38,6 +38,8 @@ from coartic.internal.text import error_line, plain
 from coartic.internal.threads import ONE_THREAD, begin_worker, end_group, environment, threads_for
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
+from coartic.runs.plan import Job
+from coartic.runs.record import Outcome
 
 _POLL_S = 0.2  # between looks for answers and at limits
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
@@ -97,7 +99,7 @@ class Workers:
         """Each job with its outcomes, as in :meth:`Local.perform`."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
-            by_method[job.method.key].append(job)
+            by_method[job.cell.method.key].append(job)
         most = self.local.workers
         waiting = deque(
             of_method[first::most]  # each has some of every cell
@@ -154,7 +156,7 @@ class Workers:
 
     def worker_for(self, jobs: Sequence[Job]) -> Worker:
         """The process that waits, if it has run their method; else a new one."""
-        method, waits = jobs[0].method.key, self._idle
+        method, waits = jobs[0].cell.method.key, self._idle
         self._idle = None
         if waits is not None and waits.method == method:
             return waits
@@ -203,7 +205,7 @@ class Worker:
             return
         # While it compiles kernels: what it returns is executed here.
         with contextlib.suppress(Exception):  # the process says the same
-            warm_up(self.jobs[0].specification.task, "trials")
+            warm_up(self.jobs[0].cell.task, "trials")
 
     @property
     def exit_code(self) -> int | None:
@@ -283,8 +285,8 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
         except EOFError:  # nobody has more
             return
         for job in jobs:  # kernels are compiled, or loaded, on no run's clock
-            learns = job.specification.method.startswith(METHOD_PREFIX)
-            warm_up(job.specification.task, "learner" if learns else "motion", "trials")
+            learns = job.cell.method.name.startswith(METHOD_PREFIX)
+            warm_up(job.cell.task, "learner" if learns else "motion", "trials")
         if not number:
             place = folder / "place"
             place.mkdir()

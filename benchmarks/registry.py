@@ -10,6 +10,7 @@ import inspect
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from pydantic import TypeAdapter
 from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.reader import begin_reader
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.text import LONGEST_LINE, plain, unknown
 from coartic.internal.toml_files import check_file
 from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
 from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
@@ -103,6 +104,19 @@ def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) 
         if why:
             raise CoarticError(f"{info.origin}: method id {info.name!r} {why}")
         registered[info.name] = info
+
+
+def methods_named(name: str, registered: Registry) -> list[str]:
+    """Return the ids of the methods that a name stands for.
+
+    A condition of the learner goes by its own name as well; ``optimum/*`` names all that begin
+    so. Raises CoarticError if there is none.
+    """
+    name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | ABLATIONS else name
+    named = [method for method in registered if fnmatchcase(method, name)]
+    if not named:
+        raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *ABLATIONS]))
+    return named
 
 
 def methods_of_file(path: Path) -> Iterator[MethodInfo]:

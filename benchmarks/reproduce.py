@@ -10,12 +10,12 @@ from pathlib import Path
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import plain, unknown
 from coartic.method import Meter
-from coartic.runs.run import PARTS, Run, execute_all
+from coartic.runs.plan import Job
+from coartic.runs.record import PARTS, Run, execute_all
 from coartic.runs.store import RUNS_FILE, open_store
 from coartic.trajectories import Trajectory, trajectory
 
@@ -51,8 +51,9 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
     """The solution of a run of a folder tick by tick. Raises CoarticError where it has none, or
     none that can be shown."""
     if "solution" not in run.scores:
-        raise CoarticError(f"run {run.id} has no solution to show: {run.status}, {run.reason}")
-    task, movements = run.specification.task, run.scores["solution"].movements
+        why = f"{run.outcome.status}, {run.outcome.reason}"
+        raise CoarticError(f"run {run.id} has no solution to show: {why}")
+    task, movements = run.cell.task, run.solution.movements
     try:
         (execution,) = execute_all(task, [movements])
         if isinstance(execution, Exception):
@@ -69,39 +70,37 @@ def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[
 
 
 def perform_again(run: Run, registered: Registry) -> Run:
-    """A stored run, performed anew by the code that is here now.
+    """Perform a stored run with the code that is here now.
 
-    Raises CoarticError where its method is not here, or no longer takes its parameters.
+    Raises CoarticError if its method is not here, or no longer takes its parameters.
     """
-    if run.specification.method not in registered:
-        raise CoarticError(unknown("method", run.specification.method, registered))
-    method = registered[run.specification.method]
+    name = run.cell.method.name
+    if name not in registered:
+        raise CoarticError(unknown("method", name, registered))
     try:
-        method.complete(run.specification.parameters)
+        registered[name].complete(run.cell.parameters)
     except CoarticError as error:
-        version = plain(str(run.environment.get("coartic")), 20)
+        version = plain(str((run.outcome.environment or {}).get("coartic")), 20)
         raise CoarticError(
             f"run {run.id} cannot be performed here: {error}. Version {version} of coartic made it."
         ) from None
-    specification = replace(run.specification, code=method.code, information=method.information)
-    job = Job(specification, method, run.suite_seed, (run.number,), run.time_limit_s)
-    return next(perform_in_order([job]))
+    cell = replace(run.cell, method=registered[name])
+    return next(perform_in_order([replace(run.job, cell=cell)]))
 
 
 def perform_some_again(
     folder: Path, count: int, registered: Registry
 ) -> Iterator[tuple[str, list[str]]]:
-    """Perform ``count`` runs of a folder anew, spread over its cells, those of known methods; the
-    id of each, and in what it differs from the stored run. Raises CoarticError where there is
-    none."""
+    """Perform ``count`` runs of a folder again, spread over its cells, of methods whose code is the
+    same here; yield the id of each, and its differences to the stored run. Raises CoarticError if
+    there is none."""
     with open_store(folder) as store:
-        plan = store.plan()
         ids = [
-            plan.run_id(position, number)
-            for position, cell in enumerate(plan.cells)
-            if cell.method.name in registered
-            and registered[cell.method.name].code == cell.method.code
-            for number in range(cell.runs)
+            job.run_id(number)
+            for job in store.plan()
+            if job.cell.method.name in registered
+            and registered[job.cell.method.name].code == job.cell.method.code
+            for number in job.numbers
         ]
         if not ids:
             raise CoarticError(f"{folder} has no run of a method whose code is the same here")
@@ -112,7 +111,7 @@ def perform_some_again(
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:
-    """Differences of the results of two runs in words, without times and surroundings."""
+    """Return in words how the results of two runs differ, without times and surroundings."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     first, second = a.to_row(), b.to_row()
@@ -126,8 +125,9 @@ def compare_runs(a: Run, b: Run) -> list[str]:
             scores = [run.scores.get(part) for run in (a, b)]
             words = [f"{each.reward} with {each.hands}" if each else "nothing" for each in scores]
             changes.append(f"{part}: {' against '.join(words)}")
-    if a.rewards != b.rewards:
-        pairs = enumerate(zip_longest(a.rewards, b.rewards, fillvalue="no trial"))
+    rewards = a.outcome.rewards, b.outcome.rewards
+    if rewards[0] != rewards[1]:
+        pairs = enumerate(zip_longest(*rewards, fillvalue="no trial"))
         trial, (x, y) = next((trial, pair) for trial, pair in pairs if pair[0] != pair[1])
         changes.append(f"rewards by trial differ, first at trial {trial}: {x} against {y}")
     return changes

@@ -2,7 +2,7 @@
 
 ``python -m coartic.benchmarks.shipped FOLDER`` makes one of a results folder whose runs have the
 results that are shipped already. The rewards of trials are downsampled
-(:meth:`coartic.runs.run.Run.downsample`): 2 MB in place of 30.
+(:meth:`coartic.runs.record.Run.downsample`): 2 MB in place of 30.
 """
 
 from __future__ import annotations
@@ -61,10 +61,13 @@ def differences(folder: Path) -> Iterator[str]:
     from coartic.benchmarks.reproduce import compare_runs
 
     with open_store(folder) as made:
-        for name, info in made.plan().methods.items():
-            if name not in built_in() or built_in()[name].code != info.code:
-                raise CoarticError(f"{folder}: other code of {name} made it: run the suite again")
-        if (suite := made.plan().suite) not in shipped_hashes():
+        plan = made.plan()
+        for method in (job.cell.method for job in plan):
+            if method.name not in built_in() or built_in()[method.name].code != method.code:
+                raise CoarticError(
+                    f"{folder}: other code of {method.name} made it: run the suite again"
+                )
+        if (suite := plan[0].suite) not in shipped_hashes():
             return
         ids = {run_id.partition("-")[0]: run_id for run_id in made.runs().run_id}
         with open_shipped(suite) as before:
@@ -85,7 +88,7 @@ def pack(folder: Path, out: Path) -> None:
             target.replace_plan(plan, made_with, ran, date)
             target.write(source.run(run_id).downsample() for run_id in source.runs().run_id)
         content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
-    (out / f"{plan.suite}{_ENDING}").write_bytes(content)
+    (out / f"{plan[0].suite}{_ENDING}").write_bytes(content)
     packed = sorted(out.glob(f"*{_ENDING}"))
     lines = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in packed]
     (out / _HASHES).write_text("".join(lines), encoding="ascii")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from fnmatch import fnmatchcase
+from collections.abc import Iterable
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
@@ -14,18 +12,15 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from coartic import ABLATIONS, CONDITIONS, CoarticError, Task, builtin_tasks, load_task, parse_task
-from coartic.benchmarks.registry import Registry
+from coartic import CoarticError, Task, builtin_tasks, parse_task
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_TRIALS, brief_value
 from coartic.internal.text import Line, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, error_saying, explain_file
-from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
-from coartic.runs.plan import Cell
 from coartic.runs.store import RUNS_FILE
-from coartic.tasks.families import Family, instance_of, named_by, shipped_families
-from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
+from coartic.tasks.families import named_by, shipped_families
+from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
@@ -183,147 +178,6 @@ def read_suite(path: Path) -> Suite:
     except ValidationError as error:
         keys = [*Suite.model_fields, *Block.model_fields, *Move.model_fields]
         raise CoarticError(explain_file(str(path), error, keys)) from None
-
-
-def select_cells(
-    suite: Suite,
-    registered: Registry,
-    *,
-    tasks: Sequence[str | Task] = (),
-    methods: Sequence[str] = (),
-    families: Mapping[str, Family] | None = None,
-) -> list[Cell]:
-    """The cells of a suite, plus those of the user's own tasks, narrowed by name.
-
-    ``tasks`` has names, task files (``.toml``) and tasks; ``optimum/*`` among ``methods`` stands
-    for all that begin so.
-
-    A method of ``methods`` that the suite does not have runs on all of the suite's
-    tasks that it applies to. A task from a file runs under every applicable method of
-    ``methods``, or of all methods of the suite where none are named; so does an instance of a
-    family that ``tasks`` names, alone or in a range, and the suite does not. ``families`` are the
-    user's own, beside the shipped ones. Raises CoarticError
-    for unknown names, for a task file whose name is taken, for parameters that a method does not
-    take, for more than :data:`MOST_CELLS` cells, and where nothing is left to run.
-    """
-
-    def task_named(name: str) -> Task:
-        address = address_of(name)
-        if address is not None and families and address.family in families:
-            return instance_of(families[address.family], address)
-        return load_task(name)
-
-    def known_by_name(task: str | Task) -> str | Task:
-        """The name in place of a shipped task or an instance, which no other task may have."""
-        if isinstance(task, str) or not (address_of(task.name) or task.name in builtin_tasks()):
-            return task
-        if task != task_named(task.name):
-            raise CoarticError(f"{task!r} is not the task of that name: give it another name")
-        return task.name
-
-    methods = [method for name in methods for method in methods_named(name, registered)]
-    tasks = list(map(known_by_name, tasks))
-    own_tasks = [each for each in tasks if isinstance(each, Task) or each.endswith(".toml")]
-    user_tasks = read_tasks(own_tasks)
-    wanted = [each for name in tasks if name not in own_tasks for each in named_by(str(name))]
-    wanted += user_tasks
-    in_suite = {name for block in suite.blocks for name in block.task_names(user_tasks)}
-    for name in wanted:
-        if name not in in_suite and address_of(name):
-            user_tasks.setdefault(name, task_named(name))
-    every = (
-        cell
-        for block in suite.blocks
-        for name in block.task_names(user_tasks)
-        # Goals are not moved in the user's tasks unless they are named.
-        if block.move is None or WILDCARD not in block.tasks or name not in user_tasks
-        for cell in cells_on(user_tasks.get(name) or task_named(name), suite, block, registered)
-    )
-    cells = list(itertools.islice(every, MOST_CELLS + 1))
-    if len(cells) > MOST_CELLS:
-        raise CoarticError(
-            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} combinations "
-            "(tasks x moves x methods x grid)"
-        )
-    # What named methods and the user's tasks add.
-    there = {(cell.task.name, cell.label) for cell in cells}
-    of_suite = list(dict.fromkeys(cell.method.name for cell in cells))
-    shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in user_tasks}
-    pairs = [
-        *itertools.product(shipped.values(), [name for name in methods if name not in of_suite]),
-        *itertools.product(user_tasks.values(), methods or of_suite),
-    ]
-    refusals: list[str | None] = []
-    for task, method in pairs:
-        if (reason := registered[method].why_not(task)) is not None:
-            refusals.append(reason)
-        elif (task.name, method) not in there:
-            cells.append(Cell(task, registered[method], runs=suite.runs))
-    task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
-    if wrong := [name for name in wanted if name not in task_names]:
-        hint = " Instances are a range, such as long/v1/i000..i009."
-        words = (f"{unknown('task', name, task_names)}{hint * ('/' in name)}" for name in wrong)
-        raise CoarticError("\n".join(words))
-    of_tasks = [cell for cell in cells if not wanted or cell.task.name in wanted]
-    chosen = [cell for cell in of_tasks if not methods or cell.method.name in methods]
-    # A user's own task that nothing applies to is an error, not a silent gap.
-    busy = {cell.task.name for cell in chosen}
-    idle = [name for name in user_tasks if name not in busy]
-    if idle or not chosen:
-        there_is = ", ".join(dict.fromkeys(cell.label for cell in of_tasks)) or "nothing there"
-        refusals += (registered[m].why_not(cell.task) for cell in of_tasks for m in methods)
-        why = (
-            "; ".join(dict.fromkeys(filter(None, refusals)))
-            or f"suite {suite.name!r} has {there_is}"
-        )
-        what = f"task {idle[0]!r}" if idle else "what was asked for"
-        raise CoarticError(f"no method to run on {what}: {why}.")
-    return chosen
-
-
-def methods_named(name: str, registered: Registry) -> list[str]:
-    """Ids of the methods that a name stands for.
-
-    A condition of the learner goes by its own name as well; ``optimum/*`` names all that begin
-    so. Raises CoarticError where there is none.
-    """
-    name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | ABLATIONS else name
-    named = [method for method in registered if fnmatchcase(method, name)]
-    if not named:
-        raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *ABLATIONS]))
-    return named
-
-
-def read_tasks(tasks_and_files: Iterable[str | Task]) -> dict[str, Task]:
-    """Tasks, and those of files, by name, which no other task may have."""
-    places: dict[str, str] = {}
-    tasks: dict[str, Task] = {}
-    for each in tasks_and_files:
-        task, place = (each, repr(each)) if isinstance(each, Task) else (load_task(each), each)
-        taken = "a shipped task" if task.name in builtin_tasks() else places.get(task.name)
-        if taken == place:
-            raise CoarticError(f"{place}: the same task is given twice")
-        if taken is not None:
-            raise CoarticError(f"{place}: name {task.name!r} is already taken by {taken}")
-        places[task.name], tasks[task.name] = place, task
-    return tasks
-
-
-def cells_on(task: Task, suite: Suite, block: Block, registered: Registry) -> Iterator[Cell]:
-    """The cells of a block on one of its tasks."""
-    if block.goals is not None and len(task.goals) not in block.goals:
-        return
-    methods = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
-    for changed, method in itertools.product(changed_tasks(task, suite, block), methods):
-        reason = registered[method].why_not(changed, block.parameters)
-        if reason is not None and WILDCARD not in "".join((*block.methods, *block.tasks)):
-            raise CoarticError(f"suite {suite.name!r}: {reason}")
-        if reason is not None:
-            continue  # "all that applies"
-        for values in itertools.product(*block.grid.values()):
-            parameters = block.parameters | dict(zip(block.grid, values, strict=True))
-            registered[method].complete(parameters)
-            yield Cell(changed, registered[method], parameters, runs=block.runs or suite.runs)
 
 
 def changed_tasks(task: Task, suite: Suite, block: Block) -> list[Task]:

@@ -13,19 +13,17 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, PlainValidator, TypeAdapter
+from pydantic import TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.text import error_line
 from coartic.method import (
     Information,
-    Meter,
     MethodError,
     Result,
     Session,
@@ -35,23 +33,10 @@ from coartic.method import (
 from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import SEARCH, Specification, run_seed
-from coartic.runs.run import PARTS, Times
+from coartic.runs.plan import SEARCH, Job
+from coartic.runs.record import PARTS, Outcome, Times
 
 _log = logging.getLogger(__name__)  # which is heard where a method is checked
-
-
-@dataclass(frozen=True)
-class Job:
-    """A batch of runs of one cell, which are performed side by side."""
-
-    specification: Specification
-    method: MethodInfo
-    suite_seed: int
-    numbers: tuple[int, ...]
-    """Numbers of the runs within their cell."""
-    time_limit_s: float | None = None
-    """CPU time of all its runs together."""
 
 
 def plain_movement(movement: Movement) -> Movement:
@@ -64,29 +49,6 @@ def plain_movement(movement: Movement) -> Movement:
         None if target is None else np.array(target, dtype=np.float64),
         waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
     )
-
-
-_Movement = Annotated[Movement, PlainValidator(lambda parts: plain_movement(Movement(*parts)))]
-_Reward = Annotated[int, Field(gt=-(2**31), lt=2**31)]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The statement of a worker about one run."""
-
-    status: Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
-    reason: str = ""
-    parts: dict[str, list[_Movement]] = field(default_factory=dict)
-    """Its solution, and of a learner first trial and replay."""
-    bound: int | None = None
-    details: dict[str, Any] = field(default_factory=dict)
-    used: tuple[str, ...] = ()
-    meter: Meter | None = None
-    """None where the worker died."""
-    rewards: list[_Reward | None] = field(default_factory=list)
-    times: Times = field(default_factory=Times)
-    environment: dict[str, Any] | None = None
-    """Where this is not that of the parent process."""
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
@@ -130,47 +92,52 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
     """The outcomes of a job from :func:`answer_of`, or that it crashed."""
     try:
-        outcomes = _OUTCOMES.validate_python(json.loads(answer))
+        content = json.loads(answer)
+        for each in content:
+            each["parts"] = {
+                part: [plain_movement(Movement(*movement)) for movement in movements]
+                for part, movements in each["parts"].items()
+            }
+        outcomes = _OUTCOMES.validate_python(content)
         if len(outcomes) == len(job.numbers):
             return outcomes
         why = f"{len(outcomes)} for {len(job.numbers)} runs"
-    except (ValueError, TypeError, RecursionError) as error:
+    except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
 
 def perform_job(job: Job) -> list[Outcome]:
     """Perform a job. Whatever the method does is an outcome, not an error."""
-    specification = job.specification
+    cell, name = job.cell, job.cell.method.name
     sessions = [
         Session(
-            specification.task,
-            run_seed(job.suite_seed, specification.task.name, number),
+            cell.task,
+            job.run_seed(number),
             # as declared, whatever became of the class since
-            map(Information, specification.information),
-            trial_budget=specification.trial_budget,
-            trusted=job.method.is_ours,
+            map(Information, cell.method.information),
+            trial_budget=cell.trial_budget,
+            trusted=cell.method.is_ours,
             of_run=True,
         )
         for number in job.numbers
     ]
-    budget = specification.trial_budget or "any number of"
-    asked = specification.method, specification.task.name, job.suite_seed, budget
-    _log.debug("%s on %s: seed %s, %s trials", *asked)
-    warm = specification.method in _seen
-    _seen.add(specification.method)
+    budget = cell.trial_budget or "any number of"
+    _log.debug("%s on %s: seed %s, %s trials", name, cell.task.name, job.seed, budget)
+    warm = name in _seen
+    _seen.add(name)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
     try:
-        method = job.method.configure(specification.parameters)
+        method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
-        if (reason_not := method.why_not(outline_of(specification.task))) is not None:
+        if (reason_not := method.why_not(outline_of(cell.task))) is not None:
             raise MethodError("infeasible", str(reason_not))
         if len(sessions) == 1:
             results = [method.solve(sessions[0])]
         else:
             results = method.solve_together(sessions)
         made = trials_outside() - made
-        if made and not job.method.is_ours:
+        if made and not cell.method.is_ours:
             text = f"the method made {made} trials outside its session, which are not counted"
             raise UndeclaredError(f"{text}: by coartic.objective, learn or execute")
     except BaseException as error:
@@ -179,7 +146,7 @@ def perform_job(job: Job) -> list[Outcome]:
     runs = len(sessions)
     times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
     pairs = zip(results, sessions, strict=True)
-    return [outcome_of(job.method, result, session, times) for result, session in pairs]
+    return [outcome_of(cell.method, result, session, times) for result, session in pairs]
 
 
 _seen: set[str] = set()

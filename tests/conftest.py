@@ -57,10 +57,10 @@ def _plain_width(monkeypatch):
 @pytest.fixture
 def in_this_process(monkeypatch):
     """Runs without processes of their own, which take long and have tests of their own."""
-    from coartic.benchmarks import pool, reproduce, run
+    from coartic.benchmarks import pool, reproduce, runner
     from tests.support.suites import InProcess
 
-    for module in (pool, reproduce, run):
+    for module in (pool, reproduce, runner):
         monkeypatch.setattr(module, "Local", InProcess)
 
 
@@ -165,7 +165,14 @@ def visited(browser):
 
 
 FIRST = (
-    *("test_conformance", "test_pool", "test_cli", "test_method_files", "test_harness", "test_dask"),
+    *(
+        "test_conformance",
+        "test_pool",
+        "test_cli",
+        "test_method_files",
+        "test_harness",
+        "test_dask",
+    ),
     *("test_browser", "test_play_page", "test_report", "test_figures"),
 )
 """Modules that begin: those that start processes, then those that read one report and draw, so that

@@ -127,7 +127,7 @@ assert {*coartic.__all__} <= {*dir(coartic)}, "not shown before it is imported"
 from coartic.runs.method_info import load_method
 import coartic.benchmarks.pool
 assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
-assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.run"} & set(sys.modules)
+assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.runner"} & set(sys.modules)
 print("worker", flush=True)
 from coartic import *
 from pkgutil import iter_modules
@@ -244,14 +244,15 @@ def without_posix(out):
     everything()
 
     from coartic.analysis.study import load
-    from coartic.benchmarks.run import perform, plan_suite
+    from coartic.benchmarks.runner import perform, plan_suite
+    from coartic.runs.plan import size_of
     from tests.support.suites import InProcess
 
     methods = ["EC1", "hill-climbing", "posture-qp/goals-ahead"]
     plan = plan_suite("quick", runs=2, trials=5, tasks=["ascending"], methods=methods)
     assert perform(plan, out, executor=InProcess()).failed == 0
     runs = load(out).runs
-    assert len(runs) == plan.size
+    assert len(runs) == size_of(plan)
     assert runs.process_peak_mb.isna().all()
 
 

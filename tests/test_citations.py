@@ -18,10 +18,9 @@ from coartic.analysis.citations import (
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.reader import METHOD_NAME
 from coartic.benchmarks.registry import NAMES, built_in, registry
-from coartic.benchmarks.suites import Cell
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.store import RUNS_FILE
-from tests.support.suites import BROKEN, run_and_write
+from tests.support.suites import BROKEN, cell_on, run_and_write
 
 ROOT = Path(__file__).parent.parent
 
@@ -81,7 +80,7 @@ def test_every_method_has_a_row_and_every_entry_is_used():
 
 
 def declared(title, citation, origin="built in"):
-    return MethodInfo(title, title, citation, (), (), True, {}, origin, "")
+    return MethodInfo(title, title, citation, (), True, {}, origin, "")
 
 
 def test_each_work_once_with_the_methods_that_rest_on_it():
@@ -120,7 +119,7 @@ def test_methods_of_others_cite_themselves():
 def test_command(tmp_path, coartic):
     methods = registry([BROKEN])
     cells = [
-        Cell(load_task("ascending"), methods[name])
+        cell_on(load_task("ascending"), methods[name])
         for name in ("corrective-alone/given", "test/good")
     ]
     run_and_write(tmp_path / "results", cells, runs=1)

@@ -26,11 +26,10 @@ from coartic.analysis.sections import TABLES
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
-from coartic.benchmarks.suites import Cell
 from coartic.estimates import Estimate
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import AS_RELEASED
-from tests.support.suites import KNOWN, InProcess, run_and_write
+from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
 
 NAN = float("nan")
 ONE_ARMED = ("ascending", "descending")
@@ -617,7 +616,7 @@ def study(tmp_path_factory):
         for task in ONE_ARMED
         for method in (RANDOM_SEARCH, "dual-process/EC1-subtask")
     ]
-    planned = [Cell(load_task(task), KNOWN[method]) for task, method in cells]
+    planned = [cell_on(load_task(task), KNOWN[method]) for task, method in cells]
     folder = tmp_path_factory.mktemp("claims")
     study = run_and_write(folder, planned, runs=4, trials=600, executor=InProcess())
     study.runs["trials"] = study.runs.trials.replace(600, 10_000)  # as long as the paper's

@@ -15,15 +15,15 @@ from typer.main import get_command
 from coartic import __version__, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
-from coartic.benchmarks.run import Progress
+from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, app, draw
 from coartic.cli.terminal import Display
-from coartic.runs.plan import Cell, run_seed
+from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session
-from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, planned
+from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, cell_on
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
@@ -80,15 +80,13 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
     progress = Progress(Path("results"), 63, done=18, waiting=Counter(x=37, y=20), workers=2)
     progress.timed["x"], progress.took["x"] = 6, 600.0  # 100 s a run, by two workers
-    specification = planned(
-        [Cell(load_task("two-armed-2"), KNOWN["posture-qp/goals-ahead"])]
-    ).specifications[0]
+    cell = cell_on(load_task("two-armed-2"), KNOWN["posture-qp/goals-ahead"])
     with Display() as display:
-        display.update(progress, specification)  # too early to tell
+        display.update(progress, cell)  # too early to tell
         progress.done = 19
-        display.update(progress, specification)
+        display.update(progress, cell)
         progress.done, progress.waiting = 63, Counter()
-        display.update(progress, specification)
+        display.update(progress, cell)
     shown = capsys.readouterr().err.replace("\r", "\n").split("\n")
     name = "Two-armed 2, posture QP, goals ahead"
     lines = ["63/63    0 failed"]
@@ -137,7 +135,7 @@ def test_reproduce(coartic, tmp_path):
     assert code == 2
     assert "is not a run id" in error
     with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
-        plain_sql.execute("UPDATE methods SET code = 'other'")
+        plain_sql.execute("UPDATE cells SET code = 'other'")
     code, _, error = coartic("verify", out, "--again", 1)
     assert code == 2
     assert "has no run of a method whose code is the same here" in error

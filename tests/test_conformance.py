@@ -10,12 +10,12 @@ from coartic import load_task
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.worker import Job, perform_job
-from coartic.runs.plan import Specification
+from coartic.benchmarks.worker import perform_job
+from coartic.runs.plan import Job
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import shipped_optima, tiny_task
-from tests.support.suites import BROKEN, InProcess
+from tests.support.suites import BROKEN, InProcess, cell_on
 from tests.support.suites import KNOWN as BUILT_IN
 
 pytestmark = pytest.mark.process
@@ -107,9 +107,7 @@ def test_methods_that_keep_every_law(methods, name):
 
 
 def test_what_a_session_shows_cannot_be_written(methods):
-    info = methods["test/forger"]
-    asked = Specification(load_task("ascending"), info.name, info.code, info.information, {}, None)
-    (outcome,) = perform_job(Job(asked, info, 0, (0,)))
+    (outcome,) = perform_job(Job(cell_on(load_task("ascending"), methods["test/forger"]), 0, (0,)))
     assert outcome.meter.trials == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
@@ -118,10 +116,9 @@ def test_what_a_session_shows_cannot_be_written(methods):
 @pytest.mark.parametrize("means", ["objective", "learn", "execute"])
 def test_trials_outside_the_session_are_noticed(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
-    info, task = methods["test/outsider"], load_task("ascending")
-    asked = Specification(task, info.name, info.code, info.information, {"means": means}, None)
+    cell = cell_on(load_task("ascending"), methods["test/outsider"], means=means)
     for _ in range(2):
-        (outcome,) = perform_job(Job(asked, info, 0, (0,)))
+        (outcome,) = perform_job(Job(cell, 0, (0,)))
         assert outcome.status == "crashed"
         assert "trials outside its session" in outcome.reason
 

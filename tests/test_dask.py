@@ -6,10 +6,16 @@ from coartic import CoarticError, load_task
 from coartic.benchmarks import cluster as cluster_module
 from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import perform, run_suite
-from coartic.benchmarks.suites import Cell
+from coartic.benchmarks.runner import perform, run_suite
 from coartic.runs.store import open_store
-from tests.support.suites import InProcess, paper_cells, planned, run_and_write, same_results
+from tests.support.suites import (
+    InProcess,
+    cell_on,
+    paper_cells,
+    planned,
+    run_and_write,
+    same_results,
+)
 
 pytestmark = [pytest.mark.process, pytest.mark.filterwarnings("ignore")]  # Dask's own
 QUIET = {"dashboard_address": None, "silence_logs": 50}
@@ -52,13 +58,13 @@ class Mine(Method):
         return Result(tuple(movements), {"process": os.getpid()})
 """)
     mine = registry([tmp_path / "mine.py"])["mine"]
-    cells = [Cell(load_task(task), mine) for task in ("ascending", "descending")]
+    cells = [cell_on(load_task(task), mine) for task in ("ascending", "descending")]
     out = tmp_path / "out"
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **QUIET) as cluster:
         run_and_write(out, cells, executor=Dask(cluster.scheduler_address), runs=8)
     with open_store(out) as store:
         runs = [store.run(run_id) for run_id in store.ids()]
-    assert (len(runs), {run.status for run in runs}) == (16, {"ok"})
+    assert (len(runs), {run.outcome.status for run in runs}) == (16, {"ok"})
     assert len({run.details["process"] for run in runs}) <= 2
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from coartic import TaskError, corrective_trial, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.run import run_suite
+from coartic.benchmarks.runner import run_suite
 from coartic.internal.limits import MOST_CELLS
 from coartic.tasks.families import (
     FAMILY_FOLDER,

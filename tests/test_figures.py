@@ -11,8 +11,7 @@ from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.topics.learning import learning_curves
-from coartic.benchmarks.suites import load_suite, select_cells
-from tests.support.suites import KNOWN, ROOT, run_and_write
+from tests.support.suites import KNOWN, ROOT, cells_of, run_and_write
 
 
 def test_robots_and_goals_are_drawn_where_they_are():
@@ -65,9 +64,7 @@ def test_learning_curves_against_a_loop(traced):
 
 
 def test_published_differences(tmp_path):
-    cells = select_cells(
-        load_suite("paper"), KNOWN, tasks=["two-armed-1"], methods=["dual-process/EC2"]
-    )
+    cells = cells_of("paper", tasks=["two-armed-1"], methods=["dual-process/EC2"])
     planted = run_and_write(tmp_path, cells=cells, runs=3, trials=60)
     planted.runs["trials"] = 10_000  # planted: the table asks for the paper's length
     planted.runs["hands"] = ["RRRR", "RRRR", "LRLR"]

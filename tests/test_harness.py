@@ -22,20 +22,22 @@ from coartic.analysis.topics.rewards import beside_paper
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import perform, plan_suite
+from coartic.benchmarks.runner import perform, plan_suite
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.suites import Cell, load_suite, select_cells, suites
-from coartic.benchmarks.worker import Job, Outcome, fail, perform_job
+from coartic.benchmarks.suites import load_suite, suites
+from coartic.benchmarks.worker import fail, perform_job
 from coartic.learner.conditions import ABLATIONS, CONDITIONS
 from coartic.method import Information, Meter, Session
-from coartic.runs.plan import Specification, run_seed
-from coartic.runs.run import Times, movements_from, too_long
+from coartic.runs.plan import Job, run_seed, size_of
+from coartic.runs.record import Outcome, Times, movements_from, too_long
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
 from tests.support.suites import (
     BROKEN,
     KNOWN,
     InProcess,
+    cell_on,
+    cells_of,
     made_once,
     paper_cells,
     planned,
@@ -65,7 +67,7 @@ def test_every_method_runs_in_some_suite():
 
 
 def test_suite_ablations_frees_the_base():
-    cells = select_cells(load_suite("ablations"), KNOWN)
+    cells = cells_of("ablations")
     tasks = {cell.task.name: cell.task for cell in cells}
     free, rail = tasks["two-armed-1.free-base"], tasks["two-armed-1"]
     assert (free.locked_base, rail.locked_base) == ((), ("y",))
@@ -77,7 +79,7 @@ def test_suite_ablations_frees_the_base():
     }
     suite = load_suite("paper").model_validate(load_suite("paper").model_dump() | blocks)
     with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
-        select_cells(suite, KNOWN)
+        cells_of(suite)
 
 
 def test_long_runs_begin_first(tmp_path):
@@ -85,17 +87,16 @@ def test_long_runs_begin_first(tmp_path):
 
     class Watched(InProcess):
         def perform(self, jobs):
-            begun.extend((job.specification.method, len(job.numbers)) for job in jobs)
+            begun.extend((job.cell.method.name, len(job.numbers)) for job in jobs)
             return super().perform(jobs)
 
-    cells = suite_of(
+    suite_of(
         tmp_path,
         'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\nruns = 2',
         f'tasks = ["ascending", "descending"]\nmethods = ["{planner}"]',
         'tasks = ["ascending"]\nmethods = ["dual-process/EC1-subtask"]\nruns = 4',
     )
-    plan = plan_suite("paper", cells=cells)
-    perform(plan, tmp_path / "results", executor=Watched(2))
+    perform(plan_suite(tmp_path / "own.toml"), tmp_path / "results", executor=Watched(2))
     assert begun == [
         (planner, 1),
         (planner, 1),
@@ -127,8 +128,8 @@ def test_seeds_are_paired_by_task_and_run(results):
 
 def test_run_ids_name_what_the_run_depends_on():
     def first(cells=None, **changes):
-        plan = planned(cells or paper_cells()[:1], **{"runs": 1, "trials": 10, **changes})
-        return plan.run_id(0, 0)
+        (job,) = planned(cells or paper_cells()[:1], **{"runs": 1, "trials": 10, **changes})
+        return job.run_id(0)
 
     (cell, other), base = paper_cells()[:2], first()
     assert base == first()
@@ -138,9 +139,9 @@ def test_run_ids_name_what_the_run_depends_on():
         first(seed=1),
         first(trials=11),
         first(trial_budget=5),
-        first([Cell(cell.task, cell.method, {"noise_sd": 0.1})]),
-        first([Cell(cell.task.model_copy(update={"radius": 0.2}), cell.method)]),
-        first([Cell(cell.task, replace(cell.method, code="c0de"))]),
+        first([cell_on(cell.task, cell.method, noise_sd=0.1)]),
+        first([cell_on(cell.task.model_copy(update={"radius": 0.2}), cell.method)]),
+        first([cell_on(cell.task, replace(cell.method, code="c0de"))]),
     ]
     assert len({base, *others}) == 8
 
@@ -152,7 +153,7 @@ def test_failures_are_kept_as_data(tmp_path):
     )  # fmt: skip
     policy = stuck.model_copy(update={"name": "policy", "initial_hands": "best-of-all"})
     learner = KNOWN["dual-process/EC1"]
-    study = run_and_write(tmp_path, [Cell(stuck, learner), Cell(policy, learner)], trials=5)
+    study = run_and_write(tmp_path, [cell_on(stuck, learner), cell_on(policy, learner)], trials=5)
     assert list(study.runs.status) == ["infeasible"] * 4
     assert study.runs.reason.str.len().min() > 20
     assert study.runs.reward.isna().all()
@@ -176,12 +177,12 @@ def test_grid_and_fixed_parameters(tmp_path):
         grid = { noise_sd = [0.02, 0.1], epsilon = [0.0, 0.5] }
         """
     )
-    cells = select_cells(load_suite(str(path)), KNOWN)
+    cells = cells_of(path)
     assert [cell.setting for cell in cells] == [
-        "trials=40, noise_sd=0.02, epsilon=0.0",
-        "trials=40, noise_sd=0.02, epsilon=0.5",
-        "trials=40, noise_sd=0.1, epsilon=0.0",
-        "trials=40, noise_sd=0.1, epsilon=0.5",
+        "trials=40, epsilon=0.0, noise_sd=0.02",
+        "trials=40, epsilon=0.5, noise_sd=0.02",
+        "trials=40, epsilon=0.0, noise_sd=0.1",
+        "trials=40, epsilon=0.5, noise_sd=0.1",
     ]
     runs = run_and_write(tmp_path / "out", cells, runs=1, trials=999).runs
     asked = {"epsilon": 0.5, "noise_sd": 0.1, "trials": 40}  # the suite's own number stands
@@ -200,15 +201,14 @@ def test_cells_are_distinguished_by_their_parameters(tmp_path):
         ec1 + "parameters = { trials = 20 }",
         'tasks = ["*"]\nmethods = ["dual-process/EC1"]',
     )
-    cells = planned(asked, runs=3, trials=30).cells
-    labels = [(cell.task.name, cell.setting) for cell in cells]
+    labels = [(cell.task.name, cell.setting) for cell in asked]
     assert labels[:3] == [
         ("ascending", ""),
         ("ascending", "noise_sd=0.5"),
         ("ascending", "trials=20"),
     ]
     assert len(labels) == len(set(labels)) == 6
-    study = run_and_write(tmp_path / "out", cells, runs=3, trials=30)
+    study = run_and_write(tmp_path / "out", asked, runs=3, trials=30)
     assert study.runs.run_id.is_unique
     assert set(study.runs.groupby(["task", "setting"]).size()) == {3}
     compared = {(row["cell"].task, row["cell"].label) for row in beside_paper(study)}
@@ -217,23 +217,23 @@ def test_cells_are_distinguished_by_their_parameters(tmp_path):
 
 def test_a_cell_has_one_number_of_runs(tmp_path):
     ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-    cells = suite_of(tmp_path, ec1, ec1 + "runs = 7")
     with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
-        plan_suite(tmp_path / "own.toml")
-    assert [cell.runs for cell in planned(cells, runs=2).cells] == [2]
-    once = paper_cells(methods=["corrective-alone/best-hands"], tasks=["two-armed-1"])
-    assert planned(once, runs=20).size == 1
+        suite_of(tmp_path, ec1, ec1 + "runs = 7")
+    (job,) = plan_suite(tmp_path / "own.toml", runs=2)
+    assert job.numbers == range(2)
+    once = {"methods": ["corrective-alone/best-hands"], "tasks": ["two-armed-1"]}
+    assert size_of(plan_suite("paper", runs=20, **once)) == 1
     task = tmp_path / "mine.toml"
     task.write_text(GOOD, encoding="utf-8")
     suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
     own = plan_suite(tmp_path / "own.toml", tasks=[task])
-    assert {cell.runs for cell in own.cells if cell.task.name == "mine"} == {7}
+    assert {len(job.numbers) for job in own if job.cell.task.name == "mine"} == {7}
 
 
 def test_learner_columns_are_the_learners(tmp_path):
     """A method's details never pass for columns that mean something else."""
     methods = registry([BROKEN])
-    cell = Cell(load_task("ascending"), methods["test/pretender"])
+    cell = cell_on(load_task("ascending"), methods["test/pretender"])
     study = run_and_write(tmp_path, [cell], runs=1)
     assert study.runs[["replay_reward", "best_trial"]].isna().all(axis=None)
 
@@ -250,7 +250,7 @@ def test_every_method_makes_the_trials_that_it_is_told(tmp_path, goals, policy, 
     begin_there = ["dual-process/EC4", "hill-climbing", "cma-es/goal-by-goal"]
     try_all = ["random-search", "random-search/hands", "cma-es/bandit", "differential-evolution"]
     methods = registry([EXAMPLES / "differential_evolution.py"])
-    cells = [Cell(task, methods[name]) for name in (*begin_there, *try_all)]
+    cells = [cell_on(task, methods[name]) for name in (*begin_there, *try_all)]
     runs = run_and_write(tmp_path, cells, runs=1, trials=20, trial_budget=budget).runs
     assert runs.status.unique().tolist() == ["ok"]
     assert runs.trials.unique().tolist() == [budget or 20]
@@ -276,7 +276,6 @@ def test_the_runs_of_a_batch_are_scored():
     """Solutions are the corrective process, 319 ticks; the second run lacks a tenth."""
     task, info = load_task("ascending"), KNOWN["dual-process/EC1"]
     movements = list(corrective_trial(task, "RRR").movements)
-    specification = Specification(task, info.name, info.code, info.information, {}, None)
     times = Times(wall_s=2.0, cpu_s=1.0, warm=True, together=4)
     corrections = [3, *range(20, 10, -1)]  # of trial 0, then by tenths
     information = {"parts": {"solution": movements}, "times": times}
@@ -287,7 +286,7 @@ def test_the_runs_of_a_batch_are_scored():
         Outcome("ok", times=times),
         Outcome("ok", parts={"solution": movements, "replay": movements[:1]}, bound=-300),
     ]  # fmt: skip
-    job = Job(specification, info, 5, (0, 1, 2, 3), 60.0)
+    job = Job(cell_on(task, info), 5, (0, 1, 2, 3), 60.0)
     runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]
     columns = ["run", "status", "reward", "hands", "best_trial",
                "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
@@ -300,21 +299,20 @@ def test_the_runs_of_a_batch_are_scored():
         [3, "solver-failed", *nothing, 1, None, None],
         [0, "timeout", *nothing, 4, 2.0, None],
     ]
-    reasons = ["", "", "it reported ok, but returned no solution", runs[3].reason, "too slow"]
-    assert [run.reason for run in runs] == reasons
-    assert "movements for goals [1], wanted [1, 2, 3]" in runs[3].reason
+    unfit = runs[3].outcome.reason
+    reasons = ["", "", "it reported ok, but returned no solution", unfit, "too slow"]
+    assert [run.outcome.reason for run in runs] == reasons
+    assert "movements for goals [1], wanted [1, 2, 3]" in runs[3].outcome.reason
     assert runs[3].scores == {}
-    better = replace(runs[0], rewards=[None, -310, -319, -319])  # than the solution
-    assert better.downsample().rewards == [None, -310, -319, None]
+    better = replace(runs[0].outcome, rewards=[None, -310, -319, -319])  # than the solution
+    downsampled = replace(runs[0], outcome=better).downsample()
+    assert downsampled.outcome.rewards == [None, -310, -319, None]
 
 
 def test_the_runs_of_a_batch_share_its_time():
-    task, info = load_task("ascending"), KNOWN["dual-process/EC1"]
-    specification = Specification(
-        task, info.name, info.code, info.information, info.complete({"trials": 50}), None
-    )
+    cell = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"], trials=50)
     begun = time.perf_counter(), time.process_time()
-    outcomes = perform_job(Job(specification, info, 0, tuple(range(8))))
+    outcomes = perform_job(Job(cell, 0, range(8)))
     wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
     assert 0 < sum(each.times.wall_s for each in outcomes) <= wall
     assert 0 < sum(each.times.cpu_s for each in outcomes) <= cpu
@@ -326,11 +324,9 @@ def test_a_solution_that_misses_a_goal_is_infeasible():
         name="stuck", locked_base=["x", "y"], hands=["right"],
         goals=[[2.5, 0.1]], initial_hands="R",
     )  # fmt: skip
-    info = KNOWN["corrective-alone/given"]
-    specification = Specification(stuck, info.name, info.code, info.information, {}, None)
-    job = Job(specification, info, 0, (0,), 60.0)
+    job = Job(cell_on(stuck, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
-    assert (run.status, run.scores) == ("infeasible", {})
+    assert (run.outcome.status, run.scores) == ("infeasible", {})
 
 
 def test_ten_thousand_movements_are_not_too_many():
@@ -344,7 +340,7 @@ def test_robots_of_different_size_share_a_table(tmp_path):
         name="small", robot={"left_links": [2.0], "right_links": [1.0] * 8},
         start={"left": [0.1], "right": [0.1] * 8}, goals=[[3.0, 1.0]], initial_hands="R",
     )  # fmt: skip
-    cells = [Cell(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
+    cells = [cell_on(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
     study = run_and_write(tmp_path, cells, trials=20)
     arms = {f"left_{k}" for k in range(1, 5)} | {f"right_{k}" for k in range(1, 9)}
     assert set(study.solutions.columns[6:]) == {"base_x", "base_y"} | arms
@@ -355,29 +351,29 @@ def test_robots_of_different_size_share_a_table(tmp_path):
 
 
 def test_own_task_runs_under_every_applicable_condition(tmp_path):
-    paper, path, other = load_suite("paper"), tmp_path / "mine.toml", tmp_path / "arm.toml"
+    path, other = tmp_path / "mine.toml", tmp_path / "arm.toml"
     path.write_text(GOOD, encoding="utf-8")
     other.write_text('hands = ["right"]\n' + GOOD.replace("mine", "arm"), encoding="utf-8")
 
     def methods(path, **selection):
-        cells = select_cells(paper, KNOWN, tasks=[str(path)], **selection)
+        cells = paper_cells(tasks=[path], **selection)
         return [cell.method.name for cell in cells]
 
     baseline = ["corrective-alone/best-hands"]
     assert methods(path, methods=baseline) == baseline
     assert methods(path) == [f"dual-process/EC{k}" for k in (1, 2, 3, 4)]
     assert methods(other) == ["dual-process/EC1"]
-    both = select_cells(paper, KNOWN, tasks=["ascending", str(path)])
+    both = paper_cells(tasks=["ascending", str(path)])
     assert [cell.task.name for cell in both] == ["ascending"] + 4 * ["mine"]
     made = [*map(load_task, ("two-armed-1", path, "two-armed/v1/i003"))]
-    again = select_cells(paper, KNOWN, tasks=made, methods=["EC4"])
+    again = paper_cells(tasks=made, methods=["EC4"])
     assert [cell.task for cell in again] == made
     for name in ("ascending", "two-armed/v1/i003"):
         impostor = made[1].model_copy(update={"name": name})
-        with pytest.raises(CoarticError, match="is not the task of that name: give it another"):
-            select_cells(paper, KNOWN, tasks=[impostor])
-    with pytest.raises(CoarticError, match="name 'mine' is already taken by"):
-        select_cells(paper, KNOWN, tasks=[made[1], str(path)])
+        with pytest.raises(CoarticError, match=f"{name}' is already taken by a shipped task: give"):
+            paper_cells(tasks=[impostor])
+    with pytest.raises(CoarticError, match="name 'arm' is already taken by another task: give"):
+        paper_cells(tasks=[made[1].model_copy(update={"name": "arm"}), str(other)])
 
 
 def test_ablations_of_the_learner_are_methods_of_their_own():
@@ -422,7 +418,7 @@ def test_a_goal_that_an_own_task_lacks_is_not_moved_in_it(tmp_path):
     head = 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\n'
     assert len(suite_of(tmp_path, head + "move = { goal = 3, by = [[0, 0.1]] }")) == 4
     files = [str(tmp_path / "mine.toml")]
-    cells = select_cells(load_suite(str(tmp_path / "own.toml")), KNOWN, tasks=files)
+    cells = cells_of(tmp_path / "own.toml", tasks=files)
     assert [cell.task.name for cell in cells] == ["mine"]
 
 
@@ -445,4 +441,4 @@ def test_a_folder_of_another_suite_is_refused(tmp_path):
     plan = planned(cells, runs=1, trials=5)
     perform(plan, tmp_path, executor=InProcess())
     with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
-        perform(replace(plan, suite="quick"), tmp_path, executor=InProcess())
+        perform([replace(job, suite="quick") for job in plan], tmp_path, executor=InProcess())

@@ -18,17 +18,17 @@ from coartic.analysis.verify import check_runs
 from coartic.benchmarks import shipped, template
 from coartic.benchmarks.include import include_folders
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.run import perform
-from coartic.benchmarks.suites import Cell
+from coartic.benchmarks.runner import perform
+from coartic.runs.plan import size_of
 from coartic.runs.store import RUNS_FILE, open_store, writing
-from tests.support.suites import KNOWN, InProcess, planned, run_and_write, same_results
+from tests.support.suites import KNOWN, InProcess, cell_on, planned, run_and_write, same_results
 
 EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "posture-qp/current-goal"
 OWN = Path(template.__file__)
 
 
-def cells(*pairs, runs=2):
-    return [Cell(load_task(task), KNOWN[method], runs=runs) for task, method in pairs]
+def cells(*pairs):
+    return [cell_on(load_task(task), KNOWN[method]) for task, method in pairs]
 
 
 LEFT = cells(("ascending", EC1), ("ascending", PLAN))
@@ -66,8 +66,7 @@ def test_what_no_folder_has_is_performed(parts, tmp_path):
     edit(left, f"DELETE FROM results WHERE id = {OF_EC1}")
     progress = joined([left], tmp_path / "whole")
     assert (progress.present, progress.done) == (2, 1 + 3)
-    more = cells(*[(cell.task.name, cell.method.name) for cell in LEFT], runs=3)
-    assert joined(parts[:1], tmp_path / "more", more, runs=3).done == 1
+    assert joined(parts[:1], tmp_path / "more", LEFT, runs=3).done == 1
     assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
     same_results(load(tmp_path / "whole"), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
 
@@ -75,7 +74,7 @@ def test_what_no_folder_has_is_performed(parts, tmp_path):
 def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, tmp_path):
     """Whatever it was asked for itself: nobody else's plan says how much is performed here."""
     left = shutil.copytree(parts[0], tmp_path / "left")
-    edit(left, "UPDATE cells SET runs = 1000000 WHERE position = 0")
+    edit(left, "UPDATE plan SET runs = 1000000 WHERE position = 0")
     with pytest.warns(UserWarning, match=f"left is not finished: it lacks runs of {EC1} on asc"):
         progress = joined([left], tmp_path / "more", RIGHT[2:])
     assert (progress.present, progress.done, progress.total) == (2 + 1, 1, 4)
@@ -119,7 +118,7 @@ def edit(folder, statement):
         db.commit()
 
 
-OF_EC1 = "(SELECT results.id FROM results JOIN settings ON settings.id = setting"
+OF_EC1 = "(SELECT results.id FROM results JOIN cells ON cells.id = cell"
 OF_EC1 += f" WHERE method = '{EC1}' AND run = 0)"
 CHEATS = {
     "reward is -": "UPDATE results SET reward = reward + 1",
@@ -152,9 +151,9 @@ def test_two_results_of_one_run(parts, tmp_path):
         store.write([store.run(run_id).downsample() for run_id in store.ids()])
     assert joined([parts[0], downsampled], tmp_path / "same", LEFT).present == 3
     with open_store(parts[0]) as store:
-        first, second = (run for run in map(store.run, store.ids()) if run.rewards)
+        first, second = (run for run in map(store.run, store.ids()) if run.outcome.rewards)
     with writing(other) as store:
-        store.write([replace(second, number=first.number)])
+        store.write([replace(second, job=first.job)])
     words = f"run {first.number} of {EC1} on ascending differs in .*left and .*other "
     with pytest.raises(CoarticError, match=words):
         joined([parts[0], other], tmp_path / "whole", LEFT)
@@ -166,20 +165,20 @@ def test_two_results_of_one_run(parts, tmp_path):
 
 def test_what_does_not_go_together(parts, tmp_path):
     moved = load_task("descending").model_copy(update={"name": "ascending"})
-    new = KNOWN[EC1].__class__(**vars(KNOWN[EC1]) | {"code": "0123456789ab"})
+    new = replace(KNOWN[EC1], code="0123456789ab")
     wrong = {
         "the seed is 0 in .*left and 5 in this command": {"seed": 5},
         "the trial budget is None in .* and 30 in": {"trial_budget": 30},
         f"trials of {EC1} on ascending is 40 in .*left and 41 in this": {"trials": 41},
-        "task 'ascending' is definition": {"cells": [Cell(moved, KNOWN[EC1])]},
+        "task 'ascending' is definition": {"cells": [cell_on(moved, KNOWN[EC1])]},
         f"method '{EC1}' is code .* and code 0123456789ab in .*: leave it out": {
-            "cells": [Cell(load_task("descending"), new)]
+            "cells": [cell_on(load_task("descending"), new)]
         },
     }
     for said, change in wrong.items():
         with pytest.raises(CoarticError, match=said):
             joined(parts[:1], tmp_path / "whole", **{"cells": LEFT} | change)
-    other = plan_suite("quick", cells=LEFT, **OPTIONS)
+    other = [replace(job, suite="quick") for job in planned(LEFT, **OPTIONS)]
     for plan, folder, said in (
         (other, parts[0], "the suite is 'paper' in .*left and 'quick' in this command"),
         (
@@ -196,7 +195,7 @@ def test_what_does_not_go_together(parts, tmp_path):
 
 def test_what_a_folder_has_may_be_of_other_code(parts, tmp_path):
     """Where nothing of it is missing: it is copied as it is."""
-    new = KNOWN[EC1].__class__(**vars(KNOWN[EC1]) | {"code": "0123456789ab"})
+    new = replace(KNOWN[EC1], code="0123456789ab")
     ours = [replace(cell, method=new if cell.method.name == EC1 else cell.method) for cell in LEFT]
     assert joined(parts[:1], tmp_path / "whole", ours).done == 0
     assert set(load(tmp_path / "whole").runs.result) == set(load(parts[0]).runs.result)
@@ -210,9 +209,10 @@ def test_a_stranger_beside_others(parts, tmp_path):
     said."""
     select = {"methods": ["NAME"], "method_files": [OWN]}
     plan = plan_suite("paper", **select, runs=2, trials=20)
-    assert {cell.method.name for cell in plan.cells} == {"NAME"}
+    assert {job.cell.method.name for job in plan} == {"NAME"}
     out = tmp_path / "out"
-    for present, done in ((4, plan.size), (4 + plan.size, 0)):
+    size = size_of(plan)
+    for present, done in ((4, size), (4 + size, 0)):
         whole = include_folders(plan, parts[1:], out)
         report = perform(whole, out, executor=InProcess())
         assert (report.present, report.done) == (present, done)
@@ -230,10 +230,11 @@ def test_shipped_results(monkeypatch, tmp_path):
     for suite in shipped.shipped_hashes():
         with shipped.open_shipped(suite) as store:
             plan = store.plan()
-            assert plan.suite == suite
-            assert len(store.ids()) == plan.size
-            some = [name for name in plan.tasks if "/" not in name or name.endswith("7")]
-            assert all(load_task(name) == plan.tasks[name] for name in some)  # as shipped today
+            assert {job.suite for job in plan} == {suite}
+            assert len(store.ids()) == size_of(plan)
+            tasks = {job.cell.task.name: job.cell.task for job in plan}
+            some = [name for name in tasks if "/" not in name or name.endswith("7")]
+            assert all(load_task(name) == tasks[name] for name in some)  # as shipped today
             learned = store.runs().query("method == 'dual-process/EC1'").run_id
             assert store.run(learned.iloc[0]).is_downsampled
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped, but of comparison, "):
@@ -301,7 +302,7 @@ def test_results_are_packed_again_where_they_have_not_changed(
     assert pack(tmp_path / "1", "--changed")[0] == 0
     with shipped.open_shipped("paper") as store:
         assert (store.runs().trials == load(tmp_path / "1").runs.trials).all()
-    edit(same, "UPDATE methods SET code = '0123456789ab' WHERE name = 'dual-process/EC1'")
+    edit(same, "UPDATE cells SET code = '0123456789ab' WHERE method = 'dual-process/EC1'")
     with pytest.raises(SystemExit):  # whatever has changed
         pack(same, "--changed")
     assert "other code of dual-process/EC1 made it" in capsys.readouterr().err

@@ -12,14 +12,13 @@ from coartic.analysis import optima
 from coartic.baselines.optimum import Optimum, with_locks
 from coartic.baselines.trajectory_optimisation import PathLength
 from coartic.baselines.whole_ticks import TickPlan
-from coartic.benchmarks.suites import Cell
 from coartic.method import MethodError
 from coartic.motion.solution import other_arm_travel
-from coartic.runs.run import movements_from
+from coartic.runs.record import movements_from
 from coartic.tasks.optima import best_shipped, essence
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, shipped_optima, solve, tiny_task
-from tests.support.suites import KNOWN, run_and_write
+from tests.support.suites import KNOWN, cell_on, run_and_write
 
 SOLVED = [entry for entry in shipped_optima() if entry.reward is not None]
 
@@ -126,7 +125,7 @@ def test_a_hand_that_is_there_already_saves_a_tick():
 def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     task = load_task("ascending")
     names = ("optimum/branch-and-bound", renew_optima.OTHER_SEARCH)
-    cells = [Cell(task, KNOWN[name], FEW) for name in names]
+    cells = [cell_on(task, KNOWN[name], **FEW) for name in names]
     study = run_and_write(tmp_path / "results", cells, runs=1)
     (entry,) = renew_optima.collect(study)
     entry = json.loads(json.dumps(entry))

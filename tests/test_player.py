@@ -2,14 +2,13 @@
 
 from coartic import load_task
 from coartic.analysis.report.player import methods_played, player
-from coartic.benchmarks.suites import Cell
-from tests.support.suites import KNOWN, run_and_write
+from tests.support.suites import KNOWN, cell_on, run_and_write
 
 
 def test_methods_that_follow_paths_are_left_out(tmp_path):
     tasks = [load_task(name) for name in ("ascending", "descending")]
     cells = [
-        Cell(task, KNOWN[method])
+        cell_on(task, KNOWN[method])
         for task in tasks
         for method in ("posture-qp/current-goal", "corrective-alone/given")
     ]

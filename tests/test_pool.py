@@ -16,12 +16,10 @@ from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import perform
-from coartic.benchmarks.suites import Cell
-from coartic.benchmarks.worker import Job
+from coartic.benchmarks.runner import perform
 from coartic.runs.store import writing
 from tests.support.processes import comes, folders_of_session, processes
-from tests.support.suites import KNOWN, made_once, planned, run_and_write
+from tests.support.suites import KNOWN, cell_on, made_once, planned, run_and_write
 
 pytestmark = pytest.mark.process
 
@@ -144,8 +142,8 @@ def folder(tmp_path_factory):
     def make(folder):
         folder.mkdir()
         does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-        hangs, *others = [Cell(task, does, {"what": name}) for name in HANDLED]
-        others += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
+        hangs, *others = [cell_on(task, does, what=name) for name in HANDLED]
+        others += [cell_on(task, again), cell_on(task, KNOWN["corrective-alone/given"])]
         for name, cells, timeout_s, limit_s in (
             ("hangs", [hangs], 0.5, 0.3),
             ("others", others, 600.0, 0.5),
@@ -189,7 +187,7 @@ def test_other_work_on_the_core_changes_no_outcome(tmp_path):
     seconds = {name: "0.3" if name == "short" else "99" for name in names}
     bodies = [(name, burn.replace("self.seconds", seconds[name])) for name in names]
     task, (does, _) = load_task("ascending"), entries(tmp_path, bodies)
-    cells = [Cell(task, does, {"what": name}) for name in names]
+    cells = [cell_on(task, does, what=name) for name in names]
     study = run_and_write(tmp_path / "out", cells, executor=Local(4), runs=1, time_limit_s=0.6)
     assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 3
     assert set(study.runs.reason[1:]) == {"CPU time limit of 0.6 s exceeded"}
@@ -216,7 +214,7 @@ def test_what_a_worker_prints_is_bounded(tmp_path):
     resource = pytest.importorskip("resource")
     task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", PRINTS)])
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    study = run_and_write(tmp_path / "out", [Cell(task, does)], executor=Local(1), runs=1)
+    study = run_and_write(tmp_path / "out", [cell_on(task, does)], executor=Local(1), runs=1)
     assert study.runs.reason[0].endswith("the end")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50 * 2**10
 
@@ -224,7 +222,7 @@ def test_what_a_worker_prints_is_bounded(tmp_path):
 def test_words_of_an_earlier_run_are_not_those_of_a_crash(tmp_path):
     task, says = load_task("ascending"), "print('x', flush=True); return Result(corrected(session))"
     does, _ = entries(tmp_path, [("says", says), ("quits", "os._exit(0)")])
-    cells = [Cell(task, does, {"what": what}) for what in ("says", "quits")]
+    cells = [cell_on(task, does, what=what) for what in ("says", "quits")]
     runs = run_and_write(tmp_path / "out", cells, executor=Local(1), runs=1).runs
     assert runs.status.tolist() == ["ok", "crashed"]
     assert runs.reason[1].endswith("exit code 0): it left no message")
@@ -240,7 +238,7 @@ def test_what_somebody_kills_is_repeated(tmp_path, whom):
             while not os.path.exists(__file__ + ".killed"): time.sleep(0.01)
         return Result(corrected(session))"""
     task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", body)])
-    cells, killed = [Cell(task, replace(does, stochastic=True))], []
+    cells, killed = [cell_on(task, replace(does, stochastic=True))], []
 
     def kill(progress, _):
         if progress.done != 1:
@@ -271,7 +269,7 @@ def test_without_a_place_for_answers_the_suite_ends(tmp_path, monkeypatch, why):
         while not os.path.exists(__file__ + ".begun"): time.sleep(0.01)
         return Result(corrected(session))"""
     task, methods = load_task("ascending"), entries(tmp_path, [("honest", body)])
-    plan, out = planned([Cell(task, method) for method in methods]), tmp_path / "out"
+    plan, out = planned([cell_on(task, method) for method in methods]), tmp_path / "out"
     resource = pytest.importorskip("resource")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     if why == "full":  # as a disk that takes a little more, and the file of results
@@ -284,7 +282,9 @@ def test_without_a_place_for_answers_the_suite_ends(tmp_path, monkeypatch, why):
     with writing(out) as store:
         assert {status for *_, status, _ in store.present()} <= {"ok"}
     (tmp_path / "mine.py.over").touch()
-    assert run_and_write(out, plan.cells, executor=Local(2)).runs.status.tolist() == ["ok", "ok"]
+    assert run_and_write(
+        out, [job.cell for job in plan], executor=Local(2)
+    ).runs.status.tolist() == ["ok", "ok"]
 
 
 def test_a_server_that_is_killed_while_a_file_is_read(tmp_path, monkeypatch):
@@ -302,15 +302,15 @@ def test_other_methods_and_the_parent_notice_nothing(folder, runs):
 
 
 def test_workers_that_cannot_begin_get_a_sentence():
-    plan = planned([Cell(load_task("ascending"), KNOWN["dual-process/EC1"])])
+    plan = planned([cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])])
     task = load_task("ascending").model_copy(update={"goals": ()})
-    job = Job(replace(plan.specifications[0], task=task), plan.cells[0].method, 0, (0,))
+    job = replace(plan[0], cell=replace(plan[0].cell, task=task), numbers=(0,))
     with pytest.raises(CoarticError, match="processes cannot begin"):
         list(Local(1).perform([job] * 10))
 
 
 SCRIPT = """
-from coartic.benchmarks.run import run_suite
+from coartic.benchmarks.runner import run_suite
 print("begun", flush=True)
 for method, tasks in (("test/does", ["ascending"]), ("test/again", ["ascending", "descending"])):
     select = {"tasks": tasks, "methods": [method], "method_files": ["mine.py"]}

@@ -23,10 +23,9 @@ from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.topics import coarticulation
-from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.store import RUNS_FILE
 from tests.support import made_up
-from tests.support.suites import KNOWN, run_and_write, suite_of
+from tests.support.suites import cells_of, run_and_write, suite_of
 
 
 @pytest.fixture(scope="module")
@@ -231,14 +230,12 @@ def test_answers_name_failed_runs_behind_them(traced):
 
 def test_few_runs_say_so(tmp_path):
     """One run a cell, and no learner: every answer is true, none is invented."""
-    one = select_cells(load_suite("paper"), KNOWN, tasks=["ascending", "descending"])
+    one = cells_of("paper", tasks=["ascending", "descending"])
     few = run_and_write(tmp_path / "few", cells=one, runs=1, trials=30)
     texts = {section.answer: " ".join(text) for section, text in answers(few)}
     assert texts["Coarticulation"].startswith("Too few runs to tell")
     assert texts["Paper"].startswith("Too few runs to judge the paper")
-    alone = select_cells(
-        load_suite("comparison"), KNOWN, tasks=["ascending"], methods=["corrective-alone/given"]
-    )
+    alone = cells_of("comparison", tasks=["ascending"], methods=["corrective-alone/given"])
     without = run_and_write(tmp_path / "without", cells=alone, runs=1)
     files = write_report(without, tmp_path / "report")
     assert {"report.html", "tables/ranking.tex"} <= set(files)
@@ -263,7 +260,7 @@ tasks = ["ascending", "descending"]
 methods = ["dual-process/EC1"]
 grid = { noise_sd = [0.02, 0.05, 0.1] }
 """)
-    cells = select_cells(load_suite(str(suite)), KNOWN)
+    cells = cells_of(suite)
     study = run_and_write(tmp_path / "noise", cells=cells, runs=4, trials=600)
     labels = {"dual-process/EC1" + setting for setting in ("", " noise_sd=0.02", " noise_sd=0.1")}
     means = study.runs.groupby(["task", "setting"]).reward.mean().astype(float)
@@ -346,11 +343,11 @@ def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):
 
 def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
     """The page names it in its place, the command names it and exits with 1."""
-    cells = select_cells(load_suite("paper"), KNOWN, tasks=["ascending"], methods=["EC1"])
+    cells = cells_of("paper", tasks=["ascending"], methods=["EC1"])
     run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
 
     def shared_goal(study):
-        return [][study.plan.seed]
+        return [][study.plan[0].seed]
 
     monkeypatch.setattr(coarticulation, "shared_goal", shared_goal)
     with pytest.raises(IndexError):  # what every other test would meet
@@ -373,7 +370,7 @@ def test_a_goal_alone_and_followed_have_a_report(tmp_path):
     for name, goals in (("alone", [(6, 2)]), ("followed", [(6, 2), (6, 4)])):
         Task(name=name, goals=goals, hands=["right"]).save(tmp_path / f"{name}.toml")
     names = [str(tmp_path / f"{name}.toml") for name in ("alone", "followed")]
-    cells = select_cells(load_suite("paper"), KNOWN, tasks=names, methods=["EC1"])
+    cells = cells_of("paper", tasks=names, methods=["EC1"])
     study = run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
     assert TABLES["contexts"](study).empty
     write_report(study, tmp_path / "report", for_paper=False)

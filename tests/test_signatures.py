@@ -477,7 +477,7 @@ def beside_corrective(method, posture_difference, *, stochastic, runs):
     ]  # fmt: skip
     study = study_with(*cells)
     study.runs["trials"] = 0
-    study.plan.methods[method] = replace(study.plan.methods[method], stochastic=stochastic)
+    study.declared[method] = replace(study.declared[method], stochastic=stochastic)
     return study
 
 

@@ -6,10 +6,9 @@ import numpy.testing as npt
 import pytest
 
 from coartic import PAPER, MotionModel, learn, learn_many, load_task
-from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import fail
 from coartic.motion.slots import SLOTS
-from tests.support.suites import KNOWN, InProcess, run_and_write
+from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
 
 SOON_FAILED = MotionModel(max_iterations=60)
 
@@ -65,8 +64,8 @@ class Nobody(InProcess):
             yield job, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
 
 
-LEARNER = Cell(load_task("ascending"), KNOWN["dual-process/EC1"])
-ALONE = Cell(load_task("ascending"), KNOWN["corrective-alone/given"])
+LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
+ALONE = cell_on(load_task("ascending"), KNOWN["corrective-alone/given"])
 
 
 def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):

@@ -16,7 +16,7 @@ from coartic import (
     movements_of,
 )
 from coartic.method import Information, Session
-from coartic.runs.run import MOST_STEPS, execute_all
+from coartic.runs.record import MOST_STEPS, execute_all
 from tests.support.strategies import make_trials, tiny_task
 
 

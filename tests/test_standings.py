@@ -110,8 +110,8 @@ def test_two_methods_differ_by_the_difference_of_their_gaps():
     plan = {(task, "my-plan"): [reward] for task, reward in
             (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
     seen = study(TEN | plan)
-    declared = replace(seen.plan.methods["my-plan"], stochastic=False)
-    seen.plan.methods["my-plan"] = declared
+    declared = replace(seen.declared["my-plan"], stochastic=False)
+    seen.declared["my-plan"] = declared
     rows = ranking.main_gaps(seen).set_index("method")
     both = "dual-process (EC1, EC4)"
     found = ranking.difference_of_gaps(seen, both, "my-plan")
@@ -259,8 +259,8 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     plan = {(task, "my-plan"): [reward] for task, reward in
             (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
     seen = study(few | plan)
-    declared = replace(seen.plan.methods["my-plan"], stochastic=False)
-    seen.plan.methods["my-plan"] = declared
+    declared = replace(seen.declared["my-plan"], stochastic=False)
+    seen.declared["my-plan"] = declared
     rows = TABLES["against-learner"](seen)
     assert rows.least_p["ascending my-plan"] == pytest.approx(2 / 2**runs)
     row_of = TABLES["ranking"](seen).loc["my-plan"]
@@ -384,7 +384,7 @@ def test_runs_without_spread_are_tested_by_their_number(runs, better, words):
     tasks = ("ascending", "dual-process/EC1", -303), ("two-armed-1", "dual-process/EC4", -485)
     learned = {(task, learner): [reward] * runs for task, learner, reward in tasks}
     seen = study(learned | {(task, "mine"): [reward + 3] for task, _, reward in tasks})
-    seen.plan.methods["mine"] = replace(seen.plan.methods["mine"], stochastic=False)
+    seen.declared["mine"] = replace(seen.declared["mine"], stochastic=False)
     row_of = TABLES["ranking"](seen).loc["mine"]
     assert row_of.better == pytest.approx(better, nan_ok=True)
     assert words in own.own_in_words(seen)

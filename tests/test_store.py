@@ -20,17 +20,17 @@ import pytest
 from coartic import CoarticError, Movement
 from coartic.analysis.study import load
 from coartic.benchmarks.provenance import command, current_environment, now
-from coartic.benchmarks.run import perform
-from coartic.benchmarks.suites import Cell
+from coartic.benchmarks.runner import perform
 from coartic.benchmarks.worker import fail
 from coartic.runs import store as store_module
-from coartic.runs.run import Score
+from coartic.runs.record import Score
 from coartic.runs.store import FORMAT, RUNS_FILE, Store, explain_errors, open_store, writing
 from tests.support.strategies import tiny_task
 from tests.support.suites import (
     KNOWN,
     Failing,
     InProcess,
+    cell_on,
     paper_cells,
     planned,
     run_and_write,
@@ -43,8 +43,8 @@ STUCK = tiny_task(
 )  # fmt: skip
 NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
 CELLS = [
-    Cell(STUCK, KNOWN["dual-process/EC4"], {"epsilon": 0.5}),
-    Cell(NEAR, KNOWN["posture-qp/current-goal"]),
+    cell_on(STUCK, KNOWN["dual-process/EC4"], epsilon=0.5),
+    cell_on(NEAR, KNOWN["posture-qp/current-goal"]),
 ]
 ONE = paper_cells(tasks=["ascending"])
 FEW = {"runs": 9, "trials": 20}
@@ -79,25 +79,27 @@ def plain(run):
         ]
         for part, score in run.scores.items()
     }  # fmt: skip
-    return replace(run, scores=parts)
+    return replace(run, scores=parts, job=replace(run.job, suite=""))
 
 
 def test_what_is_written_is_read_back(written):
     handed, study = written
     learner, _, planner = study.runs.run_id
-    assert {None} < set(handed[learner].rewards)
+    assert {None} < set(handed[learner].outcome.rewards)
     assert handed[planner].scores["solution"].movements[0].waypoints is not None
     with open_store(study.folder) as store:
         for run_id, run in handed.items():
             assert plain(store.run(run_id)) == plain(run)
-        assert store.plan().cells == planned(CELLS, trials=40).cells
+        assert store.plan() == [
+            replace(job, time_limit_s=300.0) for job in planned(CELLS, trials=40)
+        ]
     for run_id, rewards in study.rewards():
-        kept = [np.nan if reward is None else reward for reward in handed[run_id].rewards]
+        kept = [np.nan if reward is None else reward for reward in handed[run_id].outcome.rewards]
         np.testing.assert_array_equal(rewards, kept)
     with closing(sqlite3.connect(study.folder / RUNS_FILE)) as plain_sql:
         for run_id, run in handed.items():
             of_run = partial(read_values, plain_sql, run_id)
-            assert of_run("reward FROM runs WHERE run_id = ?") == [run.reward]
+            assert of_run("reward FROM runs WHERE run_id = ?") == [run.solution.reward]
             solution = run.scores["solution"].movements if run.scores else ()
             ends = of_run('right_4 FROM solutions WHERE run_id = ? ORDER BY "order"')
             assert ends == [m.target[-1] for m in solution]
@@ -114,8 +116,9 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
     movements = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
     solution = Score(-3, "L", movements)
-    run = replace(next(iter(written[0].values())), scores={"solution": solution},
-                  environment={"commit": {"id": "c0de", "dirty": True}})  # fmt: skip
+    first = next(iter(written[0].values()))
+    outcome = replace(first.outcome, environment={"commit": {"id": "c0de", "dirty": True}})
+    run = replace(first, scores={"solution": solution}, outcome=outcome)
 
     def some():
         yield run
@@ -294,7 +297,7 @@ def test_what_is_performed_again(undisturbed, tmp_path):
 
 def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     (cell,) = ONE
-    other = Cell(cell.task, replace(cell.method, code="0" * 12))
+    other = replace(cell, method=replace(cell.method, code="0" * 12))
     run_and_write(tmp_path, [other], **FEW)
     report = perform(planned(ONE, **FEW), tmp_path, executor=InProcess())
     assert (report.stale, report.present, report.done) == (9, 0, 9)
@@ -325,7 +328,7 @@ def other_reward(path):
     with closing(sqlite3.connect(path, isolation_level=None)) as db:
         (text,) = db.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
         db.execute("DROP VIEW runs")
-        db.execute(text.replace("results.reward", "results.reward + 100 AS reward", 1))
+        db.execute(text.replace('"reward"', "reward + 100 AS reward", 1))
 
 
 def behind_a_link(path):
@@ -411,14 +414,18 @@ def read_all(folder):
         "results SET wall_s = 9e999",
         "results SET warm = 2",
         "results SET run_id = randomblob(9), seed = 'x'",
-        "tasks SET definition = '{'",
-        "tasks SET definition = json_set(definition, '$.radius', 0.2)",
-        "methods SET information = '[1]'",
-        "methods SET name = 'other'",
+        "cells SET definition = '{'",
+        "cells SET definition = json_set(definition, '$.radius', 0.2)",
+        "cells SET defaults = '[1]'",
+        "cells SET stochastic = 7",
+        "cells SET method = 'other'",
+        "cells SET trial_budget = 5",
         "environments SET content = json_set(content, '$.packages', 1)",
         "suite SET date = NULL",
-        "cells SET runs = -1",
-        "cells SET variant = 'x'",
+        "suite SET seed = 'x'",
+        "suite SET time_limit_s = 9e999",
+        "plan SET runs = -1",
+        "cells SET setting = 'x'",
         "movements SET left_1 = 9e999",
         "movements SET left_1 = left_1 + 0.1",
         "movements SET goal = 7",
@@ -428,12 +435,11 @@ def read_all(folder):
         "movements SET kind = 'path'",
         "learning SET rewards = 'x'",
         f"learning SET rewards = x'{zlib.compress(bytes(4 * 21)).hex()}'",
-        "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells",
     ],
 )
 def test_content_of_another_kind_is_one_sentence(undisturbed, tmp_path, change):
     (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
-    sql(change if "INSERT" in change else f"UPDATE {change}")(tmp_path / RUNS_FILE)
+    sql(f"UPDATE {change}")(tmp_path / RUNS_FILE)
     with pytest.raises(CoarticError) as caught:
         read_all(tmp_path)
     assert str(tmp_path) in str(caught.value)
@@ -455,7 +461,7 @@ def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, t
             raise error
         assert caught.value is error
     shutil.copytree(undisturbed.folder, tmp_path / "sick")
-    sql("UPDATE cells SET variant = 'x'")(tmp_path / "sick" / RUNS_FILE)
+    sql("UPDATE cells SET setting = 'x'")(tmp_path / "sick" / RUNS_FILE)
     with (
         pytest.raises(CoarticError) as caught,
         open_store(undisturbed.folder) as whole,

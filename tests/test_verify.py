@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 from contextlib import closing
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,8 +24,8 @@ from coartic.motion.movement import follow
 from coartic.motion.solution import other_arm_travel
 from coartic.robot import HANDS
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Cell, Plan
-from coartic.runs.run import PARTS, Run, Score
+from coartic.runs.plan import Cell, Job
+from coartic.runs.record import PARTS, Outcome, Run, Score
 from coartic.runs.store import RUNS_FILE, writing
 from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task, uneven_task
@@ -45,16 +46,18 @@ def along_paths(task):
         yield Movement(goal, "right", "path", waypoints=np.array([aside, beyond]))
 
 
-def run_of(specification, number, parts, **more):
+def run_of(job, number, parts, status="ok", bound=None):
     """A run that made these movements, as it is stored."""
-    task = specification.task
+    task = job.cell.task
     done = {part: execute(task, movements) for part, movements in parts.items()}
+    scores = {part: Score(e.reward, e.hands, e.movements) for part, e in done.items()}
     if solution := done.get("solution"):
         travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
-        more |= {"solution_corrections": solution.corrections, "other_arm_travel": travel}
-    scores = {part: Score(e.reward, e.hands, e.movements) for part, e in done.items()}
-    return Run(specification, 0, number, **{"status": "ok"} | more, reason="", environment={},
-               date="", scores=scores)  # fmt: skip
+        scores["solution"] = scores["solution"]._replace(
+            corrections=solution.corrections, other_arm_travel=travel
+        )
+    outcome = Outcome(status, bound=bound, environment={})
+    return Run(replace(job, numbers=(number,)), outcome, scores, "")
 
 
 @pytest.fixture(scope="module")
@@ -75,13 +78,12 @@ def true_folder(tmp_path_factory):
     ]
     for run, parameters in NARROW.items():
         asked.append((two_armed, parameters, [(run, {}, failed)]))
-    method = MethodInfo("method", "", "", (), (), True, {}, "", "code")
-    cells = tuple(Cell(task, method, each, each, 7) for task, each, _ in asked)
+    method = MethodInfo("method", "", "", (), True, {}, "", "code")
+    plan = [Job(Cell(task, method, each), 0, range(7), suite="suite") for task, each, _ in asked]
     with writing(folder) as store:
-        plan = Plan("suite", 0, 7, 300, None, None, cells)
         store.replace_plan(plan, {}, [], "")
-        for specification, (_, _, runs) in zip(plan.specifications, asked, strict=True):
-            store.write(run_of(specification, number, made, **more) for number, made, more in runs)
+        for job, (_, _, runs) in zip(plan, asked, strict=True):
+            store.write(run_of(job, number, made, **more) for number, made, more in runs)
     return folder
 
 
@@ -140,7 +142,7 @@ EDITS = {  # what is said: of which run, and what was edited
     "solution_corrections is 1": result(2, "solution_corrections = 2"),
     "other_arm_travel is": result(3, "other_arm_travel = 1e-8"),
     "status is ok": result(5, "status = 'ok'"),
-    "must be str": (2, "DELETE FROM settings WHERE task = 'tiny'"),
+    "must be str": (2, "DELETE FROM cells WHERE task = 'tiny'"),
     "of environments that is not there": (None, "UPDATE results SET environment = 99"),
     " ticks, not ": movement(0, "right_2 = right_2 + 0.02", order=1),
     "other_arm_travel": movement(1, "left_2 = left_2 + 0.02", order=1),
@@ -162,8 +164,8 @@ EDITS = {  # what is said: of which run, and what was edited
     "a path, and no other": (3, 'DELETE FROM waypoints WHERE "order" = 1'),
     "of no movement": (3, 'UPDATE waypoints SET "order" = 9 WHERE "order" = 1'),
     "better than bound": result(4, "proven_bound = -999"),
-    "model were changed": (3, "UPDATE settings SET method = 'other' WHERE task = 'ascending'"),
-    "its task is not": (3, "UPDATE settings SET task = 'descending' WHERE task = 'ascending'"),
+    "model were changed": (3, "UPDATE cells SET method = 'other' WHERE task = 'ascending'"),
+    "its task is not": (3, "UPDATE cells SET task = 'descending' WHERE task = 'ascending'"),
     "that its id says": result(6, "run = 60"),
     "its seed is not": result(2, "seed = seed + 1"),
     "at least 2 ticks, not 1": movement(2, "ticks = 1"),
@@ -175,27 +177,18 @@ EDITS = {  # what is said: of which run, and what was edited
     ),
     "the task is too long": (
         2,
-        """UPDATE settings SET definition = json_set(definition,
+        """UPDATE cells SET definition = json_set(definition,
         '$.title', hex(zeroblob(60000))) WHERE task = 'tiny'""",
     ),
     # Of no run: the tables and views through which others read the runs.
-    "Row 1 of table cells: it has another task": (
+    "Two tasks are called tiny": (
         None,
-        "UPDATE tasks SET definition = '{}' WHERE name = 'tiny'",
+        "UPDATE cells SET task = 'tiny' WHERE task = 'ascending'",
     ),
     "Row 4 of table cells: its parameters are not": (
         None,
-        "UPDATE cells SET variant = '' WHERE position = 4",
+        "UPDATE cells SET setting = '' WHERE id = 4",
     ),
-    "Row 5 of table cells: it has other param": (
-        None,
-        "UPDATE cells SET setting = 4 WHERE setting = 6",
-    ),
-    "Two rows of table cells show": (
-        None,
-        "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells LIMIT 1",
-    ),
-    "Row 0 of table cells: its method has other code": (None, "UPDATE methods SET code = 'newer'"),
     "Tables or views are not": (None, "ALTER TABLE learning ADD COLUMN base_x REAL"),
     "ables or views are not": (None, "DROP VIEW paths"),
 }

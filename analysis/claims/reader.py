@@ -122,7 +122,7 @@ class Reader:
         """Rewards of the best trials; of a method that draws nothing its one reward."""
         rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
         method = self.study.cells[task, label].method
-        if not self.study.plan.methods[method].stochastic:
+        if not self.study.declared[method].stochastic:
             rewards = np.array(rewards.mean())
         return Measurement(task, who_is(label), rewards, published=published_reward(task, label))
 

@@ -84,7 +84,7 @@ def limits(study: Study) -> dict[str, Any]:
         "reconstructed": [task.label for task in tasks if task.reconstructed],
         "trials": sorted(trials) if trials != {TRIALS} else [],
         "few": fewest if fewest < RUNS else 0,
-        "seed": study.plan.seed,
+        "seed": study.plan[0].seed,
         "unproven": [
             marked(task) for task, best in optima if best and not (best.proven or best.only_here)
         ],

@@ -209,7 +209,7 @@ def next_goal(study: Study) -> str:
         return ""
     # A method whose runs differ by chance takes a test, and one that selects needs random search.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
-    drawn = study.plan.methods[cells[0].method].stochastic
+    drawn = study.declared[cells[0].method].stochastic
     needed, random_search = selects(study, shared.method), random_search_for(study, shared)
     beyond = shared.p_beyond(random_search) if needed and random_search is not None else math.nan
     who = "The learner" if is_learner(shared.method) else name_of(shared.method)

@@ -102,7 +102,7 @@ def list_against_learner(study: Study) -> Rows:
                 continue
             solved = all(len(each.good) == len(each.runs) for each in (cell, learner))
             if solved and scores.is_compared(study, label):
-                drawn = study.plan.methods[cell.method].stochastic
+                drawn = study.declared[cell.method].stochastic
                 rewards = cell.rewards if drawn else float(cell.rewards[0])
                 tests.append(bootstrap_test(learner.rewards, rewards, "two-sided"))
                 cells.append((cell, learner))
@@ -204,7 +204,7 @@ def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
         for task in tasks:
             cell = scores.compared(study)[method][task]
             values = gap_share(cell.rewards, study.optima[task].reward)
-            if study.plan.methods[cell.method].stochastic:
+            if study.declared[cell.method].stochastic:
                 signs.append(sign)
                 drawn.append(values)
             else:

@@ -55,6 +55,11 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
     return typer.Option(option, parser=read, metavar=unit, help=what)
 
 
+def listed(text: str | None) -> list[str]:
+    """Return the names that an option has between commas."""
+    return [] if text is None else [name.strip() for name in text.split(",")]
+
+
 def id_named(name: str, names: Mapping[str, str]) -> str:
     """The id of what people call so, in small letters or large; ``name`` itself for none.
 
@@ -88,7 +93,8 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
 
     Raises CoarticError for an unknown name.
     """
-    from coartic.benchmarks.suites import check_kind, methods_named
+    from coartic.benchmarks.registry import methods_named
+    from coartic.benchmarks.suites import check_kind
 
     ids, meant = method_names(registered) if names else {}, list[str]()
     for name in names:

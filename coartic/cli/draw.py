@@ -78,7 +78,7 @@ def animate(
     for run_id in (run,) if other is None else (run, other):
         place, found = find_run(run_id, folder)
         movement, number = trajectory_of(place, found), found.number
-        title = f"{movement.task.label}\n{name_of(found.specification.method)}, run {number}"
+        title = f"{movement.task.label}\n{name_of(found.cell.method.name)}, run {number}"
         movements.append((title, movement))
     if initial:
         on = movements[0][1].task

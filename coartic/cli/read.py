@@ -108,8 +108,9 @@ def trace(
         say_pairs([("Row", row), *traced.values_of(frame, row, {}), ("Runs", " ".join(ids))])
         return
     with open_store(results) as store:
-        runs, apart = store.runs(), titled_apart(store.plan().tasks.values())
-    tasks = {task.name: task for task in apart}
+        runs, plan = store.runs(), store.plan()
+    by_name = {job.cell.task.name: job.cell.task for job in plan}
+    tasks = {task.name: task for task in titled_apart(by_name.values())}
     behind = runs[runs.run_id.isin(ids)]
     if traced.stamp(runs) not in (tables[table].parents[1] / "report.html").read_text("utf-8"):
         again = f"coartic report {quote(str(results))}"
@@ -187,6 +188,7 @@ def cite(
         text = bibliography(built_in(), analysis=analysis)
     else:
         with open_store(folder) as store:
-            declared, made_with = store.plan().methods, store.made_with()
+            plan, made_with = store.plan(), store.made_with()
+        declared = {job.cell.method.name: job.cell.method for job in plan}
         text = bibliography(declared, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))

@@ -87,41 +87,33 @@ def run(
     """
     from coartic.benchmarks.cluster import Dask
     from coartic.benchmarks.include import include_folders
-    from coartic.benchmarks.planning import plan_suite
+    from coartic.benchmarks.planning import plan, request_for
     from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.run import perform
-    from coartic.benchmarks.suites import check_kind, load_suite, select_cells, suites
-    from coartic.tasks.families import own_families
-
-    def named(text: str | None) -> list[str]:
-        return [] if text is None else [name.strip() for name in text.split(",")]
+    from coartic.benchmarks.runner import perform
+    from coartic.benchmarks.suites import check_kind, load_suite, suites
 
     if suite is None:
         raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    registered = registry(method_file or ())
     for file in family_file or ():
         check_kind(str(file), "family")
-    names = given.methods_meant(named(methods), registered)
+    registered = registry(method_file or ())
+    names = given.methods_meant(given.listed(methods), registered)
     if include and not names:  # the user's own alone
         names = [name for name, info in registered.items() if info.where.endswith(".py")]
-    plan = plan_suite(
-        chosen,
-        cells=select_cells(
-            chosen,
-            registered,
-            tasks=given.tasks_meant(named(tasks)),
-            methods=names,
-            families=own_families(family_file or ()),
-        ),
+    request = request_for(
+        tasks=given.tasks_meant(given.listed(tasks)),
+        methods=names,
+        family_files=family_file or (),
         runs=runs,
         trials=trials,
         seed=seed,
         time_limit_s=time_limit,
         trial_budget=trial_budget,
     )
+    jobs_asked = plan(chosen, request, registered)
     display = Display()
 
     def saved() -> str:
@@ -134,9 +126,9 @@ def run(
     with interruptible(saved), display:
         if include:
             display.line(f"Copying {' and '.join(include)}.")
-            plan = include_folders(plan, include, out)
+            jobs_asked = include_folders(jobs_asked, include, out)
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
-        progress = perform(plan, out, executor=executor, watch=display.update)
+        progress = perform(jobs_asked, out, executor=executor, watch=display.update)
     say(str(progress))
     from coartic.analysis.study import load
 
@@ -252,21 +244,24 @@ def reproduce(
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
 
     _, run = find_run(run_id, folder)
-    asked, registered = run.specification, registry(method_file or [])
-    if asked.method not in registered:
-        raise CoarticError(f"unknown method {asked.method!r}: pass --method-file FILE")
-    result = "" if run.reward is None else f"reward {number(run.reward)}, hands {run.hands}"
+    cell, registered = run.cell, registry(method_file or [])
+    name, outcome, solution = cell.method.name, run.outcome, run.solution
+    if name not in registered:
+        raise CoarticError(f"unknown method {name!r}: pass --method-file FILE")
+    result = f"{outcome.status}: {outcome.reason}"
+    if solution.reward is not None:
+        result = f"reward {number(solution.reward)}, hands {solution.hands}"
     say_pairs(
         [
-            ("Run", f"{run.id}: {asked.task.label}, {name_of(asked.method)}, run {run.number}"),
+            ("Run", f"{run.id}: {cell.task.label}, {name_of(name)}, run {run.number}"),
             ("Seed", str(run.seed)),
-            ("Parameters", ", ".join(f"{k}={v}" for k, v in asked.parameters.items())),
-            ("Result", result if run.status == "ok" else f"{run.status}: {run.reason}"),
+            ("Parameters", ", ".join(f"{k}={v}" for k, v in cell.parameters.items())),
+            ("Result", result),
         ]
     )
-    again, code = perform_again(run, registered), registered[asked.method].code
-    if code != asked.code:
-        say(f"Another version of the code made the run ({asked.code}; this is {code}).")
+    again, code = perform_again(run, registered), registered[name].code
+    if code != cell.method.code:
+        say(f"Another version of the code made the run ({cell.method.code}; this is {code}).")
     changes = compare_runs(run, again)
     if changes:
         say("Performed again, it is different:", *(f"- {difference}" for difference in changes))

@@ -14,8 +14,8 @@ from coartic.internal.text import counted, one_line
 if TYPE_CHECKING:
     import pandas as pd
 
-    from coartic.benchmarks.run import Progress
-    from coartic.runs.plan import Specification
+    from coartic.benchmarks.runner import Progress
+    from coartic.runs.plan import Cell
 
 READABLE = 24  # characters that a column of text needs
 
@@ -68,12 +68,12 @@ class Display:
     def __exit__(self, *_: object) -> None:
         print(end=self._end, file=sys.stderr, flush=True)
 
-    def update(self, progress: Progress, specification: Specification | None) -> None:
+    def update(self, progress: Progress, cell: Cell | None) -> None:
         """Show the progress, and the task and method of the last run."""
         from coartic.analysis.methods import name_of
 
         self.done, total = progress.done, progress.total
-        if specification is None:
+        if cell is None:
             if progress.stale:
                 count = counted(progress.stale, "run")
                 self.line(f"Ignoring {count} made by a different version of the code.")
@@ -93,8 +93,8 @@ class Display:
         text = f"{there:{len(str(total))}}/{total}  {progress.failed:3} failed  {left:18}"
         if self._is_live:
             last = "starting processes"
-            if specification is not None:
-                last = f"{specification.task.label}, {name_of(specification.method)}"
+            if cell is not None:
+                last = f"{cell.task.label}, {name_of(cell.method.name)}"
             width = shutil.get_terminal_size().columns - 1
             print("\r", end="", file=sys.stderr)
             words = one_line(f"{text}  {last}")

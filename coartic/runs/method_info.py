@@ -34,7 +34,6 @@ class MethodInfo:
     title: str
     citation: str
     information: tuple[str, ...]
-    secondary: tuple[str, ...]
     stochastic: bool
     """Whether the seed matters; the others are run once."""
     defaults: dict[str, Any]
@@ -132,7 +131,6 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
         title=method.title,
         citation=method.citation,
         information=tuple(sorted(item.value for item in method.information)),
-        secondary=tuple(method.secondary),
         stochastic=method.stochastic,
         defaults=json.loads(json.dumps(defaults, default=str)),
         origin=origin,

@@ -1,10 +1,11 @@
 """The runs of a results folder: one SQLite file, ``runs.sqlite``.
 
-``results`` has a row a run, ``movements`` a row a movement of its solutions, ``waypoints`` a row a
-waypoint of those that follow a path, ``learning`` the rewards of its trials. The views ``runs``,
-``solutions`` and ``paths`` show what the last ``coartic run`` asked for, with names in place of
-numbers. docs/results.md lists the columns. One process writes, a batch of finished runs at a time;
-whatever interrupts it, a batch is there whole or not at all.
+``plan`` has a row for each cell that the last ``coartic run`` asked for; ``cells`` has these cells
+and the cells of earlier commands. ``results`` has a row for each run, ``movements`` for each
+movement of its solutions, ``waypoints`` for each waypoint of a movement that follows a path,
+``learning`` the rewards of its trials. The views ``runs``, ``solutions`` and ``paths`` show the
+runs of the plan; docs/results.md lists their columns. One process writes, a batch of finished runs
+at a time; whatever interrupts it, a batch is there whole or not at all.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import time
 import warnings
 import zlib
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from itertools import groupby
 from operator import itemgetter
@@ -27,100 +28,79 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from coartic.errors import CoarticError
-from coartic.internal.limits import MOST_TRIALS
+from coartic.internal.limits import MOST_RUNS, MOST_TRIALS, check_limits
 from coartic.internal.text import one_line, plain
 from coartic.internal.validation import explain_inline
+from coartic.model import PAPER
 from coartic.motion.solution import Movement
 from coartic.robot import Array
-from coartic.runs.plan import Plan, Specification, hash_of
-from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
-from coartic.tasks.task import Task
+from coartic.runs.plan import Cell, Job, hash_of
+from coartic.runs.record import COLUMNS, PARTS, STATUSES, Run, movements_from
+from coartic.tasks.task import Task, parse_task
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 4
-"""Raised when a table changes its meaning, or a table or a view its text. Format 2 is that of
-version 2.0.0, 1 that of versions 1.0 and 1.1; their folders are refused."""
+FORMAT = 5
+"""Raised when a table changes its meaning, or a table or a view its text."""
+_READ_BY = {1: ", which version 1.1.0 reads", 2: ", which version 2.0.0 reads"}
+"""Released versions of coartic that read an earlier format."""
 _APPLICATION = 0x636F6172  # "coar"
 FAILED_TRIAL = -(2**31)
 """Stored in place of the reward of a trial that did not hit every goal."""
 
+_KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "boolean"}
 _DTYPES: dict[str, Any] = {
-    **{
-        name: {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64"}[kind.split()[0]]
-        for name, kind in RESULTS.items()
-    },
-    **dict.fromkeys(("suite", "task", "method", "setting", "hand", "kind"), "string"),
-    **dict.fromkeys(("variant", "label"), "string"),  # of format 1
-    **dict.fromkeys(("information", "parameters", "commit", "code", "packages", "part"), "string"),
+    **{column.name: _KINDS[column.kind.split()[0]] for column in COLUMNS},
+    **dict.fromkeys(("part", "hand", "kind"), "string"),
     **dict.fromkeys(("result_id", "order", "goal", "ticks"), "Int64"),
-    "warm": "boolean",
 }
 """Types with which columns of views are read; all have room for missing values."""
+_CELL, _JOB = TypeAdapter(Cell), TypeAdapter(Job)
 _JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
 _OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # a journal ends so that names another
-_OWN = [name for name in RESULTS if name not in ("setting", "suite_seed", "environment", "details")]
+_STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
+_SHOWN = ", ".join(f'"{column.name}"' for column in COLUMNS)
 _SCHEMA = f"""
-CREATE TABLE suite (name TEXT, seed INTEGER, runs INTEGER, trials INTEGER, readings TEXT,
-    time_limit_s REAL, trial_budget INTEGER, command TEXT, date TEXT, environment INTEGER);
-CREATE TABLE tasks (name TEXT PRIMARY KEY, definition TEXT NOT NULL);
-CREATE TABLE methods (name TEXT PRIMARY KEY, title TEXT, citation TEXT, information TEXT,
-    secondary TEXT, stochastic INTEGER, defaults TEXT, origin TEXT, code TEXT);
-CREATE TABLE cells (position INTEGER PRIMARY KEY, setting INTEGER NOT NULL, variant TEXT NOT NULL,
-    parameters TEXT NOT NULL, runs INTEGER NOT NULL);
+CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
+    environment INTEGER);
+CREATE TABLE plan (position INTEGER PRIMARY KEY, cell INTEGER NOT NULL UNIQUE REFERENCES cells,
+    runs INTEGER NOT NULL);
+CREATE TABLE cells (id INTEGER PRIMARY KEY, digest TEXT NOT NULL, code TEXT NOT NULL,
+    task TEXT NOT NULL, definition TEXT NOT NULL, method TEXT NOT NULL, title TEXT NOT NULL,
+    citation TEXT NOT NULL, information TEXT NOT NULL, stochastic INTEGER NOT NULL,
+    defaults TEXT NOT NULL, origin TEXT NOT NULL, parameters TEXT NOT NULL, setting TEXT NOT NULL,
+    model TEXT NOT NULL, trial_budget INTEGER, UNIQUE (digest, code));
 CREATE TABLE environments (id INTEGER PRIMARY KEY, content TEXT NOT NULL UNIQUE, commit_id TEXT,
     packages TEXT);
-CREATE TABLE settings (id INTEGER PRIMARY KEY, asked TEXT NOT NULL, code TEXT NOT NULL,
-    task TEXT NOT NULL, definition TEXT NOT NULL, method TEXT NOT NULL, parameters TEXT NOT NULL,
-    model TEXT NOT NULL, trial_budget INTEGER, information TEXT NOT NULL, UNIQUE (asked, code));
-CREATE TABLE results (id INTEGER PRIMARY KEY,
-    {", ".join(f"{name} {kind}" for name, kind in RESULTS.items() if name != "initial_trials")},
-    UNIQUE (setting, suite_seed, run));
+CREATE TABLE results (id INTEGER PRIMARY KEY, cell INTEGER NOT NULL REFERENCES cells,
+    suite_seed INTEGER NOT NULL, environment INTEGER NOT NULL REFERENCES environments,
+    details TEXT NOT NULL, {_STORED}, UNIQUE (cell, suite_seed, run));
 CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
     goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL, ticks INTEGER NOT NULL,
     PRIMARY KEY (result_id, part, "order")) WITHOUT ROWID;
 CREATE TABLE waypoints (result_id INTEGER NOT NULL, "order" INTEGER NOT NULL,
     waypoint INTEGER NOT NULL, PRIMARY KEY (result_id, "order", waypoint)) WITHOUT ROWID;
 CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
+CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method, setting,
+    information, parameters, code, commit_id AS "commit", packages
+    FROM suite JOIN plan JOIN cells ON cells.id = plan.cell JOIN results
+    ON results.cell = plan.cell AND suite_seed = suite.seed AND run < plan.runs
+    JOIN environments ON environments.id = results.environment;
+CREATE VIEW solved AS SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
+    FROM asked WHERE status = 'ok';
+CREATE VIEW runs AS SELECT {_SHOWN} FROM asked ORDER BY position, run;
+CREATE VIEW solutions AS SELECT run_id, movements.* FROM asked
+    JOIN movements ON result_id = asked.id AND part = 'solution' ORDER BY position, run, "order";
+CREATE VIEW paths AS SELECT run_id, waypoints.* FROM asked
+    JOIN waypoints ON result_id = asked.id ORDER BY position, run, "order", waypoint;
 PRAGMA application_id = {_APPLICATION};
-"""
-_ASKED_FOR = """
-    FROM cells JOIN settings ON settings.id = cells.setting
-    JOIN results ON results.setting = cells.setting
-        AND results.suite_seed = (SELECT seed FROM suite) AND results.run < cells.runs"""
-_FIRST = f"""results.id IN (SELECT id FROM (
-    SELECT results.id, row_number() OVER (PARTITION BY cells.position ORDER BY run) AS place
-    {_ASKED_FOR} WHERE status = 'ok') WHERE place <= ?)"""
-_VIEWS = f"""
 PRAGMA user_version = {FORMAT};
-DROP VIEW IF EXISTS runs;
-DROP VIEW IF EXISTS solutions;
-DROP VIEW IF EXISTS paths;
-CREATE VIEW runs AS SELECT run_id, (SELECT name FROM suite) AS suite, settings.task, method,
-    variant AS setting,
-    {", ".join(f"results.{name}" for name in _OWN if name != "run_id")},
-    settings.information, settings.parameters, commit_id AS "commit", settings.code, packages
-    {_ASKED_FOR} JOIN environments ON environments.id = results.environment
-    ORDER BY cells.position, results.run;
-CREATE VIEW solutions AS SELECT results.run_id, movements.* {_ASKED_FOR}
-    JOIN movements ON movements.result_id = results.id AND part = 'solution'
-    ORDER BY cells.position, results.run, "order";
-CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
-    JOIN waypoints ON waypoints.result_id = results.id
-    ORDER BY cells.position, results.run, "order", waypoint;
 """
-_ADD_INITIAL_TRIALS = "ALTER TABLE results ADD COLUMN initial_trials INTEGER;\n"
-_VIEWS_2 = _VIEWS.replace("results.initial_trials, ", "")
-_EARLIER_VIEWS = {
-    1: _VIEWS_2.replace("variant AS setting", "variant, trim(method || ' ' || variant) AS label"),
-    2: _VIEWS_2,
-}
-"""Views of earlier formats, which count the search for initial hands among ``trials``."""
 
 _SURROUNDINGS: dict[str, Any] = {
     **dict.fromkeys(("coartic", "model_code", "python", "platform", "processor", "date"), str),
@@ -147,48 +127,55 @@ class Store:
         return empty
 
     def replace_plan(
-        self, plan: Plan, environment: dict[str, Any], command: list[str], date: str
+        self, plan: Sequence[Job], environment: dict[str, Any], command: list[str], date: str
     ) -> None:
         """Ask for the runs of this plan from now on. Runs of earlier plans stay, and are not shown.
 
         Raises CoarticError for a folder of another suite.
         """
+        first = plan[0]
         with self.transaction():
             for row in self._db.execute("SELECT name FROM suite"):
-                if row["name"] != plan.suite:
+                if row["name"] != first.suite:
                     raise CoarticError(
                         f"{self.folder} holds results of suite {row['name']!r}: name another "
-                        f"folder for suite {plan.suite!r}"
+                        f"folder for suite {first.suite!r}"
                     )
-            rows = plan.to_rows()
-            rows["suite"][0] |= {
-                "readings": [],  # of versions 1.0 and 1.1
-                "command": command,
-                "date": date,
-                "environment": self._environment(environment),
-            }
-            for row in rows["cells"]:
-                row["setting"] = self._id_of("settings", row["setting"], "asked", "code")
-            for table, content in rows.items():
-                self._db.execute(f"DELETE FROM {table}")
-                for row in content:
-                    self._insert(table, row)
-            robots = [task.robot for task in plan.tasks.values()]
+            self._db.execute("DELETE FROM suite")
+            self._db.execute("DELETE FROM plan")
+            suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
+            ran = {"command": command, "date": date, "environment": self._environment(environment)}
+            self._insert("suite", suite | ran)
+            for position, job in enumerate(plan):
+                row = cell_row(job.cell)
+                cell = self._id_of("cells", row, "digest", "code")
+                # A cell of an earlier command may have had other defaults.
+                latest = (as_text(row["defaults"]), row["setting"], row["origin"], cell)
+                query = "UPDATE cells SET defaults = ?, setting = ?, origin = ? WHERE id = ?"
+                self._db.execute(query, latest)
+                asked = {"position": position, "cell": cell, "runs": len(job.numbers)}
+                self._insert("plan", asked)
+            robots = [job.cell.task.robot for job in plan]
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
-            bring_up_to_date(self._db)
 
-    def plan(self) -> Plan:
-        """The plan of the folder. Raises CoarticError where there is none yet."""
-        queries = {table: f"SELECT * FROM {table}" for table in ("suite", "tasks", "methods")}
-        queries["cells"] = (
-            "SELECT cells.*, settings.task, method, asked, settings.parameters AS complete "
-            "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
-        )
+    def plan(self) -> list[Job]:
+        """Return the plan of the folder. Raises CoarticError if there is none yet."""
         with explain_errors(self.folder):
-            rows = {table: self._db.execute(text).fetchall() for table, text in queries.items()}
-            if not rows["suite"]:
+            suite = self._one("SELECT * FROM suite")
+            if suite is None:
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
-            return Plan.from_rows(rows, str(self.folder / RUNS_FILE))
+            query = "SELECT * FROM plan JOIN cells ON cells.id = cell ORDER BY position"
+            tasks: dict[str, Task] = {}
+            jobs = []
+            for row in self._db.execute(query):
+                check_limits("runs", row["runs"], 0, MOST_RUNS)
+                cell = self._read_cell(row)
+                if tasks.setdefault(cell.task.name, cell.task) != cell.task:
+                    raise ValueError(f"two tasks are called {cell.task.name!r}")
+                asked = {"seed": suite["seed"], "time_limit_s": suite["time_limit_s"]}
+                asked |= {"cell": cell, "numbers": range(row["runs"]), "suite": suite["name"]}
+                jobs.append(_JOB.validate_python(asked))
+            return jobs
 
     def made_with(self) -> dict[str, Any]:
         """Versions, platform, commit, command and date of the last command."""
@@ -228,27 +215,23 @@ class Store:
     def present(self) -> list[tuple[int, int, str, float | None]]:
         """Position of the cell, number, status and time limit of the runs asked for that there
         are."""
-        columns = "position, results.run, status, time_limit_s"
+        query = "SELECT position, run, status, time_limit_s FROM asked"
         with explain_errors(self.folder):
-            return list(map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR}")))
+            return list(map(tuple, self._db.execute(query)))
 
     def stale(self) -> int:
-        """Number of runs of the plan that other code made."""
+        """Return the number of runs of the plan that other code made."""
+        query = """SELECT count(*) FROM suite JOIN plan JOIN cells AS now ON now.id = plan.cell
+            JOIN cells AS old ON old.digest = now.digest AND old.code != now.code
+            JOIN results ON results.cell = old.id AND suite_seed = suite.seed AND run < plan.runs
+            WHERE old.id NOT IN (SELECT cell FROM plan)"""
         with explain_errors(self.folder):
-            row = self._one(
-                """SELECT count(*) FROM results JOIN settings AS old ON old.id = results.setting
-                WHERE EXISTS (SELECT * FROM cells JOIN settings AS new ON new.id = cells.setting
-                    WHERE new.asked = old.asked AND new.code != old.code
-                    AND results.run < cells.runs)
-                AND results.suite_seed = (SELECT seed FROM suite)
-                AND old.id NOT IN (SELECT setting FROM cells)"""
-            )
-            return int(row[0])
+            return int(self._one(query)[0])
 
     def others(self) -> Counter[int]:
-        """Number of runs that the plan does not ask for, by the seed of their suite."""
-        query = f"""SELECT suite_seed, count(*) FROM results
-            WHERE id NOT IN (SELECT results.id {_ASKED_FOR}) GROUP BY suite_seed"""
+        """Return the number of runs that the plan does not ask for, by the seed of their suite."""
+        query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
+            GROUP BY suite_seed"""
         with explain_errors(self.folder):
             return Counter(dict(self._db.execute(query)))
 
@@ -271,17 +254,16 @@ class Store:
                     self._write_run(run)
                 except (sqlite3.IntegrityError, sqlite3.DataError, OverflowError) as error:
                     raise CoarticError(
-                        f"run {run.id} of {run.specification.method} cannot be stored: {error}"
+                        f"run {run.id} of {run.cell.method.name} cannot be stored: {error}"
                     ) from None
 
     def run(self, run_id: str) -> Run:
-        """A run by its id. Raises CoarticError where there is none."""
+        """Return a run by its id. Raises CoarticError if there is none."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
                 raise CoarticError(f"it has no run {run_id}")
-            asked = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
-            specification = Specification.from_row(asked, str(self.folder / RUNS_FILE))
+            cell = self._read_cell(self._one("SELECT * FROM cells WHERE id = ?", row["cell"]))
             environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
             blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
             movements, waypoints = (
@@ -293,30 +275,21 @@ class Store:
                 rows[each["part"]].append(each)
             points = waypoints.fetchall()
             rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
-            facts = {"initial_trials": None, **row}
-            if facts["trials"] is not None and facts["initial_trials"] is None:  # format 1 or 2
-                facts["initial_trials"] = facts["trials"] - len(rewards)
-                facts["trials"] = len(rewards)
             return Run.from_row(
-                facts,
-                specification,
+                row,
+                cell,
                 json.loads(environment["content"]),
-                {part: movements_from(specification.task, rows[part], points) for part in PARTS},
+                {part: movements_from(cell.task, rows[part], points) for part in PARTS},
                 [None if reward == FAILED_TRIAL else reward for reward in rewards],
             )
 
     def runs(self) -> pd.DataFrame:
-        """View ``runs`` as a data frame, with nullable types."""
-        import pandas as pd
-
+        """Return view ``runs`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            runs = self._frame("runs").rename(columns={"variant": "setting"})
-            if "initial_trials" not in runs:  # of formats 1 and 2
-                runs["initial_trials"] = pd.array([None] * len(runs), "Int64")
-            return check_runs(runs.drop(columns="label", errors="ignore"))
+            return check_runs(self._frame("runs"))
 
     def solutions(self) -> pd.DataFrame:
-        """View ``solutions`` as a data frame, with nullable types."""
+        """Return view ``solutions`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
             return self._frame("solutions").drop(columns=["result_id", "part"])
 
@@ -326,30 +299,26 @@ class Store:
         """Movements of one part (:data:`PARTS`) by the ids of the first runs of each cell that are
         ok, so many at most. ``tasks`` are the plan's, by name."""
         points: dict[str, list[Any]] = defaultdict(list)
-        order = 'ORDER BY cells.position, results.run, "order"'
+        of_waypoints = """SELECT run_id, waypoints.* FROM solved
+            JOIN waypoints ON result_id = solved.id WHERE place <= ?
+            ORDER BY position, run, "order", waypoint"""
+        of_movements = """SELECT run_id, task, movements.* FROM solved
+            JOIN movements ON result_id = solved.id AND part = ? WHERE place <= ?
+            ORDER BY position, run, "order\""""
         with explain_errors(self.folder):
-            for row in self._db.execute(
-                f"""SELECT run_id, waypoints.* {_ASKED_FOR} JOIN waypoints
-                ON result_id = results.id WHERE {_FIRST} {order}, waypoint""",
-                (most,),
-            ):
+            for row in self._db.execute(of_waypoints, (most,)):
                 points[row["run_id"]].append(row)
-            rows = self._db.execute(
-                f"""SELECT run_id, settings.task, movements.* {_ASKED_FOR} JOIN movements
-                ON result_id = results.id AND part = ? WHERE {_FIRST} {order}""",
-                (part, most),
-            )
+            rows = self._db.execute(of_movements, (part, most))
             return {
                 run_id: movements_from(tasks[name], of_run, points[run_id])
                 for (run_id, name), of_run in groupby(rows, itemgetter("run_id", "task"))
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Runs asked for that made trials, each with the reward of every trial, NaN where it
+        """Yield the runs asked for that made trials, each with the reward of every trial, NaN if it
         failed."""
-        query = f"""SELECT run_id, rewards, trials {_ASKED_FOR}
-            JOIN learning ON learning.result_id = results.id
-            ORDER BY cells.position, results.run"""
+        query = """SELECT run_id, rewards, trials FROM asked
+            JOIN learning ON result_id = asked.id ORDER BY position, run"""
         with explain_errors(self.folder):
             for run_id, blob, trials in self._db.execute(query):
                 stored = unpack(blob, trials)
@@ -364,14 +333,12 @@ class Store:
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
         row = run.to_row()
-        row["setting"] = self._id_of("settings", run.specification.to_row(), "asked", "code")
-        row["environment"] = self._environment(run.environment)
+        row["cell"] = self._id_of("cells", cell_row(run.cell), "digest", "code")
+        row["environment"] = self._environment(run.outcome.environment or {})
         result = self._insert("results", row)
 
         def joints(configuration: Array) -> dict[str, float]:
-            return dict(
-                zip(run.specification.task.robot.joint_names, configuration.tolist(), strict=True)
-            )
+            return dict(zip(run.cell.task.robot.joint_names, configuration.tolist(), strict=True))
 
         for part, score in run.scores.items():
             for order, m in enumerate(score.movements):
@@ -381,10 +348,26 @@ class Store:
                 self._insert("movements", place | facts | {"ticks": m.ticks} | joints(m.target))
                 for n, point in enumerate(() if m.waypoints is None else m.waypoints):
                     self._insert("waypoints", place | {"waypoint": n} | joints(point))
-        if run.rewards:
-            stored = [FAILED_TRIAL if reward is None else reward for reward in run.rewards]
+        if rewards := run.outcome.rewards:
+            stored = [FAILED_TRIAL if reward is None else reward for reward in rewards]
             blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
             self._insert("learning", {"result_id": result, "rewards": blob})
+
+    def _read_cell(self, row: Mapping[str, Any]) -> Cell:
+        """Return a cell from its row. Raises ValueError for what no cell has, and TaskError."""
+        method = {name: row[name] for name in ("title", "citation", "stochastic", "origin", "code")}
+        method |= {"name": row["method"], "defaults": json.loads(row["defaults"])}
+        method |= {"information": tuple(filter(None, row["information"].split(", ")))}
+        content = {
+            "task": parse_task(json.loads(row["definition"]), str(self.folder / RUNS_FILE)),
+            "method": method,
+            "parameters": json.loads(row["parameters"]),
+            "trial_budget": row["trial_budget"],
+        }
+        cell: Cell = _CELL.validate_python(content)
+        if (cell.digest, cell.setting) != (row["digest"], row["setting"]):
+            raise ValueError(f"{cell.label} on {cell.task.name} is not the cell that was run")
+        return cell
 
     def _environment(self, content: dict[str, Any]) -> int:
         """Id of the row of an environment, which is inserted where there is none."""
@@ -407,14 +390,8 @@ class Store:
         """Insert a row, lists and tables as JSON; its id."""
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
-        values = [
-            json.dumps(value, ensure_ascii=False)
-            if isinstance(value, dict | list | tuple)
-            else value
-            for value in row.values()
-        ]
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
-        return int(self._db.execute(text, values).lastrowid or 0)
+        return int(self._db.execute(text, [*map(as_text, row.values())]).lastrowid or 0)
 
     def _one(self, query: str, *values: object) -> Any:
         """The first row of a query, or None."""
@@ -444,6 +421,34 @@ class Store:
             except sqlite3.OperationalError as error:
                 if not error.sqlite_errorname.startswith(_LOCKED):
                     raise
+
+
+def as_text(value: Any) -> Any:
+    """Return a list or a table as JSON, and any other value as it is."""
+    is_table = isinstance(value, dict | list | tuple)
+    return json.dumps(value, ensure_ascii=False) if is_table else value
+
+
+def cell_row(cell: Cell) -> dict[str, Any]:
+    """Return the row of a cell in table ``cells``, without its id."""
+    method = cell.method
+    return {
+        "digest": cell.digest,
+        "code": method.code,
+        "task": cell.task.name,
+        "definition": cell.definition,
+        "method": method.name,
+        "title": method.title,
+        "citation": method.citation,
+        "information": ", ".join(method.information),
+        "stochastic": method.stochastic,
+        "defaults": method.defaults,
+        "origin": method.origin,
+        "parameters": cell.parameters,
+        "setting": cell.setting,
+        "model": PAPER._asdict(),
+        "trial_budget": cell.trial_budget,
+    }
 
 
 @contextmanager
@@ -505,7 +510,7 @@ def writing(folder: Path) -> Iterator[Store]:
                 # No write-ahead log: it is unsafe on network disks, and a second file.
                 connection.execute("PRAGMA journal_mode = DELETE")
                 if not is_there:
-                    connection.executescript(f"BEGIN;{_SCHEMA}{_ADD_INITIAL_TRIALS}{_VIEWS}COMMIT;")
+                    connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
             yield Store(folder, connection)
 
 
@@ -586,9 +591,7 @@ def has_tables(connection: sqlite3.Connection) -> bool:
             raise CoarticError("it is not a file of coartic; move it away")
         return False
     if version != FORMAT:
-        reads = {1: ", which version 1.1.0 reads", 2: ", which version 2.0.0 reads"}.get(
-            version, ""
-        )
+        reads = _READ_BY.get(version, "")
         do = "update coartic" if version > FORMAT else "run the suite again with another --out"
         raise CoarticError(
             f"it has format {version}{reads}; this version of coartic reads {FORMAT}: {do}"
@@ -597,10 +600,6 @@ def has_tables(connection: sqlite3.Connection) -> bool:
         ours.executescript(_SCHEMA)
         columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]
         add_joints(ours, filter(_JOINT.fullmatch, columns))
-        if version == FORMAT:
-            bring_up_to_date(ours)
-        else:
-            ours.executescript(_EARLIER_VIEWS[version])
         for kind, name, _ in sorted(there ^ schema(ours)):
             raise CoarticError(
                 f"it is not as coartic makes it: {kind} {plain(name, 80)} is missing or is not "
@@ -619,14 +618,6 @@ def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
         for name in names:
             if name not in there:
                 connection.execute(f"ALTER TABLE {table} ADD COLUMN {name} REAL")
-
-
-def bring_up_to_date(connection: sqlite3.Connection) -> None:
-    """Add the column that earlier formats lack, and make the views anew, which show all columns."""
-    there = {column[1] for column in connection.execute("PRAGMA table_info(results)")}
-    statements = _VIEWS if "initial_trials" in there else _ADD_INITIAL_TRIALS + _VIEWS
-    for statement in statements.split(";\n"):
-        connection.execute(statement)
 
 
 UNREADABLE = (
@@ -695,10 +686,10 @@ def check_runs(runs: pd.DataFrame) -> pd.DataFrame:
         rules[name] = runs[name].notna() == solved
     for name in ("hands", "replay_hands", "initial_hands"):
         rules[f"letters of {name}"] = runs[name].fillna("L").str.fullmatch("[LR]+")
-    for name in [name for name in RESULTS if name in runs]:
-        if "NOT NULL" in RESULTS[name]:
+    for name, kind, *_ in COLUMNS:
+        if "NOT NULL" in kind:
             rules[f"lack of {name}"] = runs[name].notna()
-        if _DTYPES[name] in ("Int64", "Float64"):
+        if kind.startswith(("INTEGER", "REAL")):
             is_reward = name.endswith("reward") or name == "proven_bound"  # minus a count
             size = runs[name].fillna(0) * (-1 if is_reward else 1)
             rules[f"size of {name}"] = (size >= 0) & (size < np.inf)

@@ -82,7 +82,7 @@ def entries() -> list[dict[str, Any]]:
     ``task``, its :func:`essence`, ``base`` (directions in which it is locked; ``task``: as the task
     locks it), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``; then ``reward``,
     ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (reward that each found)
-    and ``solution`` (movements as :func:`coartic.runs.run.movements_from` reads them); or
+    and ``solution`` (movements as :func:`coartic.runs.record.movements_from` reads them); or
     ``infeasible``, why no search has a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))

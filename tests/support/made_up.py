@@ -9,7 +9,7 @@ from coartic import load_task
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Cell, Plan
+from coartic.runs.plan import Cell, Job
 
 MADE_WITH = {
     "coartic": "0", "model_code": "code", "commit": {"id": "abc4567", "dirty": True},
@@ -59,7 +59,7 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
 def declared(method):
     """What a made-up method declares; planners are not stochastic."""
     stochastic = not method.startswith(("trajectory-optimisation", "corrective-alone"))
-    return MethodInfo(method, method, "", (), (), stochastic, {}, "built in", "")
+    return MethodInfo(method, method, "", (), stochastic, {}, "built in", "")
 
 
 def plan_for(tasks, runs=None):
@@ -67,14 +67,12 @@ def plan_for(tasks, runs=None):
     keys = ["task", "method", "setting"]
     rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
     by_name = {task.name: task for task in tasks}
-    cells = []
+    plan = []
     for each in rows:
         parameters = dict(item.split("=") for item in each["setting"].split(", ") if item)
-        cells.append(Cell(by_name[each["task"]], declared(each["method"]), parameters, runs=3))
-    return Plan(
-        suite="paper", runs=3, seed=0, trials=10_000, time_limit_s=None, trial_budget=None,
-        cells=tuple(cells),
-    )  # fmt: skip
+        cell = Cell(by_name[each["task"]], declared(each["method"]), parameters)
+        plan.append(Job(cell, 0, range(3), suite="paper"))
+    return plan
 
 
 def study_of(rows, tasks=None, **parts):

@@ -11,9 +11,9 @@ from coartic.analysis.study import load
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import perform
-from coartic.benchmarks.suites import Cell, load_suite, select_cells
+from coartic.benchmarks.runner import perform
 from coartic.benchmarks.worker import fail, perform_job
+from coartic.runs.plan import Job, cell_of
 
 ROOT = Path(__file__).parents[2]
 BROKEN = ROOT / "tests" / "methods" / "broken.py"
@@ -44,28 +44,35 @@ class Failing(InProcess):
             yield job, fail(job, "crashed", "exit code 9") if lost else perform_job(job)
 
 
+def cell_on(task, method, **parameters):
+    """A cell with these parameters, and the defaults of the others."""
+    return cell_of(task, method, parameters)
+
+
+def cells_of(suite, **selection):
+    return [job.cell for job in plan_suite(suite, **selection)]
+
+
 def paper_cells(**selection):
-    return select_cells(load_suite("paper"), KNOWN, **selection)
+    return cells_of("paper", **selection)
 
 
 def suite_of(tmp_path, *blocks):
     path = tmp_path / "own.toml"
     head = 'title = "x"\ndescription = "x"\nruns = 3\ntrials = 30\n'
     path.write_text(head + "".join(f"[[blocks]]\n{block}\n" for block in blocks))
-    return select_cells(load_suite(str(path)), KNOWN)
+    return cells_of(path)
 
 
 def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial_budget=None):
-    """A plan of some cells, or of those of the paper."""
-    return plan_suite(
-        "paper",
-        cells=cells,
-        runs=runs,
-        trials=trials,
-        seed=seed,
-        time_limit_s=time_limit_s,
-        trial_budget=trial_budget,
-    )
+    """A plan of some cells, or of those of the paper, as parts of suite ``paper``."""
+    plan = []
+    for each in paper_cells() if cells is None else cells:
+        defaults, numbers = each.method.defaults, range(runs if each.method.stochastic else 1)
+        changed = {k: v for k, v in each.parameters.items() if v != defaults.get(k)}
+        whole = cell_of(each.task, each.method, changed, trials, trial_budget)
+        plan.append(Job(whole, seed, numbers, time_limit_s, "paper"))
+    return plan
 
 
 def run_and_write(folder, cells=None, *, executor=None, **options):
@@ -104,7 +111,7 @@ def same_results(a, b):
 def traced_cells():
     """Of the paper, beside planners, a search without a corrective process, and an ablation."""
     cells = [
-        Cell(load_task(task), KNOWN[method])
+        cell_on(load_task(task), KNOWN[method])
         for task, methods in (
             ("ascending", ["dual-process/EC1", "trajectory-optimisation/path-length"]),
             ("descending", ["dual-process/EC1", "corrective-alone/given"]),
@@ -113,4 +120,4 @@ def traced_cells():
         )
         for method in methods
     ]  # fmt: skip
-    return [*cells, Cell(cells[-1].task, KNOWN["dual-process/EC4"], {"noise_sd": 0.1})]
+    return [*cells, cell_on(cells[-1].task, KNOWN["dual-process/EC4"], noise_sd=0.1)]

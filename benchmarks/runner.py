@@ -12,7 +12,6 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +21,12 @@ from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
-from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted, unknown
-from coartic.runs.plan import Plan, Specification, trials_in
-from coartic.runs.run import Run
+from coartic.internal.text import counted
+from coartic.runs.plan import Cell, Job, size_of, trials_in
+from coartic.runs.record import Run
 from coartic.runs.store import Store, writing
 
 _EXECUTORS = {
@@ -78,9 +76,9 @@ class Progress:
 
     def finish(self, run: Run) -> None:
         """Count a run that is performed now."""
-        method, seconds = run.specification.method, run.times.wall_s
+        method, seconds = run.cell.method.name, run.outcome.times.wall_s
         self.done += 1
-        self.count(run.status)
+        self.count(run.outcome.status)
         self.waiting[method] -= 1
         if seconds is not None:
             self.timed[method] += 1
@@ -116,8 +114,8 @@ class Progress:
         return f"{runs} in {time_taken}, {failed}: {self.folder}{without}"
 
 
-Watcher = Callable[[Progress, Specification | None], None]
-"""Called before the first run, and after each with its specification."""
+Watcher = Callable[[Progress, Cell | None], None]
+"""Called before the first run, and after each run with its cell."""
 
 
 def run_suite(
@@ -155,18 +153,13 @@ def run_suite(
     >>> run_suite("paper", "results/first", tasks=["ascending"], runs=3)  # doctest: +SKIP
     3 runs in 4 s, none failed: results/first
     """
-    names = [*signature(plan_suite).parameters][1:]
-    for name in options:
-        if name in _EXECUTORS:
-            raise CoarticError(f"{name} is no option: give executor={_EXECUTORS[name]}")
-        if name not in names:
-            raise CoarticError(unknown("option", name, names))
-    plan = plan_suite(suite, **options)
-    return perform(plan, folder, executor=executor, watch=watch)
+    for name in _EXECUTORS.keys() & options.keys():
+        raise CoarticError(f"{name} is no option: give executor={_EXECUTORS[name]}")
+    return perform(plan_suite(suite, **options), folder, executor=executor, watch=watch)
 
 
 def perform(
-    plan: Plan,
+    plan: Sequence[Job],
     folder: str | Path,
     *,
     executor: Local | Dask | None = None,
@@ -178,8 +171,8 @@ def perform(
 
     Parameters
     ----------
-    plan : Plan
-        The runs that are asked for.
+    plan : sequence of Job
+        The runs that are asked for, as :func:`plan_suite` returns them.
     folder : str or Path
         Results folder, made where there is none.
     executor : Local or Dask, optional
@@ -201,18 +194,18 @@ def perform(
         be written.
     """
     folder, clock = folder_named(folder), time.perf_counter()
-    watch = watch or (lambda progress, specification: None)
+    watch = watch or (lambda progress, cell: None)
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
         known = " or ".join(_EXECUTORS.values())
         raise CoarticError(f"executor is {brief_value(executor)}; it must be {known}")
     with writing(folder) as store:
         store.replace_plan(plan, current_environment(), command(), now())
-        progress = Progress(folder, plan.size, stale=store.stale(), others=store.others())
-        progress.others[plan.seed] -= progress.stale
+        progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
+        progress.others[plan[0].seed] -= progress.stale
         missing = missing_jobs(plan, store, progress)
         for job in missing:
-            progress.waiting[job.specification.method] += len(job.numbers)
+            progress.waiting[job.cell.method.name] += len(job.numbers)
         progress.workers = executor.workers
         watch(progress, None)
         jobs = divided(missing, executor.workers)
@@ -222,41 +215,44 @@ def perform(
                 for job, outcomes in answers:
                     runs = score(job, outcomes)
                     if len(runs) > 1:  # a run that failed may have failed because of the others
-                        again = [run.number for run in runs if run.status not in _SURE]
-                        alone += [replace(job, numbers=(number,)) for number in again]
-                        runs = [run for run in runs if run.status in _SURE]
+                        alone += [run.job for run in runs if run.outcome.status not in _SURE]
+                        runs = [run for run in runs if run.outcome.status in _SURE]
                     store.write(runs)
                     for run in runs:
                         progress.finish(run)
-                        watch(progress, run.specification)
+                        watch(progress, run.cell)
             jobs = alone
         progress.wall_s = time.perf_counter() - clock
         return progress
 
 
-def missing_jobs(plan: Plan, store: Store, progress: Progress) -> list[Job]:
-    """The runs to perform, a job for each cell; those that are there are counted. What crashed is
-    performed again, and what took too long where it may now take longer, unless the code of its
-    method is not here. Raises CoarticError where that is so of a method whose runs are missing."""
+def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
+    """Return the runs to perform, a job for each cell; count the runs that are there.
+
+    A run that crashed is performed again, and a run that took too long if it may now take longer,
+    unless the code of its method is not here. Raises CoarticError if that is so of a method whose
+    runs are missing.
+    """
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
-        longer = had_s is not None and (plan.time_limit_s is None or plan.time_limit_s > had_s)
+        job = plan[position]
+        longer = had_s is not None and (job.time_limit_s is None or job.time_limit_s > had_s)
         failed = status == "crashed" or (status == "timeout" and longer)
-        if not (plan.cells[position].method.where and failed):
+        if not (job.cell.method.where and failed):
             there.add((position, number))
             progress.present += 1
             progress.count(status)
-    jobs = []
-    for p, (cell, specification) in enumerate(zip(plan.cells, plan.specifications, strict=True)):
-        numbers = tuple(number for number in range(cell.runs) if (p, number) not in there)
-        if numbers and not cell.method.where:
+    missing = []
+    for position, job in enumerate(plan):
+        numbers = tuple(number for number in job.numbers if (position, number) not in there)
+        if numbers and not job.cell.method.where:
             raise CoarticError(
-                f"{store.folder} lacks runs of {cell.label} on {cell.task.name}, and the code of "
-                "this method is not here: plan them with its method file"
+                f"{store.folder} lacks runs of {job.cell.label} on {job.cell.task.name}, and the "
+                "code of this method is not here: plan them with its method file"
             )
         if numbers:
-            jobs.append(Job(specification, cell.method, plan.seed, numbers, plan.time_limit_s))
-    return jobs
+            missing.append(replace(job, numbers=numbers))
+    return missing
 
 
 def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
@@ -276,8 +272,8 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), LEAST_BATCH)
     parts: list[Job] = []
     for job in jobs:
-        is_ours, parameters = job.method.is_ours, job.specification.parameters
-        most = job.method.configure(parameters).most_together() if is_ours else 1
+        method, parameters = job.cell.method, job.cell.parameters
+        most = method.configure(parameters).most_together() if method.is_ours else 1
         parts += divide(job, min(most, share))
     even = len(parts) - len(parts) % workers
     ordered, last = parts[:even], parts[even:]
@@ -285,6 +281,6 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), LEAST_BATCH))
 
     def trials(job: Job) -> float:
-        return trials_in(job.specification.parameters) * len(job.numbers) or math.inf
+        return trials_in(job.cell.parameters) * len(job.numbers) or math.inf
 
     return sorted(ordered, key=trials, reverse=True)

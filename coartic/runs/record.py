@@ -1,0 +1,390 @@
+"""The record of a run: its job, outcome and scores, and the columns under which it is stored."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from operator import attrgetter, itemgetter
+from types import SimpleNamespace
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field, InstanceOf
+
+from coartic.errors import SolutionError
+from coartic.learner.run import CORRECTIONS
+from coartic.method import Meter
+from coartic.model import PAPER
+from coartic.motion.reach import compiled_task
+from coartic.motion.solution import Execution, Movement, execute_many
+from coartic.runs.plan import Cell, Job
+from coartic.tasks.task import Task
+
+STATUSES = ("ok", "infeasible", "solver-failed", "timeout", "crashed")
+"""Statuses of a run."""
+PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
+"""Parts of a run that are scored (its solution, the first trial of a learner, and one noiseless
+greedy trial with what it has learned), and how the columns of each part begin."""
+PARTS = tuple(PREFIXES)
+MOST_MOVEMENTS = 10_000
+"""Most movements of one solution."""
+MOST_STEPS = 1_000_000
+"""Most movement steps along one solution, its targets visited in order: thousands do."""
+
+
+class Score(NamedTuple):
+    """One part of a run as it was executed."""
+
+    reward: int | None = None
+    hands: str | None = None
+    """Hand of each goal, such as ``LRLR``."""
+    movements: tuple[Movement, ...] = ()
+    corrections: int | None = None
+    """Corrective movements that a solution needed."""
+    other_arm_travel: float | None = None
+    """Joint travel of the arm that a solution does not choose, rad."""
+
+
+@dataclass(frozen=True)
+class Times:
+    """Time and memory that a run took: an equal share of its batch's time."""
+
+    wall_s: float | None = None
+    """None if the worker died and nobody knows when it began."""
+    cpu_s: float | None = None
+    warm: bool | None = None
+    """Whether the process had run the method before."""
+    together: int = 1
+    """Runs of the batch."""
+    process_peak_mb: float | None = None
+    """Memory of the worker so far, all its runs included."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The statement of a method about one run, as plain data."""
+
+    status: Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
+    reason: str = ""
+    """Why the run is not ok; empty if it is."""
+    parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
+    """Movements of each part (:data:`PARTS`) that there is, to be executed and scored."""
+    bound: int | None = None
+    """Reward that no solution exceeds, if it is proven."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """Whatever the method keeps beside its solution."""
+    used: tuple[str, ...] = ()
+    """Declared information that the method used."""
+    meter: Meter | None = None
+    """None if the worker died."""
+    rewards: list[Annotated[int, Field(gt=-(2**31), lt=2**31)] | None] = field(default_factory=list)
+    """Reward of each trial; None if the trial failed, or if its reward is not kept."""
+    times: Times = Times()
+    environment: dict[str, Any] | None = None
+    """Versions, platform, processor, threads and commit; None for those of this process."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run."""
+
+    job: Job
+    """A job of this run alone."""
+    outcome: Outcome
+    """What became of the run; its ``parts`` are among the scores."""
+    scores: dict[str, Score]
+    """Scores of the parts (:data:`PARTS`) that there are."""
+    date: str
+
+    @property
+    def cell(self) -> Cell:
+        """The cell of the run."""
+        return self.job.cell
+
+    @property
+    def number(self) -> int:
+        """Number of the run, from 0 within its cell."""
+        return self.job.numbers[0]
+
+    @cached_property
+    def id(self) -> str:
+        """Id of the run (:meth:`Job.run_id`)."""
+        return self.job.run_id(self.number)
+
+    @property
+    def seed(self) -> int:
+        """Seed of the random numbers."""
+        return self.job.run_seed(self.number)
+
+    @property
+    def solution(self) -> Score:
+        """Score of the solution; a blank one if there is none."""
+        return self.scores.get("solution", Score())
+
+    @property
+    def initial(self) -> Score:
+        """Score of the first trial of a learner; a blank one for other methods."""
+        return self.scores.get("initial", Score())
+
+    @property
+    def replay(self) -> Score:
+        """Score of the trial after learning; a blank one for other methods."""
+        return self.scores.get("replay", Score())
+
+    @property
+    def counts(self) -> Any:
+        """The meter; one of blanks if the worker died."""
+        return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
+
+    @property
+    def best_trial(self) -> int | None:
+        """The first trial with the solution's reward, if any."""
+        reward, rewards = self.solution.reward, self.outcome.rewards
+        return None if reward is None or reward not in rewards else rewards.index(reward)
+
+    @property
+    def early_corrections(self) -> int | None:
+        """Corrective movements in the first tenth of a learner's trials after trial 0."""
+        return self._corrections()[1]
+
+    @property
+    def late_corrections(self) -> int | None:
+        """Corrective movements in the last tenth of a learner's trials."""
+        return self._corrections()[-1]
+
+    def _corrections(self) -> list[int | None]:
+        """Corrective movements of a learner in trial 0 and in each tenth of the others; blanks for
+        other methods."""
+        counts = self.outcome.details.get(CORRECTIONS)
+        return counts if isinstance(counts, list) and len(counts) == 11 else [None] * 11
+
+    @property
+    def is_downsampled(self) -> bool:
+        """Whether rewards of some trials are not kept (:meth:`downsample`)."""
+        meter = self.outcome.meter
+        return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
+
+    def downsample(self) -> Run:
+        """Return the run with the rewards of its best trial and of the trials that were better than
+        all before; the others are None. It takes a tenth of the room."""
+        best, solved, kept = -math.inf, self.best_trial, list[int | None]()
+        for trial, reward in enumerate(self.outcome.rewards):
+            better = reward is not None and reward > best
+            kept.append(reward if better or trial == solved else None)
+            best = max(best, -math.inf if reward is None else reward)
+        return replace(self, outcome=replace(self.outcome, rewards=kept))
+
+    @cached_property
+    def result(self) -> str:
+        """Hash of status, bound, rewards of all trials, and solutions to the last joint.
+
+        Equal for runs that came out the same, whatever was spent on the way.
+        """
+        content: list[Any] = [self.outcome.status, self.outcome.bound, self.outcome.rewards]
+        for part in PARTS:
+            content += [[part, *movement] for movement in self.movement_data(part)]
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+
+    def movement_data(self, part: str) -> list[list[Any]]:
+        """Return the movements of a part as plain data; none if there is no such part.
+
+        SQLite keeps no sign of zero; adding 0.0 loses it here as well.
+        """
+        data = []
+        for m in self.scores[part].movements if part in self.scores else ():
+            arrays = (m.target, m.waypoints)
+            places = [None if array is None else (array + 0.0).tolist() for array in arrays]
+            data.append([m.goal, m.hand, m.kind, m.ticks, *places])
+        return data
+
+    def to_row(self) -> dict[str, Any]:
+        """Return the columns of the run in table ``results``, without the ids of other rows."""
+        row = {name: attrgetter(source)(self) for name, _, source, _ in COLUMNS if source}
+        details = json.dumps(self.outcome.details)
+        used = ", ".join(self.outcome.used)
+        return row | {"suite_seed": self.job.seed, "used": used, "details": details}
+
+    @classmethod
+    def from_row(
+        cls,
+        row: Mapping[str, Any],
+        cell: Cell,
+        environment: dict[str, Any],
+        movements: Mapping[str, tuple[Movement, ...]],
+        rewards: list[int | None],
+    ) -> Run:
+        """Return a run from its row of table ``results``, its movements by part, and the rewards of
+        its trials.
+
+        Raises ValueError if it is not the run of its id.
+        """
+        meter = {name: row[name] for name in vars(Meter())}
+        outcome = Outcome(
+            row["status"],
+            row["reason"],
+            bound=row["proven_bound"],
+            details=json.loads(row["details"]),
+            used=tuple(filter(None, row["used"].split(", "))),
+            meter=None if row["trials"] is None else Meter(**meter),
+            rewards=rewards,
+            times=Times(**{each.name: row[each.name] for each in fields(Times)}),
+            environment=environment,
+        )
+        scores = {
+            part: Score(row[f"{prefix}reward"], row[f"{prefix}hands"], movements[part])
+            for part, prefix in PREFIXES.items()
+            if movements[part]
+        }
+        if "solution" in scores:
+            scores["solution"] = scores["solution"]._replace(
+                corrections=row["solution_corrections"], other_arm_travel=row["other_arm_travel"]
+            )
+        job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
+        run = cls(job, outcome, scores, row["date"])
+        if (run.id, run.seed) != (row["run_id"], row["seed"]):
+            raise ValueError(f"run {row['run_id']} is not the run that its id says")
+        return run
+
+
+class Column(NamedTuple):
+    """A column of view ``runs``, which has a row for each run that the last command asked for."""
+
+    name: str
+    kind: str
+    """Its type in SQL, with ``NOT NULL`` if every run has a value."""
+    source: str
+    """Attribute of :class:`Run`, in table ``results``; empty for a column of another table."""
+    meaning: str
+    """For the documentation."""
+
+
+COLUMNS = tuple(
+    Column(*row)
+    for row in (
+        ("run_id", "TEXT NOT NULL UNIQUE", "id",
+         "hash of all that the result depends on: task, method, parameters, seed and code"),
+        ("suite", "TEXT", "", "name of the suite"),
+        ("task", "TEXT", "", "name of the task"),
+        ("method", "TEXT", "", "id of the method"),
+        ("setting", "TEXT", "", "parameters that are not the defaults"),
+        ("run", "INTEGER NOT NULL", "number", "number of the run, from 0"),
+        ("seed", "INTEGER NOT NULL", "seed", "the same for every method on a task and `run`"),
+        ("status", "TEXT NOT NULL", "outcome.status",
+         "`ok`, `infeasible`, `solver-failed`, `timeout` or `crashed`"),
+        ("reason", "TEXT NOT NULL", "outcome.reason", "why the run is not ok"),
+        ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
+        ("reward", "INTEGER", "solution.reward", "of the solution; of a learner its best trial"),
+        ("replay_reward", "INTEGER", "replay.reward",
+         "of one more trial of a learner, greedy and without noise"),
+        ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),
+        ("initial_reward", "INTEGER", "initial.reward",
+         "of a learner's first trial: the corrective process alone"),
+        ("initial_hands", "TEXT", "initial.hands", "hand of each goal in that trial"),
+        ("best_trial", "INTEGER", "best_trial", "first trial that got `reward`, from 0"),
+        ("trials", "INTEGER", "counts.trials", "physical trials, as many as `--trials` says"),
+        ("initial_trials", "INTEGER", "counts.initial_trials",
+         "trials besides, of the search for the first hands, where the [task](howto/task.md) names "
+         "a rule for them"),
+        ("movement_ticks", "INTEGER", "counts.movement_ticks", "control ticks of all these trials"),
+        ("forward_kinematics", "INTEGER", "counts.forward_kinematics",
+         "evaluations of the forward kinematics"),
+        ("jacobians", "INTEGER", "counts.jacobians", "evaluations of the Jacobian"),
+        ("corrective_iterations", "INTEGER", "counts.corrective_iterations",
+         "iterations of the corrective process"),
+        ("corrections", "INTEGER", "counts.corrections",
+         "corrective movements of all these trials"),
+        ("failed_trials", "INTEGER", "counts.failed_trials", "trials that missed a goal"),
+        ("gradients", "INTEGER", "counts.gradients", "evaluations of a solver's gradient"),
+        ("hessians", "INTEGER", "counts.hessians", "evaluations of a solver's Hessian"),
+        ("solver_iterations", "INTEGER", "counts.solver_iterations", "iterations of a solver"),
+        ("solution_corrections", "INTEGER", "solution.corrections",
+         "corrective movements of the solution"),
+        ("early_corrections", "INTEGER", "early_corrections",
+         "corrective movements in the first tenth of a learner's trials after its first trial"),
+        ("late_corrections", "INTEGER", "late_corrections",
+         "corrective movements in the last tenth"),
+        ("other_arm_travel", "REAL", "solution.other_arm_travel",
+         "joint travel of the arm that is not chosen, rad"),
+        ("proven_bound", "INTEGER", "outcome.bound",
+         "reward that no solution can exceed, where a method proves one"),
+        ("build_s", "REAL", "counts.build_s", "seconds of setting up a solver's problems"),
+        ("solve_s", "REAL", "counts.solve_s", "seconds of solving, without compiling"),
+        ("wall_s", "REAL", "outcome.times.wall_s", "seconds of wall time"),
+        ("cpu_s", "REAL", "outcome.times.cpu_s", "seconds of CPU time"),
+        ("warm", "BOOLEAN", "outcome.times.warm",
+         "whether the process had run the method before"),
+        ("together", "INTEGER", "outcome.times.together",
+         "runs that one process made side by side; they share their time evenly"),
+        ("process_peak_mb", "REAL", "outcome.times.process_peak_mb",
+         "most memory of the process so far, MiB"),
+        ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
+        ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
+        ("used", "TEXT NOT NULL", "outcome.used", "declared information that the method used"),
+        ("result", "TEXT NOT NULL", "result",
+         "hash of the outcome; runs with the same value are identical"),
+        ("information", "TEXT", "", "information that the method declares"),
+        ("parameters", "TEXT", "", "all parameters of the method, as JSON"),
+        ("commit", "TEXT", "", "commit of the checkout, with + if it was changed since"),
+        ("code", "TEXT", "", "hash of the code that the result comes from"),
+        ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
+    )
+)  # fmt: skip
+"""Columns of view ``runs``: SQL, data frames and documentation follow from this list."""
+
+
+def movements_from(
+    task: Task, rows: Iterable[Mapping[str, Any]], waypoints: Iterable[Mapping[str, Any]] = ()
+) -> tuple[Movement, ...]:
+    """The movements of one solution from its rows of ``solutions`` and, for movements of kind
+    ``path``, of ``paths``. Raises ValueError where a joint is not a finite number."""
+
+    def joints(row: Mapping[str, Any]) -> list[float]:
+        return [row[name] for name in task.robot.joint_names]
+
+    points: dict[int, list[list[float]]] = defaultdict(list)
+    for row in sorted(waypoints, key=itemgetter("waypoint")):
+        points[row["order"]].append(joints(row))
+    movements = []
+    for row in sorted(rows, key=itemgetter("order")):
+        target, path = np.array(joints(row), dtype=np.float64), None
+        if row["kind"] == "path":
+            path = np.array(points[row["order"]], dtype=np.float64).reshape(-1, len(target))
+        if not all(np.isfinite(each).all() for each in (target, path) if each is not None):
+            raise ValueError("a joint is not a finite number")
+        movements.append(
+            Movement(int(row["goal"]), row["hand"], row["kind"], target, int(row["ticks"]), path)
+        )
+    return tuple(movements)
+
+
+def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
+    """Execute solutions side by side: the only scores that count.
+
+    In place of an execution, the error of a solution that breaks the task's rules.
+    """
+    errors = [too_long(task, solution) for solution in solutions]
+    short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
+    executions = iter(execute_many(compiled_task(task, PAPER), short))
+    return [next(executions) if error is None else error for error in errors]
+
+
+def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
+    """The error of a solution that would take very long to execute."""
+    if len(solution) > MOST_MOVEMENTS:
+        return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
+    corners = [task.q0]
+    for movement in solution:
+        corners += [] if movement.waypoints is None else list(movement.waypoints)
+        corners += [] if movement.target is None else [movement.target]
+    if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
+        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / PAPER.step
+        if steps > MOST_STEPS:
+            return SolutionError(
+                f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
+            )
+    return None
