@@ -65,7 +65,7 @@ class Mine(Method):
     with open_store(out) as store:
         runs = [store.run(run_id) for run_id in store.ids()]
     assert (len(runs), {run.outcome.status for run in runs}) == (16, {"ok"})
-    assert len({run.details["process"] for run in runs}) <= 2
+    assert len({run.outcome.details["process"] for run in runs}) <= 2
 
 
 def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
