@@ -12,9 +12,10 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from coartic import Task
+from coartic.analysis.methods import SEARCHES
 from coartic.analysis.solutions import initial_solution
 from coartic.robot import Array
-from coartic.runs.plan import SEARCH, label_of
+from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
 
 SHIPPED = "shipped"
@@ -55,7 +56,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     """
     asked = restrictions(runs)
     solved = runs[(runs.status == "ok") & (asked.base == BASE)]
-    is_search = solved.method.str.startswith(SEARCH)
+    is_search = solved.method.isin(SEARCHES)
     solved = pd.concat([solved[is_search], solved[~is_search]])  # of equal runs a search counts
     by_task, known = dict([*solved.groupby("task")]), {}
     for task in tasks:
@@ -78,11 +79,6 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
         if best.reward < 0:
             known[task.name] = best
     return known
-
-
-def locks_base(runs: pd.DataFrame) -> bool:
-    """Whether a parameter of these runs locks the base: another problem, another optimum."""
-    return any(json.loads(text).get("base", BASE) != BASE for text in runs.parameters.unique())
 
 
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:

@@ -7,7 +7,8 @@ study, in the packages beside this file; :func:`cached` makes such a function co
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
+from coartic.analysis.method_frame import methods_of
 from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
@@ -57,10 +59,31 @@ class CellRuns:
         solved = self.runs["status"] == "ok"
         return self.runs if solved.all() else self.runs[solved]
 
+    @property
+    def all_good(self) -> bool:
+        """Whether there are runs, and all of them have a solution."""
+        return len(self.good) == len(self.runs) > 0
+
     @cached_property
     def rewards(self) -> Array:
         """Rewards of the solved runs, shape ``(n,)``, ticks."""
         return self.good.reward.to_numpy(dtype=np.float64)
+
+    @cached_property
+    def gaps(self) -> Array:
+        """Gaps of the solved runs to the best known reward, shape ``(n,)``, shares of it."""
+        return self.good.gap.to_numpy(dtype=np.float64)
+
+    @property
+    def gap(self) -> float:
+        """Gap of the mean reward to the best known reward; NaN where either is missing."""
+        best = self.good.best_known.dropna().unique()
+        return float(gap_share(self.rewards.mean(), best[0])) if len(best) else math.nan
+
+    @property
+    def has_best_known(self) -> bool:
+        """Whether there are runs, and a best known reward to which they can have gaps."""
+        return bool(self.runs.best_known.notna().any())
 
 
 UNITS = {
@@ -84,6 +107,13 @@ MOST_EXECUTED = 500
 """Runs of a method on a task whose solutions are executed again for the signatures."""
 
 
+def check_study(study: object) -> None:
+    """Raise CoarticError for what is no study, such as a folder."""
+    if not isinstance(study, Study):
+        needed = "needed is a study, as coartic.analysis.load(folder) returns it"
+        raise CoarticError(f"{needed}, not a {type(study).__name__}")
+
+
 def cached(
     function: Callable[Concatenate[Study, Asked], Computed],
 ) -> Callable[Concatenate[Study, Asked], Computed]:
@@ -94,9 +124,7 @@ def cached(
 
     @wraps(function)
     def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
-        if not isinstance(study, Study):
-            needed = "needed is a study, as coartic.analysis.load(folder) returns it"
-            raise CoarticError(f"{needed}, not a {type(study).__name__}")
+        check_study(study)
         key = function, args, tuple(named.items())
         if key not in study._computed:
             study._computed[key] = function(study, *args, **named)
@@ -120,18 +148,19 @@ def load(folder: str | Path) -> Study:
                 f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted. "
                 "Repeat the `coartic run` command, which does what is missing."
             )
-        return Study(folder, plan, store.made_with(), tidy(runs, plan))
+        return Study(folder, plan, store.made_with(), runs)
 
 
-def tidy(runs: pd.DataFrame, plan: Sequence[Job]) -> pd.DataFrame:
+def tidy(
+    runs: pd.DataFrame, tasks: Mapping[str, Task], optima: Mapping[str, BestKnown]
+) -> pd.DataFrame:
     """Return stored runs with columns for facts of their tasks, parameters and gaps.
 
     A parameter whose name is that of a stored column is left out: ``trials`` are those made,
     ``hands`` those of the solution.
     """
-    tasks = {job.cell.task.name: job.cell.task for job in plan}
     parameters = {text: json.loads(text) for text in runs.parameters.unique()}
-    best = {name: each.reward for name, each in best_known(runs, tasks.values()).items()}
+    best = {name: each.reward for name, each in optima.items()}
     rows = [
         {
             **parameters[text],
@@ -164,10 +193,8 @@ class Study:
     """The cells of the suite, with the seed and the number of runs of each."""
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
-    runs: pd.DataFrame
-    """One row a run: rewards, hand sequences, what was spent (docs/results.md); of its task
-    ``family``, ``split``, ``goals`` (their number) and ``best_known``; its parameters by their
-    names; ``gap`` to the best known reward, as a share."""
+    stored: pd.DataFrame
+    """Runs as they are stored."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -190,6 +217,57 @@ class Study:
         """The declarations of the methods that were run, by id."""
         return {job.cell.method.name: job.cell.method for job in self.plan}
 
+    @cached_property
+    def optima(self) -> dict[str, BestKnown]:
+        """Best known reward by task, with the proven bound and where the reward comes from."""
+        return best_known(self.stored, self.tasks.values())
+
+    @cached_property
+    def runs(self) -> pd.DataFrame:
+        """A row for each run: rewards, hand sequences, what was spent (docs/results.md).
+
+        Of its task ``family``, ``split``, ``goals`` (their number) and ``best_known``; its
+        parameters by their names; ``gap`` to the best known reward, as a share.
+        """
+        return tidy(self.stored, self.tasks, self.optima)
+
+    @cached_property
+    def methods(self) -> pd.DataFrame:
+        """A row for each method with its setting, by its label, in the order of lists and figures.
+
+        The learner's conditions together are a row as well: EC1 on tasks for one arm and EC4 on
+        tasks for two. Columns:
+
+        - ``base``: id of the method without a setting;
+        - ``condition``: exploration condition of the learner; empty for other methods;
+        - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
+        - ``parts``: labels of the runs, of which the last that ran on a task counts there;
+        - ``title``: its name, the same wherever it is shown;
+        - ``algorithm``: what it is a form of;
+        - ``kind``: ``"learner"`` (the paper's, under its own conditions), ``"optimum search"``,
+          ``"no learning"`` (it makes trials without learning from them), or empty;
+        - ``information``: its use of the reward, one of three groups;
+        - ``built_in``: whether it is one of coartic's methods;
+        - ``stochastic``: whether the seed matters;
+        - ``headline``: whether it stands for its algorithm;
+        - ``under``: label of the method whose setting or ablation it is, if that ran as well;
+        - ``look``: colour and dash in figures.
+        """
+        return methods_of(self.cells.values(), self.declared)
+
+    @cached_property
+    def cells(self) -> dict[CellKey, CellRuns]:
+        """Runs by task and label (method with its setting), in the order of the plan."""
+        names = ["task", "method", "setting"]
+        runs = self.runs.copy(deep=False)
+        runs.attrs = {}  # which pandas copies with every column that is taken
+        groups = runs.groupby(names, sort=False).indices if len(runs) else {}
+        return {
+            (key[0], cell.label): CellRuns(*key, runs.iloc[groups.get(key, [])])
+            for cell in (job.cell for job in self.plan)
+            for key in [(cell.task.name, cell.method.name, cell.setting)]
+        }
+
     @cached
     def sequences(self, task: str) -> pd.DataFrame:
         """The corrective process alone on a task: a row for each hand sequence, best first.
@@ -205,19 +283,6 @@ class Study:
         rows = [(hands, trial.reward, trial.reason) for hands, trial in ranked]
         frame = pd.DataFrame(rows, columns=["hands", "reward", "reason"])
         return frame.astype({"reward": "Int64"})
-
-    @cached_property
-    def cells(self) -> dict[CellKey, CellRuns]:
-        """Runs by task and label (method with its setting), in the order of the plan."""
-        names = ["task", "method", "setting"]
-        runs = self.runs.copy(deep=False)
-        runs.attrs = {}  # which pandas copies with every column that is taken
-        groups = runs.groupby(names, sort=False).indices if len(runs) else {}
-        return {
-            (key[0], cell.label): CellRuns(*key, runs.iloc[groups.get(key, [])])
-            for cell in (job.cell for job in self.plan)
-            for key in [(cell.task.name, cell.method.name, cell.setting)]
-        }
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
@@ -259,7 +324,7 @@ class Study:
             on_task = [name for on, name in self.cells if on == task]
             asked = ("method", method, on_task) if on_task else ("task", task, self.tasks)
             raise CoarticError(f"{self.folder}: {unknown(*asked)}")
-        stored = self._movements("replay" if replay else "solution")
+        stored = self.movements("replay" if replay else "solution")
         ids = map(str, self.cells[task, method].good.run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
         executed = []
@@ -316,14 +381,16 @@ class Study:
             values[here] = SIGNATURES[name].each(executed)
         return values
 
-    @cached_property
-    def optima(self) -> dict[str, BestKnown]:
-        """Best known reward by task, with the proven bound and where the reward comes from."""
-        return best_known(self.runs, self.tasks.values())
+    @cached
+    def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
+        """Return a signature of the runs of a method on a task that have it, shape ``(n,)``."""
+        from coartic.analysis.signatures.measures import SIGNATURES
+
+        return SIGNATURES[name].of(self.executed(task, method, replay=replay))
 
     @cached
-    def _movements(self, part: str) -> dict[str, tuple[Movement, ...]]:
-        """Movements of a part of the runs that are executed, by their ids."""
+    def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
+        """Movements of the ``solution`` or ``replay`` of the runs that are executed, by run id."""
         with open_store(self.folder) as store:
             return store.movements(part, self.tasks, MOST_EXECUTED)
 

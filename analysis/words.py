@@ -79,6 +79,11 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
+def percent(share: float) -> str:
+    """Return a share in per cent with one decimal."""
+    return f"{number(100 * share, 1)} %"
+
+
 def estimate(value: Estimate, digits: int | None = None) -> str:
     """``2.1 % [1.3, 2.9]`` with its unit; without the brackets where there is no interval."""
     return f"{number(value.value, digits)} {in_brackets(value.low, value.high, digits)}".strip()

@@ -21,7 +21,7 @@ from scipy import stats
 from coartic.analysis import fill_page, mean_beyond
 from coartic.analysis.claims.judgements import CLAIMS
 from coartic.analysis.claims.judging import Verdict
-from coartic.analysis.methods import name_of
+from coartic.analysis.methods import title_of
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
@@ -118,10 +118,10 @@ def filled_pages() -> dict[str, str]:
 
     A page that has the name of a suite waits until something of that suite is stored.
     """
-    published = ANALYSIS / "topics" / "published.toml"
+    published = ANALYSIS / "published.toml"
     values = {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "seen": seen,
-        "name_of": name_of, "p_of_shares": p_of_shares, "p_above": p_above,
+        "title_of": title_of, "p_of_shares": p_of_shares, "p_above": p_above,
         "published": tomllib.loads(published.read_text("utf-8"))["general"],
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
         "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),

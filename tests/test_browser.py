@@ -5,11 +5,10 @@ import re
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from coartic.analysis.methods import name_of
 from coartic.analysis.sections import TABLES
+from coartic.analysis.sections.coarticulation import shared_goal
+from coartic.analysis.sections.ranking import differences
 from coartic.analysis.study import typical_run
-from coartic.analysis.topics.coarticulation import shared_goal
-from coartic.analysis.topics.ranking import differences
 
 pytestmark = pytest.mark.browser
 
@@ -96,8 +95,9 @@ def test_a_table_is_copied_for_a_spreadsheet_and_two_methods_are_compared(opened
     page.get_by_text("rows are in the clipboard").wait_for()
     lines = page.evaluate("navigator.clipboard.readText()").split("\n")
     rows = [line.split("\t") for line in lines]
-    table = TABLES["ranking"](traced)
-    assert [row[0] for row in rows[1:]] == [name_of(method) for method in table.method]
+    methods, table = traced.methods, TABLES["ranking"](traced)
+    table = table[table.method.map(methods.under) == ""]  # settings are folded
+    assert [row[0] for row in rows[1:]] == [methods.title[method] for method in table.method]
     assert rows[0][1].startswith("gap")
     assert [float(row[1].split()[0]) for row in rows[1:] if row[1] != "–"] == pytest.approx(
         list(100 * table.gap.dropna()), abs=0.05

@@ -12,17 +12,12 @@ import pytest
 
 from coartic import corrective_trial, load_task
 from coartic.analysis.claims.claim import Claim, Higher, all_higher
-from coartic.analysis.claims.judgements import (
-    CLAIMS,
-    counts,
-    judge_claims,
-    judgements,
-    verdicts_in_words,
-)
+from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.paper import CLAIMS_OF_THE_PAPER, shortest_reach, some_of
 from coartic.analysis.claims.reader import Measurement, MissingError
 from coartic.analysis.sections import TABLES
+from coartic.analysis.sections.claims import counts, verdicts_in_words
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study

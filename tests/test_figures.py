@@ -7,10 +7,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from coartic import drawing, load_task
-from coartic.analysis.figures.style import looks
-from coartic.analysis.methods import KNOWN_METHODS, name_of
+from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
-from coartic.analysis.topics.learning import learning_curves
+from coartic.analysis.sections.learning import learning_curves
+from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, ROOT, cells_of, run_and_write
 
 
@@ -51,15 +51,15 @@ def test_learning_curves_against_a_loop(traced):
     for key, rows in data.groupby(["task", "method"]):
         runs = [rewards[run_id] for run_id in traced.cells[key].good.run_id]
         assert rows.trial.iloc[[0, -1]].tolist() == [1, 150]
-        for row in rows.itertuples():
-            best = sorted(np.nanmax(run[: row.trial]) for run in runs)
-            assert row.best == pytest.approx(np.mean(best))
+        for point in rows.itertuples():
+            best = sorted(np.nanmax(run[: point.trial]) for run in runs)
+            assert point.best == pytest.approx(np.mean(best))
             # Quartiles of four runs lie a quarter of the way from the inner to the outer ones.
-            assert row.best_low == pytest.approx(best[0] + 0.75 * (best[1] - best[0]))
-            assert row.best_high == pytest.approx(best[3] - 0.75 * (best[3] - best[2]))
-            spread += row.best_low < row.best_high
-            last = np.concatenate([run[max(row.trial - 100, 0) : row.trial] for run in runs])
-            assert row.trials == pytest.approx(np.nanmean(last))
+            assert point.best_low == pytest.approx(best[0] + 0.75 * (best[1] - best[0]))
+            assert point.best_high == pytest.approx(best[3] - 0.75 * (best[3] - best[2]))
+            spread += point.best_low < point.best_high
+            last = np.concatenate([run[max(point.trial - 100, 0) : point.trial] for run in runs])
+            assert point.trials == pytest.approx(np.nanmean(last))
     assert spread > 100
 
 
@@ -79,12 +79,16 @@ def test_published_differences(tmp_path):
 
 
 def test_names_and_looks_tell_methods_apart():
-    assert len({name_of(label) for label in KNOWN}) == len(KNOWN)
-    drawn = [name for name, row in KNOWN_METHODS.items() if row.look]
-    assert len(set(map(str, looks(drawn).values()))) == len(drawn)
-    learner = "dual-process/EC4"
-    assert looks(["mine", learner])[learner] == looks([learner])[learner]
-    both = looks(["mine", "theirs", "hill-climbing"])
-    assert len(set(map(str, both.values()))) == 3
-    built_in = {look["color"] for look in looks(drawn).values()}
-    assert not built_in & {both[name]["color"] for name in ("mine", "theirs")}
+    """The same looks whatever methods from files are there, which are brown."""
+    assert len({title_of(method) for method in KNOWN}) == len(KNOWN)
+    fixed = [method for method, known in KNOWN_METHODS.items() if known.look]
+    alone, both = (
+        study_of([row(method, -300, task="ascending") for method in methods]).methods.look
+        for methods in ([*KNOWN_METHODS], ["mine", *KNOWN_METHODS, "theirs"])
+    )
+    assert len({*alone[fixed]}) == len(fixed)
+    assert both[[*KNOWN_METHODS]].equals(alone)
+    brown = {color for color, _ in both[["mine", "theirs"]]}
+    assert brown == {"brown"}
+    assert not brown & {color for color, _ in alone}
+    assert both["mine"] != both["theirs"]

@@ -13,10 +13,9 @@ from coartic.analysis.claims.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics import instances
-from coartic.analysis.study import tidy
 from coartic.analysis.words import p_value
 from coartic.benchmarks import run_suite
-from tests.support.made_up import plan_for, row
+from tests.support.made_up import row, study_of
 
 
 @pytest.mark.parametrize("module", [context_tests, frames, instances, judging, pages])
@@ -219,10 +218,10 @@ def test_one_task_refutes_no_claim():
 
 def test_runs_with_another_base_have_no_gap():
     """They solve another task, and may better the best known of this one."""
-    rows = [row("one", -300, task="ascending"),
-            row("one", -250, task="ascending", run=1, parameters='{"base": ""}')]  # fmt: skip
-    runs = pd.DataFrame(rows).astype({"proven_bound": "Int64"})
-    tidied = tidy(runs, plan_for([coartic.load_task("ascending")], runs))
+    tidied = study_of([
+        row("one", -300, task="ascending"),
+        row("one", -250, task="ascending", run=1, parameters='{"base": ""}'),
+    ]).runs  # fmt: skip
     assert tidied.best_known.tolist() == [-292, pd.NA]
     assert tidied.gap.tolist() == pytest.approx([8 / 292, np.nan], nan_ok=True)
     assert frames.ranking(tidied).gap.tolist() == pytest.approx([8 / 292])

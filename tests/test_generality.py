@@ -12,14 +12,13 @@ from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, RANDOM_SEARCH
 from coartic.analysis.report import about
+from coartic.analysis.sections import random_tasks
+from coartic.analysis.sections.random_tasks import solved
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.study import one_by_one
-from coartic.analysis.topics import random_tasks
-from coartic.analysis.topics.instances import best_of_instances, solved
-from coartic.analysis.topics.random_search import signature_of
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
-from tests.support.made_up import made, row, study_of
+from tests.support.made_up import MadeUp, made, row, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 FEW = (*ONE, "two-armed/v1", "long/v1")
@@ -75,7 +74,7 @@ RISING = {INITIAL: ALONE, EC1: -540, EC2: -560, EC3: -550, EC4: -540}
 def on(study, name, label):
     """Gaps of a method on an instance, to the best known and to the bound."""
     rows = solved(study)
-    rows = rows[(rows.task == name) & (rows.label == label)]
+    rows = rows[(rows.task == name) & (rows.method == label)]
     return (rows.gap.item(), rows.to_bound.item()) if len(rows) else None
 
 
@@ -84,10 +83,10 @@ def test_gaps_are_between_the_best_known_and_the_bound():
     name = "two-armed/v1/i000"
     gap, to_bound = on(study, name, EC4)
     assert (gap.mean(), to_bound.mean()) == pytest.approx((40 / 500, 90 / 450))
-    assert not best_of_instances(study)[name].proven
-    assert best_of_instances(study)["two-armed/v1/i001"].proven
+    assert not study.optima[name].proven
+    assert study.optima["two-armed/v1/i001"].proven
     assert on(study, name, EC1) is None
-    assert (on(study, name, "learner")[0] == gap).all()
+    assert (on(study, name, "dual-process (EC1, EC4)")[0] == gap).all()
     assert list(solved(study).family.unique()) == [*ONE, *TWO]
 
 
@@ -120,11 +119,10 @@ def made_up_signatures(study, hand=1.0, idle=0.3, of_random_search=0.5):
 
 def with_signatures(study, **values):
     """A study whose runs are not executed: their signatures are made up."""
-    for cell, of_cell in made_up_signatures(study, **values).items():
-        for name in SIGNATURES:
-            made_up = signature_of.__wrapped__, (name, *cell), ()
-            study._computed[made_up] = of_cell.get(name, np.empty(0))
-    return study
+    by_cell = made_up_signatures(study, **values)
+    signatures = {(name, *cell): of_cell.get(name, np.empty(0))
+                  for cell, of_cell in by_cell.items() for name in SIGNATURES}  # fmt: skip
+    return MadeUp(study, **vars(study), signature_of=made(signatures))
 
 
 def test_claims_of_generality(monkeypatch):
@@ -156,17 +154,17 @@ def test_claims_of_generality(monkeypatch):
 
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
-    study = with_signatures(
-        rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8), of_random_search=0.1
-    )
+    rewards = rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8)
+    study = with_signatures(rewards, of_random_search=0.1)
 
     def verdict(more):
-        for task, label in study.cells:
-            if label in (EC2, EC4):
-                shift = (more + 0.01 * int(task[-1])) * (label == EC4)
-                made_up = signature_of.__wrapped__, ("hand", task, label), ()
-                study._computed[made_up] = np.array([0.4, 0.6]) + shift
-        return judge_claims(study, [CLAIMS["hand-coarticulation-in-general"]]).verdict.iloc[0]
+        def signature_of(name, task, label, *, replay=False):
+            if label not in (EC2, EC4):
+                return study.signature_of(name, task, label)
+            return np.array([0.4, 0.6]) + (more + 0.01 * int(task[-1])) * (label == EC4)
+
+        seen = MadeUp(study, **vars(study) | {"signature_of": signature_of})
+        return judge_claims(seen, [CLAIMS["hand-coarticulation-in-general"]]).verdict.iloc[0]
 
     assert [verdict(more) for more in (0.1, -0.2, -0.02)] == [
         "supported", "not supported", "undecided",

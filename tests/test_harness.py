@@ -17,8 +17,8 @@ from coartic import (
     execute,
     load_task,
 )
+from coartic.analysis.sections.rewards import beside_paper
 from coartic.analysis.study import load
-from coartic.analysis.topics.rewards import beside_paper
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry

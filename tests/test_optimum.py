@@ -137,18 +137,19 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
 
 def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
     """Also of runs that are no search; not of another base, and not of one method alone."""
+    search = "optimum/branch-and-bound"
     drawn, own = "one-armed/v1/i901", load_task("ascending").model_copy(update={"radius": 0.2})
     tasks = [*map(load_task, ("ascending", "descending", "two-armed-2", drawn))]
     tasks += [own.model_copy(update={"name": name}) for name in ("mine", "yours", "still", "free")]
     rows = [
-        ("ascending", "optimum/a", "", -290, -280, {}),
+        ("ascending", search, "", -290, -280, {}),
         ("ascending", "other", "", -200, None, {"base": ""}),  # another task
         ("descending", "other", "", -309, None, {}),
-        (drawn, "optimum/a", "", -300, -250, {}), (drawn, "other", "", -290, None, {}),
-        ("mine", "optimum/a", "", -290, -280, {}), ("mine", "other", "b=2", -288, None, {}),
+        (drawn, search, "", -300, -250, {}), (drawn, "other", "", -290, None, {}),
+        ("mine", search, "", -290, -280, {}), ("mine", "other", "b=2", -288, None, {}),
         ("yours", "other", "", -290, None, {}),  # to be compared with itself
-        ("still", "optimum/a", "other_arm=still", -290, -285, {"other_arm": "still"}),
-        ("still", "optimum/a", "", -290, -280, {}),
+        ("still", search, "other_arm=still", -290, -285, {"other_arm": "still"}),
+        ("still", search, "", -290, -280, {}),
         ("free", "one", "", -301, None, {}), ("free", "one", "b=2", -300, None, {}),
     ]  # fmt: skip
     columns = ["task", "method", "setting", "reward", "proven_bound", "parameters"]
@@ -160,12 +161,12 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
     best = optima.best_known(runs, tasks)
     shipped = {name: best_shipped(load_task(name)) for name in ("descending", "two-armed-2")}
     assert {name: (b.reward, b.bound, b.source, b.run_id) for name, b in best.items()} == {
-        "ascending": (-290, -292, "optimum/a", "run-0"),
+        "ascending": (-290, -292, search, "run-0"),
         "descending": (shipped["descending"].reward, shipped["descending"].bound, "shipped", ""),
         "two-armed-2": (shipped["two-armed-2"].reward, shipped["two-armed-2"].bound, "shipped", ""),
         drawn: (-290, -250, "other", "run-4"),
         "mine": (-288, -280, "other b=2", "run-6"),
-        "still": (-290, -280, "optimum/a other_arm=still", "run-8"),
+        "still": (-290, -280, f"{search} other_arm=still", "run-8"),
         "free": (-300, None, "one b=2", "run-11"),
     }
     assert [name for name, each in best.items() if each.only_here] == ["free"]

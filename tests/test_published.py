@@ -4,7 +4,7 @@ import pytest
 
 from coartic import PAPER, Robot, corrective_trial, hand_sequences, load_task
 from coartic.analysis.claims.judgements import CLAIMS
-from coartic.analysis.topics.published import (
+from coartic.analysis.published import (
     ENTRIES,
     RUNS,
     published_cell,

@@ -10,8 +10,9 @@ import pytest
 from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task
+from coartic.analysis import random_search
 from coartic.analysis.methods import EC1, RANDOM_SEARCH
-from coartic.analysis.sections import TABLES
+from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.signatures import context_tests, measures
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
 from coartic.analysis.signatures.measures import SIGNATURES, as_in_isolation
@@ -22,7 +23,6 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.topics import coarticulation, random_search
 from coartic.robot import HANDS
 from tests.support.made_up import made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task

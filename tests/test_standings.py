@@ -10,16 +10,14 @@ import pytest
 from scipy import stats
 
 from coartic import Task, load_task
-from coartic.analysis import frames
+from coartic.analysis import standings
+from coartic.analysis.method_frame import BY_TRIAL, WITHOUT_REWARD
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about
 from coartic.analysis.report.render import columns_of
-from coartic.analysis.sections import FIGURES, TABLES
+from coartic.analysis.sections import FIGURES, TABLES, costs, own, ranking
+from coartic.analysis.sections.rewards import changed_hands
 from coartic.analysis.statistics import running_times
-from coartic.analysis.topics import costs, own, ranking, scores
-from coartic.analysis.topics.ranking import leaders, paired_difference
-from coartic.analysis.topics.rewards import changed_hands
-from coartic.analysis.topics.scores import BY_TRIAL
 from coartic.estimates import RESAMPLES, SEED
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
@@ -37,7 +35,7 @@ def study(rewards):
 def test_targets_lie_between_the_initial_solution_and_the_best_known():
     seen = study({("two-armed-1", "dual-process/EC2"): [-520]})
     assert costs.spans(seen) == {"two-armed-1": (-675.0, -465)}
-    assert frames.gaps(scores.scores(seen)).tolist() == pytest.approx([(520 - 465) / 465])
+    assert seen.runs.gap.tolist() == pytest.approx([(520 - 465) / 465])
 
 
 def test_which_tasks_are_ranked_does_not_depend_on_the_corrective_process():
@@ -71,7 +69,7 @@ def test_on_one_task_intervals_are_of_the_gaps_themselves():
     ends = stats.bootstrap((gap,), np.mean, n_resamples=9_999, rng=np.random.default_rng(SEED))
     low, high = ends.confidence_interval
     assert high - gap.mean() > 1.3 * (gap.mean() - low) > 0
-    table = ranking.main_gaps(seen).set_index("method")[["gap", "gap_low", "gap_high"]]
+    table = standings.main_gaps(seen).set_index("method")[["gap", "gap_low", "gap_high"]]
     assert table.loc["dual-process/EC1"].tolist() == pytest.approx(
         [gap.mean(), low, high], rel=0.01
     )
@@ -83,10 +81,10 @@ def test_a_rank_counts_algorithms():
         (task, f"{method}-uncorrected"): rewards for (task, method), rewards in LEARNER.items()
     }
     seen = study(LEARNER | CMA | setting)
-    rows = leaders(seen, BY_TRIAL)
+    rows = standings.leaders(standings.main_gaps(seen), BY_TRIAL)
     assert rows.algorithm.tolist() == ["CMA-ES", "learner"]
     # Eight pairs, all in favour of the first: of 2^8 signs two are as extreme.
-    test = paired_difference(seen, *rows.method)
+    test = standings.paired_difference(seen, *rows.method, standings.common_tasks(seen))
     assert test.p == pytest.approx(2 / 2**8, abs=0.003)
 
 
@@ -102,7 +100,9 @@ def test_tasks_count_alike_in_a_paired_test():
     values = np.concatenate(parts)
     sums = [abs(values @ signs) for signs in itertools.product((1, -1), repeat=len(values))]
     p = np.mean(np.array(sums) >= abs(values.sum()) - 1e-12)
-    assert paired_difference(seen, "mine", "yours").p == pytest.approx(p)
+    assert standings.paired_difference(
+        seen, "mine", "yours", standings.common_tasks(seen)
+    ).p == pytest.approx(p)
 
 
 def test_two_methods_differ_by_the_difference_of_their_gaps():
@@ -112,7 +112,7 @@ def test_two_methods_differ_by_the_difference_of_their_gaps():
     seen = study(TEN | plan)
     declared = replace(seen.declared["my-plan"], stochastic=False)
     seen.declared["my-plan"] = declared
-    rows = ranking.main_gaps(seen).set_index("method")
+    rows = standings.main_gaps(seen).set_index("method")
     both = "dual-process (EC1, EC4)"
     found = ranking.difference_of_gaps(seen, both, "my-plan")
     ends = rows.loc[both, ["gap", "gap_low", "gap_high"]] - rows.gap["my-plan"]
@@ -163,19 +163,21 @@ def test_who_tries_hands_alone_does_not_learn():
 def test_the_learner_stands_by_the_form_that_explores_most():
     better = {("two-armed-1", "dual-process/EC3"): [-470, -471, -470, -471]}
     seen = study(LEARNER | better)
-    assert ranking.main_gaps(seen).method.iloc[0] == "dual-process (EC1, EC3)"
-    assert leaders(seen, BY_TRIAL).method.tolist() == ["dual-process (EC1, EC4)"]
+    assert standings.main_gaps(seen).method.iloc[0] == "dual-process (EC1, EC3)"
+    assert standings.leaders(standings.main_gaps(seen), BY_TRIAL).method.tolist() == [
+        "dual-process (EC1, EC4)"
+    ]
 
 
 def test_a_method_that_makes_one_trial_does_not_use_its_reward():
     """The corrective process alone uses the reward of its only trial, and of every hand
     sequence."""
     alone = study({("ascending", "corrective-alone/given"): [-319]} | LEARNER)
-    assert scores.groups(alone)["corrective-alone/given"] == BY_TRIAL  # of ten trials
+    assert alone.methods.information["corrective-alone/given"] == BY_TRIAL  # of ten trials
     alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
     again = MadeUp(alone, optima=made_up_optima("ascending", "two-armed-1"))
-    assert scores.groups(again)["corrective-alone/given"] == scores.WITHOUT_REWARD
-    assert scores.groups(again)["dual-process (EC1, EC4)"] == BY_TRIAL
+    assert again.methods.information["corrective-alone/given"] == WITHOUT_REWARD
+    assert again.methods.information["dual-process (EC1, EC4)"] == BY_TRIAL
 
 
 def test_crossings_by_brute_force():
@@ -208,7 +210,7 @@ def test_a_failed_run_reaches_nothing():
     runs = seen.runs.assign(status=np.where(failed, "timeout", "ok"))
     runs["reward"] = runs.reward.mask(failed)
     again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
-    assert ranking.main_gaps(again).method.tolist() == [learner]
+    assert standings.main_gaps(again).method.tolist() == [learner]
     assert TABLES["against-learner"](again).empty
     assert TABLES["runtimes"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
     times = costs.times_of(again, again.cells["ascending", other], "solve_s")
@@ -219,8 +221,8 @@ def test_a_locked_base_is_another_problem():
     seen = study({("ascending", name): [-300] * 3 for name in ("dual-process/EC1", "mine")})
     locked = seen.runs.assign(parameters=np.where(seen.runs.method == "mine", '{"base": ""}', "{}"))
     again = study_of(locked, optima=seen.optima)
-    assert ranking.main_gaps(again).method.tolist() == ["dual-process/EC1"]
-    assert list(costs.cells_compared(again)) == ["dual-process/EC1"]
+    assert standings.main_gaps(again).method.tolist() == ["dual-process/EC1"]
+    assert list(costs.cells_with_targets(again)) == ["dual-process/EC1"]
 
 
 SPREAD = np.array([0, 1, -1, 0, 1, -2, 0, 2, -1, 0])
@@ -265,7 +267,9 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     assert rows.least_p["ascending my-plan"] == pytest.approx(2 / 2**runs)
     row_of = TABLES["ranking"](seen).loc["my-plan"]
     both = "dual-process (EC1, EC4)"
-    test = paired_difference(seen, "my-plan", both)  # with every run
+    test = standings.paired_difference(
+        seen, "my-plan", both, standings.common_tasks(seen)
+    )  # with every run
     assert test.least_p == pytest.approx(max(2 / 4**runs, 2 / (1 + RESAMPLES)))
     expected = (2, 0) if runs == 10 else (math.nan, math.nan)
     assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
@@ -283,11 +287,13 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     assert ranked.loc["mine", ["on ascending", "on two-armed-1"]].tolist() == pytest.approx(
         [3.5 / 293, 15 / 480]
     )
-    assert columns_of(ranked)["gap"].startswith("gap to the best of this folder (%)")
+    assert columns_of(TABLES["ranking"], ranked)["gap"].startswith(
+        "gap to the best of this folder (%)"
+    )
     plot, sentence = FIGURES["ranking"](unknown), ranking.nearest(unknown)
     assert "best of folder" in plot.figure.axes[0].get_xlabel()
     assert sentence.startswith("The learner comes nearest to the best of this folder (1.6 %).")
-    for words in (sentence, plot.alt, *columns_of(ranked).values()):
+    for words in (sentence, plot.alt, *columns_of(TABLES["ranking"], ranked).values()):
         assert not re.search("optimum|known", words)
     assert "Two-armed 1 † is known: gaps there are" in about.notes_of(unknown, ranked)[0]
     assert TABLES["tasks"](unknown).source.tolist() == ["mine", "dual-process/EC4"]
@@ -317,16 +323,14 @@ def test_the_ranking_figure_names_every_method_inside():
 def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
     rewards = LEARNER | CMA | {("two-armed-2", "mine"): [-310, -308]}
     seen = study(rewards)
-    assert scores.common_tasks(MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))) == [
-        "ascending", "two-armed-1"
-    ]  # fmt: skip
     optima = made_up_optima("ascending", "two-armed-1")
+    assert standings.common_tasks(MadeUp(seen, optima=optima)) == ("ascending", "two-armed-1")
     alone = own.own_in_words(MadeUp(seen, optima=optima))
     assert alone == "mine is the only method on Two-armed 2 †: name others, too."
     both = study(rewards | {("two-armed-2", "theirs"): [-300]})
     optima |= {"two-armed-2": BestKnown(-300, None, only_here=True)}
     both = MadeUp(both, optima=optima)
-    assert scores.common_tasks(both) == ["ascending", "two-armed-1"]
+    assert standings.common_tasks(both) == ("ascending", "two-armed-1")
     first, *others = own.own_in_words(both).split("\n")
     assert first == "theirs ran on 1 of 3 tasks: gap of 0.0 % there."
     assert others[1].startswith("Gap of mine to the best of this folder on Two-armed 2 †: 3.0 %.")
@@ -347,7 +351,7 @@ def test_what_a_method_did_not_run_on_is_said():
     texts = [text.get_text() for text in FIGURES["ranking"](seen).figure.axes[0].texts]
     assert any("mine (1 of 2 tasks)" in text for text in texts)
     assert ranking.nearest(seen).startswith("CMA-ES comes nearest of the two that learn (0.4 %)")
-    cells = costs.cells_compared(seen)
+    cells = costs.cells_with_targets(seen)
     assert [cell.task for cell in cells["mine"]] == ["ascending"]
     assert len(cells["cma-es/bandit"]) == 2
 
@@ -407,15 +411,15 @@ def test_on_one_task_a_method_stands_beside_the_learners_reward():
 
 
 def test_a_method_from_a_file_stands_with_its_parameters():
-    """In ranking, tests and headline; a setting of a built-in method is not compared."""
-    rewards = TEN | strangers(("mine", 2), ("hill-climbing", 5), runs=10)
+    """In ranking, tests and sentence, as a setting of a built-in method without its defaults."""
+    rewards = TEN | strangers(("mine", 2), ("hill-climbing", -5), runs=10)
     seen = study(rewards)
     learns = seen.runs.method.str.contains("/EC")
     runs = seen.runs.assign(setting=np.where(learns, "", "width=0.2"))
     again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
     ranked = TABLES["ranking"](again)
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
-    assert not any("climbing" in name for name in ranked.index)
+    assert "hill-climbing width=0.2" in ranked.index
     assert ranked.better["mine width=0.2"] == 2
     assert own.own_in_words(again).startswith("mine (width=0.2): gap of 3.5 %, better than the")
     assert "as its author declares" in ranking.nearest(again)

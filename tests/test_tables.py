@@ -11,11 +11,10 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
+from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL
 from coartic.analysis.report.render import latex_table
-from coartic.analysis.sections import FIGURES, TABLES
-from coartic.analysis.topics import costs
-from coartic.analysis.topics.scores import BY_FORMULA, BY_TRIAL
-from coartic.analysis.topics.tasks import how_long
+from coartic.analysis.sections import FIGURES, TABLES, costs
+from coartic.analysis.sections.tasks import how_long
 from tests.support.made_up import made_up_optima, row, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
@@ -186,7 +185,7 @@ def test_tasks_of_one_title_have_their_names_besides():
     assert [task.label for task in seen.tasks.values()] == names
     for table in ("tasks", "methods"):
         assert TABLES[table](seen).task.tolist() == names
-    latex = latex_table(TABLES["tasks"](seen), "tasks", "Tasks")
+    latex = latex_table(TABLES["tasks"], TABLES["tasks"](seen), "Tasks")
     assert all(name in latex for name in names)
     titles = [axes.get_title(loc="left") for axes in FIGURES["tasks"](seen).figure.axes]
     assert [title[3:].replace("\n", " ").strip() for title in titles if title] == names

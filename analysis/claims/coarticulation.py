@@ -9,12 +9,11 @@ from functools import partial
 import numpy as np
 from scipy import stats
 
-from coartic.analysis import methods
 from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, Higher, all_higher
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.signatures.context_tests import posture_difference_below
 from coartic.analysis.signatures.measures import ticks_slower
 from coartic.analysis.signatures.two_contexts import TwoContexts
@@ -39,7 +38,7 @@ def first_movement_sacrificed(read: Reader) -> Finding:
         first = read.signature("first", task, EC1)
         comparisons += [
             Higher(first, by=margins.TICKS),
-            Higher(first, read.signature("first", task, RANDOM_SEARCH)),
+            Higher(first, read.signature_of_random_search("first", task)),
             Higher(first, read.signature("first", task, EC1_BY_SUBTASK)),
             Higher(read.signature("whole", task, EC1)),
         ]
@@ -50,7 +49,7 @@ def first_movement_sacrificed(read: Reader) -> Finding:
 def posture_depends_on_context(read: Reader) -> Finding:
     """Postures at goal 1 depend on the goal that follows, more than in random search."""
     contexts, replayed = contexts_of(read, EC1), contexts_of(read, EC1, replay=True)
-    equivalent, other = contexts.parts
+    (equivalent, other), titles = contexts.parts, read.study.methods.title
     parts = [
         f"posture difference at goal 1 {number(contexts.posture_difference, 2)}, standardised "
         f"{number(contexts.standardised_posture_difference, 1)} pooled SD; per dimension "
@@ -70,13 +69,11 @@ def posture_depends_on_context(read: Reader) -> Finding:
         beyond = replace(test, value=more, n=(contexts.n, compared.n))
         tests.append(replace(beyond, p=contexts.p_beyond(compared)))
         against.append(replace(beyond, value=-more, p=compared.p_beyond(contexts)))
-        parts.append(
-            f"{methods.name_of(compared.method)}: {number(compared.posture_difference, 2)}"
-        )
-    for label in ("posture-based/one-goal", methods.INITIAL):  # which look at the current goal
+        parts.append(f"{titles[compared.method]}: {number(compared.posture_difference, 2)}")
+    for label in ("posture-based/one-goal", INITIAL):  # which look at the current goal
         with suppress(MissingError):
             posture_difference = contexts_of(read, label).posture_difference
-            parts.append(f"{methods.name_of(label)}: {number(posture_difference, 2)}")
+            parts.append(f"{titles[label]}: {number(posture_difference, 2)}")
     holds = contexts.standardised_posture_difference > margins.SPREAD and all(
         each.value > 0 for each in tests
     )
@@ -113,7 +110,7 @@ def arm_coarticulation(read: Reader) -> Finding:
             arm = read.signature("arm", task, label)
             comparisons += [
                 Higher(arm, by=margins.TICKS),
-                Higher(arm, read.signature("arm", task, RANDOM_SEARCH)),
+                Higher(arm, read.signature_of_random_search("arm", task)),
             ]
             if label == EC4:
                 comparisons.append(Higher(arm, read.signature("arm", task, EC4_BY_SUBTASK)))
@@ -125,7 +122,8 @@ def other_arm_coarticulation(read: Reader) -> Finding:
     """The idle arm brings its hand nearer to its next goal."""
     arm = read.signature("other arm", TASK_1, EC4)
     others = [
-        read.signature("other arm", TASK_1, label) for label in (RANDOM_SEARCH, EC4_BY_SUBTASK)
+        read.signature_of_random_search("other arm", TASK_1),
+        read.signature("other arm", TASK_1, EC4_BY_SUBTASK),
     ]
     shown = [
         partial(read.signature, "other arm", TASK_1, EC4, replay=True),
@@ -167,7 +165,7 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
             better = estimate(difference_of_means(rewards[does], rewards[~does]), 1)
             parts[-1] += f", which end with {better} ticks more reward than the others"
     parts.append(
-        f"{methods.name_of(label_of_random_search)}: {of_random_search.sum()} of "
+        f"{read.study.methods.title[label_of_random_search]}: {of_random_search.sum()} of "
         f"{len(of_random_search)} runs"
     )
     best = min(tests, key=lambda test: (test.value <= 0, test.p))

@@ -12,17 +12,17 @@ from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_
 from coartic.analysis.claims.judging import Finding, all_of, mean_beyond
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import (
+    CONDITION_OF,
     EC1,
     EC2,
     EC3,
     EC4,
-    LEARNER,
     LEARNERS,
     RANDOM_SEARCH,
     most_exploring,
 )
 from coartic.analysis.optima import BestKnown
-from coartic.analysis.topics.instances import best_of_instances
+from coartic.analysis.standings import best_of_instances
 from coartic.analysis.words import estimate
 from coartic.estimates import FEWEST, mean
 
@@ -77,17 +77,22 @@ def earns_more(families: Sequence[str], *pairs: tuple[str, str]) -> Callable[[Re
     """Judges whether the first of each pair of methods earns more."""
 
     def comparing(first: str, second: str) -> Comparing:
-        words = f" {first.removeprefix(LEARNER)} > {second.removeprefix(LEARNER)}"
-        return words, lambda read, task: Higher(read.reward(task, first), read.reward(task, second))
+        words = " > ".join(CONDITION_OF.get(label, label) for label in (first, second))
+        return f" {words}", lambda read, task: Higher(
+            read.reward(task, first), read.reward(task, second)
+        )
 
     return partial(in_every_family, families, [comparing(*pair) for pair in pairs])
 
 
 def shows(signature: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
-    """A signature of the learner that explores most, alone or beside that of another method."""
+    """A signature of the learner that explores most, alone or beside the signature of another
+    condition or of random search."""
 
     def compare(read: Reader, task: str) -> Higher:
         first = read.signature(signature, task, most_exploring(read.task(task)))
+        if beyond == RANDOM_SEARCH:
+            return Higher(first, read.signature_of_random_search(signature, task), by)
         return Higher(first, read.signature(signature, task, beyond) if beyond else None, by)
 
     return f", more than {who_is(beyond)}" if beyond else "", compare

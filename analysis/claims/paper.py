@@ -27,9 +27,9 @@ from coartic.analysis.claims.coarticulation import (
 from coartic.analysis.claims.judging import Finding, all_of
 from coartic.analysis.claims.reader import Measurement, MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4
+from coartic.analysis.published import published_cell
 from coartic.analysis.signatures.two_contexts import movable
 from coartic.analysis.statistics.hypotheses import bootstrap_test, share_test
-from coartic.analysis.topics.published import published_cell
 from coartic.analysis.words import tally
 from coartic.estimates import SEED, Estimate
 from coartic.learner.kernel import TENTHS

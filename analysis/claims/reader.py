@@ -10,20 +10,12 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.methods import LEARNER, RANDOM_SEARCH, RANDOM_SEARCHES, name_of
+from coartic.analysis.methods import CONDITION_OF, RANDOM_SEARCH, title_of
+from coartic.analysis.published import Summary, published_alone, published_cell
+from coartic.analysis.random_search import most_of_random_search, random_search_on
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.study import CellKey, Study
-from coartic.analysis.topics.published import (
-    Summary,
-    published_alone,
-    published_cell,
-)
-from coartic.analysis.topics.random_search import (
-    most_of_random_search,
-    random_search_on,
-    signature_of,
-)
 from coartic.analysis.words import estimate, number
 from coartic.estimates import FEWEST, mean
 from coartic.learner.learning import TRIALS
@@ -97,7 +89,7 @@ class Reader:
                 "the mean of the others would mislead"
             )
         runs = cell.good
-        if label.startswith((LEARNER, *RANDOM_SEARCHES)):
+        if self.study.methods.algorithm[label] in ("learner", "random search"):
             trials = sorted(cell.runs.trials.unique())
             if trials != [TRIALS]:
                 raise MissingError(
@@ -121,8 +113,7 @@ class Reader:
     def reward(self, task: str, label: str) -> Measurement:
         """Rewards of the best trials; of a method that draws nothing its one reward."""
         rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
-        method = self.study.cells[task, label].method
-        if not self.study.declared[method].stochastic:
+        if not self.study.methods.stochastic[label]:
             rewards = np.array(rewards.mean())
         return Measurement(task, who_is(label), rewards, published=published_reward(task, label))
 
@@ -156,24 +147,26 @@ class Reader:
         return Measurement(task, "best", np.array(np.nanmax(rewards)), published=published)
 
     def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
-        """A signature of coarticulation, of the runs that have one.
+        """A signature of coarticulation, of the runs that have one."""
+        self.runs(task, label)
+        values = self.study.signature_of(name, task, label, replay=replay)
+        return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
-        Of random search, that of the width and hands that show most of it on the task, or in the
-        family.
-        """
-        signature, words = SIGNATURES[name], SIGNATURES[name].words
-        for each in (label, *(self.random_search(task) if label == RANDOM_SEARCH else ())):
-            self.runs(task, each)
-        if replay:
-            values = signature.of(self.study.executed(task, label, replay=True))
-            words = f"in noiseless replays, {words}"
-        elif label == RANDOM_SEARCH:
-            values = most_of_random_search(self.study, name, task)
-        else:
-            values = signature_of(self.study, name, task, label)
+    def signature_of_random_search(self, name: str, task: str) -> Measurement:
+        """A signature of the random search, of all widths and hands, that shows most of it on the
+        task, or in the family."""
+        for label in self.random_search(task):
+            self.runs(task, label)
+        values = most_of_random_search(self.study, name, task)
+        return self.shown(name, task, RANDOM_SEARCH, values)
+
+    def shown(
+        self, name: str, task: str, label: str, values: Array, words: str = ""
+    ) -> Measurement:
+        """A signature with its words. Raises MissingError where no run has it."""
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
-        return Measurement(task, who_is(label), values, words)
+        return Measurement(task, who_is(label), values, words + SIGNATURES[name].words)
 
     def random_search(self, task: str) -> list[str]:
         """Labels of the settings of random search that solved a task."""
@@ -198,7 +191,7 @@ class Reader:
 
 def who_is(label: str) -> str:
     """A method as evidence names it: the learner by its condition."""
-    return label.removeprefix(LEARNER) if label.startswith(LEARNER) else name_of(label)
+    return CONDITION_OF.get(label) or title_of(label)
 
 
 def in_words(published: Summary | None) -> str:
@@ -208,7 +201,7 @@ def in_words(published: Summary | None) -> str:
 
 def published_reward(task: str, label: str) -> str:
     """Mean reward of runs as the paper has it, in words; empty where it does not publish it."""
-    cell = published_cell(task, label.removeprefix(LEARNER))
+    cell = published_cell(task, CONDITION_OF.get(label, ""))
     return in_words((cell or {}).get(""))
 
 

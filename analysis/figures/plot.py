@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import wraps
 
@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 
 from coartic import Task
 from coartic.analysis.figures import style
-from coartic.analysis.methods import name_of
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
@@ -61,6 +60,7 @@ def figure(
         @wraps(draw)
         @style.styled
         def plot(study: Study) -> Plot | None:
+            check_study(study)
             if (parts := draw(study)) is None:
                 return None
             drawing, data, alt, tasks = parts
@@ -72,15 +72,14 @@ def figure(
     return as_figure
 
 
-def looks_in(study: Study, labels: Collection[str]) -> dict[str, style.Look]:
-    """The look of each method (:func:`~.style.looks`), the same in all figures of a study."""
-    return style.looks(labels, dict.fromkeys(label for _, label in study.cells))
+def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
+    """Return the look of the lines of each method, the same in all figures of a study."""
+    return {label: style.look_of(*study.methods.look[label]) for label in labels}
 
 
 def spoken(rows: pd.DataFrame, template: str) -> str:
-    """Each row in words, for an alternative text: names in ``{}`` are columns."""
-    named = rows.assign(method=rows.method.map(name_of))
-    return "; ".join(template.format_map(row) for row in named.to_dict("records"))
+    """Return each row in words, for an alternative text: names in ``{}`` are columns."""
+    return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 
 def picture(drawing: Figure, ending: str) -> bytes:

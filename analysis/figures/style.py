@@ -7,7 +7,7 @@ white. All are legible on white and on #111; dashes tell what colours tell.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
@@ -22,7 +22,6 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
-from coartic.analysis.methods import KNOWN_METHODS, is_built_in, look_alike
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -48,10 +47,9 @@ _COLORS = {
     "purple": "#cc79a7",
     "grey": "#7a7a7a",
     "ink": "#000000",
+    "brown": "#8c564b",
 }
-BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK = _COLORS.values()
-BROWN = "#8c564b"
-"""Of methods from files: no other has it."""
+BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK, _ = _COLORS.values()
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
 _DASHES: dict[str, Any] = {
     "solid": "-",
@@ -71,28 +69,9 @@ Look = dict[str, Any]
 """Looks of a method's lines: ``color`` and ``linestyle``."""
 
 
-def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]:
-    """The look of each method of a figure, the same in all figures of a report.
-
-    Built-in methods may have one of their own, the learner over all tasks that of its two-armed
-    condition. Methods from files are brown; more than four of them, and the others, get what is
-    free, in their order ``among`` the labels of the report.
-    """
-    every = dict.fromkeys([*among, *labels])
-    fixed = {}
-    for label in every:
-        row = KNOWN_METHODS.get(look_alike(label))
-        if row is not None and row.look is not None:
-            fixed[label] = {"color": _COLORS[row.look[0]], "linestyle": _DASHES[row.look[1]]}
-    dashes, colors = (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
-    pairs = [{"color": c, "linestyle": dash} for dash in dashes for c in colors]
-    free = itertools.cycle(look for look in pairs if look not in fixed.values())
-    theirs = itertools.chain([{"color": BROWN, "linestyle": dash} for dash in dashes], free)
-    given = {
-        label: fixed.get(label) or next(free if is_built_in(label) else theirs)
-        for label in sorted(every, key=is_built_in)
-    }
-    return {label: given[label] for label in dict.fromkeys(labels)}
+def look_of(color: str, dash: str) -> Look:
+    """Return the look of lines by the names of a colour and a dash."""
+    return {"color": _COLORS[color], "linestyle": _DASHES[dash]}
 
 
 def grid(panels: int) -> tuple[int, int]:

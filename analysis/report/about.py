@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from coartic.analysis.methods import LEARNER, LEARNERS
+from coartic.analysis.published import RUNS
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.topics.published import RUNS
 from coartic.analysis.words import NO_BREAK, listed, marked
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
@@ -71,9 +70,11 @@ def limits(study: Study) -> dict[str, Any]:
     """Facts that limit the conclusions from these runs."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
-    learners = [cell for cell in study.cells.values() if cell.method.startswith(LEARNER)]
+    algorithm, kind = study.methods.algorithm, study.methods.kind
+    learners = [cell for cell in study.cells.values() if algorithm[cell.label] == "learner"]
     trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
-    fewest = min((len(cell.runs) for cell in learners if cell.method in LEARNERS), default=RUNS)
+    papers = [len(cell.runs) for cell in learners if kind[cell.label] == "learner"]
+    fewest = min(papers, default=RUNS)
     tasks = list(one_by_one(study).values())
     optima = [(task, study.optima.get(task.name)) for task in tasks]
     reasons = Counter(map(str, failed.reason.dropna())).most_common(3)

@@ -22,20 +22,22 @@ from coartic.analysis.report.render import (
     IN_LATEX,
     MOST_ROWS,
     TONES,
+    classes_of,
     html_table,
     latex_table,
     table_csv,
 )
 from coartic.analysis.report.trace import stamp
 from coartic.analysis.sections import SECTIONS, TABLES, Section
+from coartic.analysis.sections.ranking import differences
 from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.ranking import differences
-from coartic.analysis.words import id_of, listed, number
+from coartic.analysis.table import Table
+from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
 HERE = Path(__file__).parent
-NO_PARTS: dict[str, Any] = {"rows": 0, "claims": [], "finding": [], "figure": None}
+NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "claims": [], "finding": [], "figure": None}
 """Parts of a section that failed."""
 
 
@@ -61,26 +63,26 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
     ):
         raise CoarticError(f"{folder} holds the report of other results: choose another folder")
     files = {"report.html": page(study, home).encode()}
-    sections = {id_of(section.table): section for section in SECTIONS}
-    for name in TABLES:
-        where = sections[name].short if name in sections else name
-        files |= about.attempt(study, where, partial(files_of_table, name, for_paper)) or {}
+    captions = {section.table.id: (section.short, section.caption) for section in SECTIONS}
+    for name, table in TABLES.items():
+        where, caption = captions.get(name, (name, ""))
+        make = partial(files_of_table, table, caption, for_paper)
+        files |= about.attempt(study, where, make) or {}
     for section in about.visible_sections(study) if for_paper else ():
         files |= about.attempt(study, section.short, partial(files_of_figure, section)) or {}
     publish(folder, files)
     return list(files)
 
 
-def files_of_table(name: str, for_paper: bool, study: Study) -> dict[str, bytes]:
+def files_of_table(table: Table, caption: str, for_paper: bool, study: Study) -> dict[str, bytes]:
     """Return a table as CSV, ``for_paper`` in LaTeX as well, by path; nothing without rows."""
-    frame = TABLES[name](study)
+    frame = table(study)
     if not len(frame):
         return {}
-    files = {f"tables/{name}.csv": table_csv(frame).encode()}
-    if for_paper and name in IN_LATEX and len(frame) <= MOST_ROWS:
-        (caption,) = (each.caption for each in SECTIONS if id_of(each.table) == name)
-        text = latex_table(frame, name, caption, about.notes_of(study, frame.columns))
-        files[f"tables/{name}.tex"] = text.encode()
+    files = {f"tables/{table.id}.csv": table_csv(frame).encode()}
+    if for_paper and table.id in IN_LATEX and len(frame) <= MOST_ROWS:
+        text = latex_table(table, frame, caption, about.notes_of(study, frame.columns))
+        files[f"tables/{table.id}.tex"] = text.encode()
     return files
 
 
@@ -115,16 +117,17 @@ def sections(study: Study) -> list[dict[str, Any]]:
 def parts_of(section: Section, study: Study) -> dict[str, Any]:
     """Return a section as the template wants it, with its ``finding`` and the number of ``rows`` of
     its table; ``figure`` is None where the runs do not allow it."""
-    name, frame, plot = id_of(section.table), section.table(study), plot_of(study, section)
+    table, frame, plot = section.table, section.table(study), plot_of(study, section)
     claims = frame.reset_index(names="id") if section.id == "claims" else pd.DataFrame()
     if len(claims):
         by_verdict = claims.verdict.map(get_args(Verdict).index)
         claims = claims.loc[by_verdict.sort_values(kind="stable").index]
     return {
         "claims": claims.to_dict("records"),
-        "table": name,
+        "table": table.id,
         "rows": len(frame),
-        "html": html_table(frame, name, section.caption) if len(frame) else "",
+        "settings": sum("setting" in names for names in classes_of(table, frame)),
+        "html": html_table(table, frame, section.caption) if len(frame) else "",
         "example": f"'{frame.index[0]}'" if len(frame) else "",
         "finding": about.finding(study, section),
         "figure": plot,

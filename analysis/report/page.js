@@ -39,7 +39,8 @@
 
   document.querySelectorAll("[data-table]").forEach((tools) => {
     const table = document.getElementById(tools.dataset.table);
-    const search = tools.querySelector("input");
+    const search = tools.querySelector("[type=search]");
+    const unfold = tools.querySelector("[type=checkbox]");
     const filter = tools.querySelector("select");
     const status = tools.querySelector("output");
     const show = () => {
@@ -48,7 +49,8 @@
       [...table.tBodies[0].rows].forEach((row) => {
         const text = row.textContent.toLowerCase();
         const wanted = !filter || !filter.value || row.dataset.verdict === filter.value;
-        row.hidden = !(wanted && words.every((word) => text.includes(word)));
+        const folded = unfold && !unfold.checked && !words.length && row.classList.contains("setting");
+        row.hidden = folded || !(wanted && words.every((word) => text.includes(word)));
         shown += !row.hidden;
       });
       status.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";
@@ -79,6 +81,7 @@
   const reveal = () => {
     const target = document.querySelector(":target");
     const folded = target && (target.querySelector("details") || target.closest("details"));
+    if (target) target.hidden = false;
     if (!folded) return;
     folded.open = true;
     target.scrollIntoView({ block: "center", inline: "start" });

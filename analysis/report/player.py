@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH, in_order, main_methods, name_of
+from coartic.analysis.methods import RANDOM_SEARCH
+from coartic.analysis.random_search import every_random_search_for
+from coartic.analysis.sections.coarticulation import shared_goal
+from coartic.analysis.sections.own import own_methods
+from coartic.analysis.standings import compared
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, typical_run
-from coartic.analysis.topics.coarticulation import shared_goal
-from coartic.analysis.topics.own import own_methods
-from coartic.analysis.topics.random_search import every_random_search_for
-from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS
 
@@ -55,10 +55,10 @@ def player(study: Study) -> str:
         page=None,
         first=begin,
         cells=[
-            (method, f"on {task}", {"preset": where[task], "who": label})
-            for method, labels in labels_by_task(study).items()
-            for task, label in labels.items()
-            if task in where and label in {run["id"] for run in alone[task]["runs"]}
+            (method, f"on {task}", {"preset": where[task], "who": cell.label})
+            for method, cells in compared(study).items()
+            for task, cell in cells.items()
+            if task in where and cell.label in {run["id"] for run in alone[task]["runs"]}
         ],
     )
 
@@ -82,18 +82,15 @@ def methods_played(
     which they share. Methods that follow paths are left out: the script moves straight. Of random
     search it has those with the label ``random_search``, which the script puts beside the
     others."""
-    labels = [label for name, label in study.cells if name == tasks[0]]
-    ranked = {label for labels in labels_by_task(study).values() for label in labels.values()}
-    shown = {*LEARNERS, *main_methods(labels), *ranked}
     runs = []
-    for label in in_order([label for label in labels if label in shown]):
+    for label in study.methods.index:
         played = random_search if label == RANDOM_SEARCH else label
         films = [film_of(study, (name, played)) for name in tasks]
         if all(films):
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
                     film["reached"] = study.configurations(name, played)[:, 0].round(3).tolist()
-            runs.append({"id": label, "name": name_of(played), "films": films})
+            runs.append({"id": label, "name": study.methods.title[played], "films": films})
     return runs
 
 
@@ -103,7 +100,7 @@ def film_of(study: Study, key: CellKey) -> dict[str, Any]:
     if key not in study.cells or not len(study.cells[key].good):
         return {}
     good = study.cells[key].good[:MOST_EXECUTED]
-    run, stored = typical_run(good), study._movements("solution")
+    run, stored = typical_run(good), study.movements("solution")
     if any(movement.kind == "path" for each in good.run_id for movement in stored[each]):
         return {}
     movements = [

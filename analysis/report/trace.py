@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from coartic import CoarticError, Task
-from coartic.analysis.methods import name_of
+from coartic import CoarticError
 from coartic.analysis.report.render import columns_of, guarded, is_number, texts_of
-from coartic.analysis.table import SHORT_ID
+from coartic.analysis.study import Study
+from coartic.analysis.table import SHORT_ID, Table
 from coartic.analysis.words import NONE, marked, number
 from coartic.internal.text import plain
 from coartic.runs.plan import hash_of, label_of
@@ -57,31 +57,32 @@ def stamp(runs: pd.DataFrame) -> str:
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
-def beginnings(frame: pd.DataFrame) -> list[tuple[str, str]]:
-    """The rows of a table by id, with the first two columns of words that the page shows."""
-    words = [name for name in columns_of(frame) if not is_number(frame[name])]
-    texts = [texts_of(frame, name) for name in words[:2]]
+def beginnings(table: Table, frame: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return the rows of a table by id, with the first two columns of words that the page shows."""
+    words = [name for name in columns_of(table, frame) if not is_number(frame[name])]
+    texts = [texts_of(table, frame, name) for name in words[:2]]
     return [(row, ", ".join(first)) for row, *first in zip(frame.index, *texts, strict=True)]
 
 
-def values_of(frame: pd.DataFrame, row: str, tasks: Mapping[str, Task]) -> list[tuple[str, str]]:
-    """Headers and values of a row as the page shows them, without those that are missing."""
+def values_of(table: Table, frame: pd.DataFrame, row: str) -> list[tuple[str, str]]:
+    """Return headings and values of a row as the page shows them, without missing ones."""
     one = frame.loc[[row]]
-    one.attrs["tasks"] = {name: marked(task) for name, task in tasks.items()}
-    shown = ((header, texts_of(one, name)[0]) for name, header in columns_of(one).items())
+    columns = columns_of(table, one).items()
+    shown = ((header, texts_of(table, one, name)[0]) for name, header in columns)
     return [(header, text) for header, text in shown if text not in ("", NONE)]
 
 
-def runs_behind(runs: pd.DataFrame, ids: Sequence[str], tasks: Mapping[str, Task]) -> pd.DataFrame:
-    """The runs with these ids: run, task, seed, hands and reward, worst of a task first, and the
-    method where there are several."""
-    chosen = runs[runs.run_id.isin(ids)].sort_values(["task", "reward"], kind="stable")
-    labels = map(label_of, chosen.method, chosen.setting)
+def runs_behind(study: Study, ids: Sequence[str]) -> pd.DataFrame:
+    """Return the runs with these ids: run, task, seed, hands and reward, worst of a task first, and
+    the method where there are several."""
+    chosen = study.runs[study.runs.run_id.isin(ids)]
+    chosen = chosen.sort_values(["task", "reward"], kind="stable")
+    labels = [*map(label_of, chosen.method, chosen.setting)]
     rewards = chosen.reward.astype("Float64").to_numpy(float, na_value=math.nan)
     shown = {
         "run": chosen.run_id.str[:SHORT_ID],
-        "task": [marked(tasks[task]) for task in chosen.task],
-        "method": list(map(name_of, labels)),
+        "task": [marked(study.tasks[task]) for task in chosen.task],
+        "method": [*study.methods.title[labels]],
         "seed": chosen.seed,
         "hands": chosen.hands.fillna(NONE),
         "reward (ticks)": [number(reward, 0) for reward in rewards.tolist()],

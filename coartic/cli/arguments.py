@@ -80,10 +80,10 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
 
 def method_names(registered: Registry) -> Mapping[str, str]:
     """People's names of methods by id, empty where they have none."""
-    from coartic.analysis.methods import name_of
+    from coartic.analysis.methods import title_of
     from coartic.learner.conditions import ABLATIONS, CONDITIONS
 
-    names = {name: name_of(name) for name in registered}
+    names = {name: title_of(name) for name in registered}
     named = {name: words if words != name else "" for name, words in names.items()}
     return named | dict.fromkeys((*CONDITIONS, *ABLATIONS), "")
 

@@ -37,7 +37,7 @@ def draw(
     names = [name for text in meant for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
     from coartic.analysis.figures.plot import FORMATS, picture  # slow, after quick errors
-    from coartic.analysis.topics.tasks import picture_of_tasks
+    from coartic.analysis.sections.tasks import picture_of_tasks
 
     drawing = picture_of_tasks(chosen[:_PICTURED])
     if out.suffix:
@@ -67,7 +67,7 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.methods import name_of
+    from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
     from coartic.film import check_film, write_film
 
@@ -78,7 +78,7 @@ def animate(
     for run_id in (run,) if other is None else (run, other):
         place, found = find_run(run_id, folder)
         movement, number = trajectory_of(place, found), found.number
-        title = f"{movement.task.label}\n{name_of(found.cell.method.name)}, run {number}"
+        title = f"{movement.task.label}\n{title_of(found.cell.method.name)}, run {number}"
         movements.append((title, movement))
     if initial:
         on = movements[0][1].task

@@ -86,43 +86,45 @@ def trace(
 ) -> None:
     """Name the runs behind a row of a report's table: run `coartic report` first."""
     from coartic.analysis.report import trace as traced
-    from coartic.analysis.words import titled_apart
+    from coartic.analysis.sections import TABLES
+    from coartic.analysis.study import load
+    from coartic.analysis.table import shown_names
     from coartic.benchmarks.registry import registry
-    from coartic.runs.store import RUNS_FILE, open_store
+    from coartic.runs.store import RUNS_FILE
 
     tables = traced.tables_of(folder)
     if table is None:
         say_pairs([("Tables", ", ".join(tables))])
         return
-    if table not in tables:
+    if table not in tables or table not in TABLES:
         raise CoarticError(unknown("table", table, tables))
-    frame = traced.rows_of(tables[table])
+    frame, results = traced.rows_of(tables[table]), tables[table].parents[2]
+    # A report may lie elsewhere.
+    study = load(results) if (results / RUNS_FILE).is_file() else None
+    frame.attrs = shown_names(study) if study else {}
     if row is None:
-        say_pairs(traced.beginnings(frame))
+        say_pairs(traced.beginnings(TABLES[table], frame))
         return
     if row not in frame.index:
         raise CoarticError(unknown("row", row, frame.index))
     ids = str(frame.run_ids.fillna("")[row]).split()
-    results = tables[table].parents[2]
-    if not (results / RUNS_FILE).is_file():  # the report lies elsewhere
-        say_pairs([("Row", row), *traced.values_of(frame, row, {}), ("Runs", " ".join(ids))])
+    values = [("Row", row), *traced.values_of(TABLES[table], frame, row)]
+    if study is None:
+        say_pairs([*values, ("Runs", " ".join(ids))])
         return
-    with open_store(results) as store:
-        runs, plan = store.runs(), store.plan()
-    by_name = {job.cell.task.name: job.cell.task for job in plan}
-    tasks = {task.name: task for task in titled_apart(by_name.values())}
-    behind = runs[runs.run_id.isin(ids)]
-    if traced.stamp(runs) not in (tables[table].parents[1] / "report.html").read_text("utf-8"):
+    behind = study.runs[study.runs.run_id.isin(ids)]
+    report = tables[table].parents[1] / "report.html"
+    if traced.stamp(study.runs) not in report.read_text("utf-8"):
         again = f"coartic report {quote(str(results))}"
         raise CoarticError(f"the report is older than the runs of {results}: {again}")
-    say_pairs([("Row", row), *traced.values_of(frame, row, tasks)])
+    say_pairs(values)
     if not len(behind):
         say("No runs stand behind this row.")
         return
     known = {*registry(), "dual-process"}
     file = "" if known >= {*behind.method} else " --method-file FILE"
     say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
-    show_frame(traced.runs_behind(runs, ids, tasks))
+    show_frame(traced.runs_behind(study, ids))
     where = f"--in {quote(str(results))}"
     say_pairs(
         [

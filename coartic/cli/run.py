@@ -176,7 +176,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     Raises CoarticError for another name.
     """
     from coartic import builtin_tasks, load_task
-    from coartic.analysis.methods import name_of
+    from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
     from coartic.tasks.families import shipped_families
@@ -224,7 +224,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
             applies = (t for t in builtin_tasks() if info.why_not(load_task(t)) is None)
             parameters = [f"{k}={v}" for k, v in info.defaults.items()]
             yield "Method", f"{info.name}: {info.title}"
-            yield "Called", name_of(info.name)
+            yield "Called", title_of(info.name)
             yield "Information", ", ".join(info.information)
             yield "Parameters", ", ".join(parameters) or "none"
             yield "Tasks", ", ".join(applies) or "none of the four"
@@ -238,7 +238,7 @@ def reproduce(
     method_file: given.MethodFiles = None,
 ) -> None:
     """Perform a run again and say whether the result is identical."""
-    from coartic.analysis.methods import name_of
+    from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
@@ -253,7 +253,7 @@ def reproduce(
         result = f"reward {number(solution.reward)}, hands {solution.hands}"
     say_pairs(
         [
-            ("Run", f"{run.id}: {cell.task.label}, {name_of(name)}, run {run.number}"),
+            ("Run", f"{run.id}: {cell.task.label}, {title_of(name)}, run {run.number}"),
             ("Seed", str(run.seed)),
             ("Parameters", ", ".join(f"{k}={v}" for k, v in cell.parameters.items())),
             ("Result", result),

@@ -70,7 +70,7 @@ class Display:
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
         """Show the progress, and the task and method of the last run."""
-        from coartic.analysis.methods import name_of
+        from coartic.analysis.methods import title_of
 
         self.done, total = progress.done, progress.total
         if cell is None:
@@ -94,7 +94,7 @@ class Display:
         if self._is_live:
             last = "starting processes"
             if cell is not None:
-                last = f"{cell.task.label}, {name_of(cell.method.name)}"
+                last = f"{cell.task.label}, {title_of(cell.method.name)}"
             width = shutil.get_terminal_size().columns - 1
             print("\r", end="", file=sys.stderr)
             words = one_line(f"{text}  {last}")

@@ -6,9 +6,10 @@ from pathlib import Path
 import pandas as pd
 
 from coartic import load_task
+from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
-from coartic.runs.method_info import MethodInfo
+from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.runs.plan import Cell, Job
 
 MADE_WITH = {
@@ -59,7 +60,8 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
 def declared(method):
     """What a made-up method declares; planners are not stochastic."""
     stochastic = not method.startswith(("trajectory-optimisation", "corrective-alone"))
-    return MethodInfo(method, method, "", (), stochastic, {}, "built in", "")
+    origin = BUILT_IN if method in KNOWN_METHODS else "file.py"
+    return MethodInfo(method, method, "", (), stochastic, {}, origin, "")
 
 
 def plan_for(tasks, runs=None):
@@ -77,7 +79,11 @@ def plan_for(tasks, runs=None):
 
 def study_of(rows, tasks=None, **parts):
     """A study of rows of runs, with parts made up; tasks are those of the names unless given."""
-    runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
+    runs = (
+        pd.DataFrame(rows)
+        .reset_index(drop=True)
+        .astype({"reward": "Int64", "proven_bound": "Int64"})
+    )
     if tasks is None:
         tasks = [load_task(name) for name in runs.task.unique()]
     return MadeUp(Study(Path("made-up"), plan_for(tasks, runs), MADE_WITH, runs), **parts)

@@ -10,11 +10,11 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
-from coartic.analysis.methods import LEARNER, LEARNERS, name_of
+from coartic.analysis.methods import CONDITION_OF, LEARNERS, title_of
+from coartic.analysis.published import RUNS, published_alone, published_cell
 from coartic.analysis.statistics.hypotheses import MARGIN, difference_to_published, equivalence
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Rows, runs_of, table
-from coartic.analysis.topics.published import RUNS, published_alone, published_cell
 from coartic.analysis.words import interval, listed, marked
 from coartic.estimates import standard_deviation
 from coartic.learner.learning import TRIALS
@@ -42,8 +42,8 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
     """
     rows = []
     for cell in study.cells.values():
-        own, condition = cell.label in LEARNERS, cell.label.removeprefix(LEARNER)
-        published, hands = published_cell(cell.task, condition) if own else None, cell.good.hands
+        condition, hands = CONDITION_OF.get(cell.label, ""), cell.good.hands
+        published = published_cell(cell.task, condition)
         if published is None:
             continue
         complete = sum(each.published_runs or 0 for of, each in published.items() if of) == RUNS
@@ -81,8 +81,8 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
 
 
 @table(
-    "task, condition, published±, ours±, runs, difference[], margin, verdict, published_initial, "
-    "ours_initial",
+    "task; condition; published± .1; ours± .1; runs; difference[] .1; margin .1; verdict; "
+    "published_initial: -; ours_initial: -"
 )
 def list_published(study: Study) -> Rows:
     """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
@@ -97,7 +97,10 @@ def list_published(study: Study) -> Rows:
             yield f"{cell.task} {row['condition']}", row | initial | runs_of(cell)
 
 
-@table("task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]")
+@table(
+    "task; condition; hands; published_runs; runs; of_runs: of; published± .1; ours± .1; "
+    "difference[] .1"
+)
 def list_hands(study: Study) -> Rows:
     """Learned rewards by hand sequence, published and ours, where there are several."""
     for row in beside_paper(study):
@@ -135,7 +138,7 @@ def draw_published(study: Study) -> Parts | None:
     names, words = [], []
     for place, row in enumerate(data.to_dict("records")):
         published, margin, y = row["published_runs"], row["margin"], -place
-        name = f"{marked(tasks[row['task']])}, {name_of(row['method'])}{'*' * row['pooled']}"
+        name = f"{marked(tasks[row['task']])}, {title_of(row['method'])}{'*' * row['pooled']}"
         if row["hands"]:
             of_published = (
                 "" if published is None or math.isnan(published) else f"; {published:.0f}"
@@ -150,7 +153,7 @@ def draw_published(study: Study) -> Parts | None:
         if not math.isnan(row["difference_low"]):
             axes.plot([row["difference_low"], row["difference_high"]], [y, y], color=color, lw=1.0)
         axes.plot(row["difference"], y, marker, color=color, markersize=4, markerfacecolor=face)
-        who = f"{row['task']}, {name_of(row['method'])} {row['hands']}".strip()
+        who = f"{row['task']}, {title_of(row['method'])} {row['hands']}".strip()
         words.append(f"{who}: {row['difference']:+.1f}")
     axes.axvline(0, color=style.INK, linewidth=0.6)
     style.name_rows(axes, names)

@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import pandas as pd
-
-from coartic.analysis.claims import judgements
 from coartic.analysis.figures.plot import Plot
-from coartic.analysis.study import Study
-from coartic.analysis.topics import (
+from coartic.analysis.sections import (
+    claims,
     coarticulation,
     costs,
     learning,
+    methods,
     own,
     random_tasks,
     ranking,
     rewards,
-    scores,
     settings,
     tasks,
 )
+from coartic.analysis.study import Study
+from coartic.analysis.table import Table
 from coartic.analysis.words import id_of
 
 
@@ -33,7 +32,7 @@ class Section:
     short: str
     """Name among the contents."""
     title: str
-    table: Callable[[Study], pd.DataFrame]
+    table: Table
     caption: str
     """Caption of the table."""
     figure: Callable[[Study], Plot | None] | None = None
@@ -68,18 +67,6 @@ SECTIONS = (
         folded=True,
     ),
     Section(
-        "settings",
-        "Settings",
-        "Which setting is best?",
-        table=settings.list_settings,
-        caption="Mean reward of each setting (ticks), the best of each task first",
-        sentence=settings.best_settings,
-        answer="Best",
-        note="Gap: ticks behind the best setting of the task. p is corrected for the settings "
-        "of the task (Holm).",
-        single=False,
-    ),
-    Section(
         "coarticulation",
         "Coarticulation",
         "Does the next goal change the movement?",
@@ -109,9 +96,9 @@ SECTIONS = (
         "claims",
         "Claims",
         "Do the paper's claims hold?",
-        table=judgements.list_claims,
+        table=claims.list_claims,
         caption="Claims",
-        sentence=judgements.claims_hold,
+        sentence=claims.claims_hold,
         answer="Paper",
         note="p is corrected for the number of claims (Holm). Some claims of the paper rest on "
         "goals that it does not publish: the third column says in how many of the sets of goals "
@@ -131,12 +118,25 @@ SECTIONS = (
         sentence=ranking.nearest,
         answer="Nearest",
         note="Methods are grouped by their use of the reward: its value after each trial, its "
-        "formula, or nothing. They have their default settings; in the sentence the best method of "
-        "each algorithm counts. Intervals describe "
+        "formula, or nothing. In the sentence the best method of each algorithm counts, with its "
+        "default setting if it ran with it. Intervals describe "
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
         "against-learner). Empty: the runs are too few, or too alike, to tell.",
+    ),
+    Section(
+        "settings",
+        "Settings",
+        "Which setting of a method is best?",
+        table=settings.list_settings,
+        caption="Mean gap of each setting of a method, the smallest first",
+        sentence=settings.best_settings,
+        answer="Settings",
+        note="Gaps are means over the tasks of a method's settings. Beside the smallest: by a test "
+        "of runs paired by seed; p is corrected for the settings of the method (Holm).",
+        single=False,
+        folded=True,
     ),
     Section(
         "runtimes",
@@ -210,14 +210,14 @@ SECTIONS = (
         "methods",
         "All methods",
         "What did every method do on every task?",
-        table=scores.list_methods,
+        table=methods.list_methods,
         caption="Reward, gap to the optimum, hands with their runs, and costs of a run (medians)",
         note="Every method works on the same robot. Its movements are scored by one function, "
         "which no method can reach. Times are seconds of solving.",
         folded=True,
     ),
 )
-TABLES = {id_of(each.table): each.table for each in SECTIONS}
+TABLES = {each.table.id: each.table for each in SECTIONS}
 TABLES["against-learner"] = ranking.list_against_learner
 """Every table by its id, functions of a study; the last is a CSV file that no section shows."""
 FIGURES = {id_of(each.figure): each.figure for each in SECTIONS if each.figure}

@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import methods
+from coartic.analysis import standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.method_frame import BY_TRIAL, headline_methods
 from coartic.analysis.optima import initial_reward
-from coartic.analysis.settings import compares_settings
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import CellRuns, Study, cached, load
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics import scores
 from coartic.analysis.words import capital, interval, number
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
@@ -74,14 +73,14 @@ def times_of(
     evaluations and time are known as totals of the run and spread evenly over its trials, which is
     not exact: over the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times their
     even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. A run whose spend is not known,
-    such as the time of a cold one, has no part; times are those of :func:`.scores.solve_times`.
+    such as the time of a cold one, has no part; times are as :func:`solve_times` returns them.
     """
     initial, optimum = spans(study)[cell.task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
     runs, learned, rows = cell.runs, improvements(study), []
     totals = runs[spend]
     if spend == "solve_s":
-        totals = scores.solve_times(cell.good).reindex(runs.index)
+        totals = solve_times(cell.good).reindex(runs.index)
     for run_id, status, made, total, reward in zip(
         runs.run_id, runs.status, runs.trials, totals, runs.reward, strict=True
     ):
@@ -96,17 +95,29 @@ def times_of(
     return np.array(rows).reshape(-1, len(targets))
 
 
-def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
-    """Cells of each method on those of :func:`.scores.common_tasks` with targets, in lists' order,
-    of methods that ran on all of them; of methods from files that did not, on all with targets."""
-    compared, of_methods = scores.compared(study), {}
-    tasks = [task for task in scores.common_tasks(study) if task in spans(study)]
-    for method in methods.in_order(compared):
-        ran_on = [task for task in compared[method] if task in spans(study)]
-        on = tasks if {*tasks} <= {*ran_on} or methods.is_built_in(method) else ran_on
-        is_whole = {*on} <= {*ran_on} and not (len(on) == 1 and method.startswith(methods.TOGETHER))
-        if on and is_whole:
-            of_methods[method] = [cell for task, cell in compared[method].items() if task in on]
+def solve_times(runs: pd.DataFrame) -> pd.Series:
+    """Wall time of solving, s: of runs in a warm process, or of all where there are none.
+
+    ``runs`` have a solution. Their whole time stands for methods that mark no solving.
+    """
+    times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
+    warm = runs.warm.to_numpy(bool, na_value=False)
+    return times[warm] if warm.any() else times
+
+
+def cells_with_targets(study: Study) -> dict[str, list[CellRuns]]:
+    """Return the cells of each method on those of :func:`.common_tasks` with targets, of methods
+    that ran on all of them; of methods from files that did not, on all with targets."""
+    common, of_methods = (
+        [task for task in standings.common_tasks(study) if task in spans(study)],
+        {},
+    )
+    for method, of_method in standings.compared(study).items():
+        cells = standings.cells_on(study, method, common)
+        if not (cells or study.methods.built_in[method]):
+            cells = [cell for task, cell in of_method.items() if task in spans(study)]
+        if cells:
+            of_methods[method] = cells
     return of_methods
 
 
@@ -149,7 +160,7 @@ def runtimes(
     if not spans(study):
         raise CoarticError("no task has a best known reward above that of its initial solution")
     rows = []
-    for name, cells in cells_compared(study).items():
+    for name, cells in cells_with_targets(study).items():
         for spend in SPENDS:
             times = [times_of(study, cell, spend, tuple(shares.tolist())) for cell in cells]
             if all(map(len, times)):
@@ -159,13 +170,16 @@ def runtimes(
 
 
 @table(
-    "method, reached, tasks, trials_to_quarter[], trials_to_half[], forward_kinematics_to_half[], "
-    "seconds_to_half[], half on *",
+    "method; reached: targets reached (%) .0; tasks: over tasks; "
+    "trials_to_quarter[]: trials to a quarter of the targets; "
+    "trials_to_half[]: trials to half of the targets; "
+    "forward_kinematics_to_half[]: forward-kinematics evaluations to half of the targets; "
+    "seconds_to_half[]: seconds to half of the targets; half on *: -"
 )
 def list_runtimes(study: Study) -> Rows:
     """Cost of a quarter and of half of the targets; ``half on``: median trials to the
     target halfway, by task, infinite where most runs never reach it."""
-    for method, cells in cells_compared(study).items():
+    for method, cells in cells_with_targets(study).items():
         times = {spend: [times_of(study, cell, spend) for cell in cells] for spend in SPENDS}
         if not all(map(len, times["trials"])):
             continue
@@ -174,8 +188,8 @@ def list_runtimes(study: Study) -> Rows:
         for name, spend, share in COSTS:
             if all(map(len, times[spend])):
                 row |= running_times.budget_for(times[spend], share).columns(name)
-        if scores.groups(study)[method] == scores.BY_TRIAL:
-            of_method = scores.compared(study)[method]
+        if study.methods.information[method] == BY_TRIAL:
+            of_method = standings.compared(study)[method]
             for task in (task for task in spans(study) if task in of_method):
                 half = times_of(study, of_method[task], "trials", (0.5,))
                 row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
@@ -193,15 +207,13 @@ def draw_runtimes(study: Study) -> Parts | None:
     """Share of targets reached (runtime ECDF), against trials and forward-kinematics
     evaluations."""
     tabled = list_runtimes(study)
-    curves = list(tabled.index)
+    rows = study.methods.loc[[*tabled.index]]
+    rows = rows.loc[headline_methods(rows)]
     # methods that learn, random search, the best planner, from files
-    if not compares_settings(study):
-        alone = methods.INITIAL, methods.BEST_HANDS
-        kept = [each for each in methods.main_methods(curves) if each not in alone]
-        plan = [each for each in kept if scores.groups(study)[each] != scores.BY_TRIAL]
-        best = tabled.reached[plan].idxmax() if plan else None
-        left_out = {*filter(methods.is_built_in, plan)} - {best}
-        curves = [label for label in kept if label not in left_out]
+    rows = rows[rows.algorithm != "corrective process alone"]
+    plans = rows.index[rows.information != BY_TRIAL]
+    best = tabled.reached[plans].idxmax() if len(plans) else None
+    curves = rows.index[(rows.information == BY_TRIAL) | ~rows.built_in | (rows.index == best)]
     data = runtimes(study) if len(tabled) else pd.DataFrame(columns=["method", "spend", "budget"])
     shown = data.method.isin(curves) & (data.budget < math.inf)
     data = data[shown & data.spend.isin(PANELS)]
@@ -227,7 +239,7 @@ def draw_runtimes(study: Study) -> Parts | None:
             y = 100 * np.append(rows.share, rows.share.iloc[-1])
             line: Any = {**looks[str(label)], "linewidth": 1.3}
             (drawn,) = axes.step(x, y, where="post", **line)
-            name = scores.shown_name(study, str(label))
+            name = standings.shown_name(study, str(label))
             style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
         axes.set_xlim(edge, most)
         axes.set_ylim(-2, 102)
@@ -238,10 +250,11 @@ def draw_runtimes(study: Study) -> Parts | None:
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
     entries = [
-        style.legend_line(scores.shown_name(study, label), **look) for label, look in looks.items()
+        style.legend_line(standings.shown_name(study, label), **look)
+        for label, look in looks.items()
     ]
     style.legend(drawing, entries, 3)
-    shares = spoken(ends, "{method} {share:.0f} %")
+    shares = spoken(ends.join(study.methods.title, on="method"), "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()
 
@@ -249,19 +262,16 @@ def draw_runtimes(study: Study) -> Parts | None:
 def what_it_costs(study: Study) -> str:
     """Trials that the learner and its rival need for half of the targets."""
     table = list_runtimes(study)
-    learners = [label for label in methods.main_methods(table.index) if methods.is_learner(label)]
-    if not learners:
+    methods = study.methods.loc[[*table.index]]
+    main = methods.loc[headline_methods(methods)]
+    learners = main.index[standings.is_learner(main)]
+    if not len(learners):
         return ""
-    others = [
-        label
-        for label in table.index
-        if not (methods.is_learner(label) or methods.learns_nothing(label))
-        and scores.groups(study)[label] == scores.BY_TRIAL
-    ]
+    learns = (methods.information == BY_TRIAL) & (methods.kind == "") & (methods.under == "")
     # The other method that learns from the reward of trials and reaches most targets.
-    rival = [table.reached[others].idxmax()] if others else []
+    rival = [str(table.reached[learns].idxmax())] if learns.any() else []
     rows = table.loc[[learners[0], *rival]].to_dict("records")
-    names = ["the learner", *(methods.name_of(row["method"]) for row in rows[1:])]
+    names = ["the learner", *methods.title[rival]]
     named = list(zip(names, rows, strict=True))
     ends = "; ".join(f"{name} reaches {number(100 * row['reached'], 0)} %" for name, row in named)
     text = f"{capital(ends)} of the reward targets.\n"
@@ -274,8 +284,8 @@ def what_it_costs(study: Study) -> str:
         )
     cells = (
         cell
-        for method, by_task in scores.compared(study).items()
-        if scores.groups(study)[method] == scores.BY_TRIAL
+        for method, by_task in standings.compared(study).items()
+        if study.methods.information[method] == BY_TRIAL
         for cell in by_task.values()
     )
-    return text + scores.failed_runs(cells, " and count as reaching nothing")
+    return text + standings.failed_runs(study, cells, " and count as reaching nothing")

@@ -7,12 +7,13 @@ from typing import Any
 
 import pandas as pd
 
-from coartic.analysis import methods
-from coartic.analysis.settings import name_in
+from coartic.analysis import standings
+from coartic.analysis.method_frame import BY_TRIAL, GROUPS
+from coartic.analysis.methods import most_exploring
+from coartic.analysis.sections import ranking
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics import ranking, scores
-from coartic.analysis.words import interval, listed, marked, number, p_value
+from coartic.analysis.words import listed, marked, number, p_value, percent
 from coartic.estimates import standard_deviation
 from coartic.internal.text import counted
 
@@ -23,36 +24,40 @@ UNTESTED = " (the runs are too few, or too alike, for a test)"
 
 def own_methods(study: Study) -> list[str]:
     """Return the methods from files that solved every run on a task, the smallest gap first."""
-    return [m for m in ranking.shown_gaps(study).method if not methods.is_built_in(m)]
+    rows = ranking.shown_gaps(study)
+    return [*rows.method[~rows.built_in.astype(bool)]]
 
 
 def nearest_others(study: Study, method: str) -> dict[str, float]:
     """Return the gap of the nearest built-in method, and of the learner, on the tasks that a method
     solved, by their names; of methods that use the reward as it does if there are any."""
-    rows = ranking.gaps_on(study, scores.solved_tasks(study, method))
-    group = scores.groups(study)[method]
-    rows = pd.concat([ranking.leaders(study, of, rows) for of in (group, *scores.GROUPS)])
-    rows = rows[rows.method.map(methods.is_built_in)].drop_duplicates("method")
-    is_learner = rows.method.map(methods.is_learner).astype(bool)
-    nearest = rows[~is_learner & ~rows.method.map(methods.learns_nothing).astype(bool)]
-    others = pd.concat([nearest.head(1), rows[is_learner].head(1)])
-    names = ["the learner" if methods.is_learner(m) else name_in(study, m) for m in others.method]
-    return dict(zip(names, others.gap, strict=True))
+    rows = standings.gaps_on(study, standings.solved_tasks(study, method))
+    group = study.methods.information[method]
+    rows = pd.concat([standings.leaders(rows, of) for of in (group, *GROUPS)])
+    rows = rows[rows.built_in.astype(bool)].drop_duplicates("method")
+    is_learner = standings.is_learner(rows)
+    nearest = rows[~is_learner & (rows.kind != "no learning")]
+    others = pd.concat([nearest.head(1), rows[is_learner].head(1)]).to_dict("records")
+    return {standings.called(row): row["gap"] for row in others}
 
 
-@table("task, method, runs, solved, reward±, gap, nearest, nearest_gap, learner, p_holm")
+@table(
+    "task; method; runs; solved: -; reward± .1; gap: gap (%) .1; nearest; "
+    "nearest_gap: its gap (%) .1; learner: learner's reward .1; p_holm: p (corrected) .p"
+)
 def list_own(study: Study) -> Rows:
     """Return methods from files on each task, with the nearest built-in method and the learner."""
-    compared, tested = scores.compared(study), ranking.list_against_learner(study)
+    compared, tested = standings.compared(study), ranking.list_against_learner(study)
+    rows = study.methods
     for task, title in ((name, marked(task)) for name, task in study.tasks.items()):
         cells = {method: of[task] for method, of in compared.items() if task in of}
         gaps = {
-            scores.cell_gap(study, cell): method
+            cell.gap: method
             for method, cell in cells.items()
-            if methods.is_built_in(method) and len(cell.good)
+            if rows.built_in[method] and not rows.under[method] and len(cell.good)
         }
         for method, cell in cells.items():
-            if methods.is_built_in(method):
+            if rows.built_in[method]:
                 continue
             row: Row = {
                 "task": title,
@@ -61,7 +66,7 @@ def list_own(study: Study) -> Rows:
                 "solved": len(cell.good),
                 "reward": cell.rewards.mean() if len(cell.good) else math.nan,
                 "reward_sd": standard_deviation(cell.rewards),
-                "gap": scores.cell_gap(study, cell),
+                "gap": cell.gap,
                 "nearest": gaps[min(gaps)] if gaps else None,
                 "nearest_gap": min(gaps, default=math.nan),
             }
@@ -76,45 +81,46 @@ def own_in_words(study: Study) -> str:
     lines = [card(study, method) for method in names[:1]]
     lines += [details(study, method) for method in names[:MOST_NAMED]]
     lines += [f"And {len(names) - MOST_NAMED} more in the table."] * (len(names) > MOST_NAMED)
-    foreign = [key for key in study.cells if not methods.is_built_in(key[1])]
+    foreign = [key for key in study.cells if not study.methods.built_in[key[1]]]
     for task, label in foreign:
         if sum(other == task for other, _ in study.cells) == 1:
             only = f"{label} is the only method on {marked(study.tasks[task])}: name others, too."
             lines.append(only)
     cells = [study.cells[key] for key in foreign]
-    lines.append(scores.failed_runs(cells, ", and these tasks do not count").strip())
+    lines.append(standings.failed_runs(study, cells, ", and these tasks do not count").strip())
     return "\n".join(filter(None, lines))
 
 
 def card(study: Study, method: str) -> str:
     """Return the gap of a method from a file in a line, on which tasks, and beside whom."""
-    row = standing(study, method)
-    text, beside = f"gap of {number(100 * row['gap'], 1)} %", ""
+    row, title = standing(study, method), study.methods.title[method]
+    text, beside = f"gap of {percent(row['gap'])}", ""
     for other, gap in [*nearest_others(study, method).items()][:1]:
-        beside = f"{other} {number(100 * gap, 1)} %"
-    if covered := scores.coverage(study, method):
+        beside = f"{other} {percent(gap)}"
+    if covered := standings.coverage(study, method):
         there = "task" if covered.startswith("1 of ") else "tasks"
         on_the_same = f"; {beside} on the same {there}" * bool(beside)
-        return f"{name_in(study, method)} ran on {covered}: {text} there{on_the_same}."
+        return f"{title} ran on {covered}: {text} there{on_the_same}."
     if not math.isnan(row["better"]):
         tasks = counted(len(beside_learner(study, method)), "task")
         text += f", better than the learner on {row['better']:.0f} of {tasks}"
     elif beside:
         text += f" ({beside})"
-    return f"{name_in(study, method)}: {text}."
+    return f"{title}: {text}."
 
 
 def details(study: Study, method: str) -> str:
     """Return the gap of a method from a file with its interval, and of others on the same tasks,
     its trials where the learner made others, tests, and who declares its information."""
     row, tests = standing(study, method), beside_learner(study, method)
-    tasks, is_partial = scores.solved_tasks(study, method), bool(scores.coverage(study, method))
-    gap = f"Gap of {name_in(study, method)} to the {scores.reference(study, tasks)}"
+    tasks = standings.solved_tasks(study, method)
+    is_partial = bool(standings.coverage(study, method))
+    gap = f"Gap of {study.methods.title[method]} to the {standings.reference(study, tasks)}"
     if is_partial and len(tasks) <= MOST_NAMED:
         gap += f" on {listed(marked(study.tasks[task]) for task in tasks)}"
-    gap += f": {interval(row, 'gap', scale=100, unit=' %')}"
+    gap += f": {ranking.gap_in_words(row)}"
     for other, gap_of_other in nearest_others(study, method).items():
-        gap += f"; of {other}{' there' * is_partial}: {number(100 * gap_of_other, 1)} %"
+        gap += f"; of {other}{' there' * is_partial}: {percent(gap_of_other)}"
     sentences, untested = [gap, trials_beside(study, method)], math.isnan(row["better"])
     if len(tests) == 1:
         reward, learner, p = tests[["reward", "learner", "p_holm"]].iloc[0]
@@ -142,14 +148,14 @@ def beside_learner(study: Study, method: str) -> pd.DataFrame:
 def trials_beside(study: Study, method: str) -> str:
     """Say how many trials a method that learns from them and the learner made at most; nothing
     where these are the same, or one made none."""
-    cells = scores.compared(study)[method]
-    keys = [(task, methods.most_exploring(study.tasks[task])) for task in cells]
+    cells = standings.compared(study)[method]
+    keys = [(task, most_exploring(study.tasks[task])) for task in cells]
     learners = [study.cells[key] for key in keys if key in study.cells]
     made, learned = (
         max((trials for each in of for trials in each.runs.trials.dropna()), default=0)
         for of in (cells.values(), learners)
     )
-    if scores.groups(study)[method] != scores.BY_TRIAL or learned in (0, made):
+    if study.methods.information[method] != BY_TRIAL or learned in (0, made):
         return ""
     return f"It made {number(made)} trials (the learner: {number(learned)})"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -10,41 +11,66 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.methods import LEARNERS, is_setting, most_exploring, name_of
+from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.optima import gap_share
-from coartic.analysis.statistics.instances import other_tasks
-from coartic.analysis.study import Study
+from coartic.analysis.standings import best_of_instances, called, compared, reference
+from coartic.analysis.statistics.instances import Scores, other_tasks
+from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.instances import best_of_instances, by_family, solved
-from coartic.analysis.topics.scores import reference
-from coartic.analysis.words import listed, number
+from coartic.analysis.words import listed, number, percent
 
 
-@table("method, instances, gap[], to_bound[], in *")
+@cached
+def solved(study: Study) -> pd.DataFrame:
+    """Return a row for each compared method on each instance of a family that it solved in some
+    run, family by family.
+
+    Columns ``method``, ``family``, ``task``, ``cell``, and of the solved runs, shape ``(n,)``:
+    ``gap`` to the best known reward, as a share of it, and ``to_bound``, which the gap to the
+    optimum is at most; None where nothing is proven.
+    """
+    instances = best_of_instances(study)
+    families = dict.fromkeys(str(study.tasks[name].family) for name in instances)
+    rows = []
+    for family, (method, cells) in itertools.product(families, compared(study).items()):
+        for name, best in instances.items():
+            cell = cells.get(name)
+            if study.tasks[name].family == family and cell is not None and len(cell.good):
+                bound = None if best.bound is None else gap_share(cell.rewards, best.bound)
+                rows.append((method, family, name, cell, cell.gaps, bound))
+    return pd.DataFrame(rows, columns=["method", "family", "task", "cell", "gap", "to_bound"])
+
+
+def by_family(rows: pd.DataFrame, column: str) -> Scores:
+    """Return values of instances by family, without instances that have none."""
+    rows = rows[rows[column].notna()]
+    return {
+        str(family): [(values,) for values in of_family[column]]
+        for family, of_family in rows.groupby("family", sort=False)
+    }
+
+
+@table(
+    "method; instances; gap[]: gap (%) .1; to_bound[]: gap to the proven bound (%) .1; "
+    "in *: {} (%) .1"
+)
 def list_family_gaps(study: Study) -> Rows:
     """Gap to the best known reward over families with two arms, and in each family."""
-    every = solved(study)
-    drawn = [study.tasks[name] for name in best_of_instances(study)]
-    two_armed = {str(task.family) for task in drawn if len(task.hands) > 1}
-    rows: list[tuple[str, Row]] = []
-    for label in (name for name in every.label.unique() if not is_setting(name)):
-        of_label = every[every.label == label]
-        row: Row = {"method": label, "instances": len(of_label), "gap": math.nan}
+    every, rows = solved(study), list[tuple[str, Row]]()
+    families = every.family.unique()
+    hands = every.task.map({name: len(task.hands) for name, task in study.tasks.items()})
+    two_armed = {*every.family[hands > 1]}
+    for method, of_method in every.groupby("method", sort=False):
+        row: Row = {"method": method, "instances": len(of_method), "gap": math.nan}
         for column in ("gap", "to_bound"):
-            scores = by_family(of_label, column)
+            scores = by_family(of_method, column)
             if two_armed and two_armed <= scores.keys():
                 both = {family: part for family, part in scores.items() if family in two_armed}
                 row |= other_tasks(both).columns(column)
-        row |= {f"in {family}": math.nan for family in every.family.unique()}
-        for family, part in by_family(of_label, "gap").items():
+        row |= {f"in {family}": math.nan for family in families}
+        for family, part in by_family(of_method, "gap").items():
             row[f"in {family}"] = other_tasks({family: part}).value
-        cells = [
-            cell
-            for (task, name), cell in study.cells.items()
-            if study.tasks[task].family is not None
-            and name == (most_exploring(study.tasks[task]) if label == "learner" else label)
-        ]
-        rows.append((label, row | runs_of(*cells)))
+        rows.append((str(method), row | runs_of(*of_method.cell)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
 
@@ -57,8 +83,9 @@ def list_family_gaps(study: Study) -> Rows:
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Gap to the best known reward of each instance, by method and family."""
-    rows = solved(study).rename(columns={"label": "method"})
-    rows = rows[~rows.method.str.contains(" ") & (rows.method != "learner")]
+    methods = study.methods[(study.methods.under == "") & (study.methods.parts.map(len) == 1)]
+    rows = solved(study)
+    rows = rows[rows.method.isin(methods.index)]
     if not len(rows):
         return None
     columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
@@ -89,24 +116,23 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])
-    style.name_rows(panels[0], [name_of(label) for label in order])
+    style.name_rows(panels[0], [*methods.title[order]])
     panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
-    means = spoken(data.drop_duplicates(["method", "family"]), "{method}, {family}: {mean:.1%}")
+    first = data.drop_duplicates(["method", "family"]).join(methods.title, on="method")
+    means = spoken(first, "{title}, {family}: {mean:.1%}")
     return drawing, data, f"Gaps of instances by method and family. {means}.", ()
 
 
 def on_random_tasks(study: Study) -> str:
     """Gaps of the nearest methods to the best known reward, over families with two arms."""
     best = best_of_instances(study)
-    gaps = list_family_gaps(study).dropna(subset="gap")
-    gaps = gaps[~gaps.method.isin(LEARNERS)].head(4)  # "learner" is these together
+    gaps = list_family_gaps(study).dropna(subset="gap").gap
+    gaps = gaps[gaps.index.isin(headline_methods(study.methods.loc[gaps.index]))].head(4)
     if not len(gaps):
         return ""
-    ends = [
-        f"{'the learner' if label == 'learner' else name_of(label)} {number(100 * gap, 1)} %"
-        for label, gap in zip(gaps.method, gaps.gap, strict=True)
-    ]
+    rows = study.methods.loc[gaps.index].to_dict("records")
+    ends = [f"{called(row)} {percent(gap)}" for row, gap in zip(rows, gaps, strict=True)]
     first, *others = ends
     beside = [end for end in others if end.startswith("the learner")] or others[:1]
     unproven = [

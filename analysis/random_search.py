@@ -12,27 +12,17 @@ from statistics import fmean
 
 import numpy as np
 
-from coartic.analysis.methods import RANDOM_SEARCHES
-from coartic.analysis.signatures.measures import SIGNATURES
+from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.scores import BY_TRIAL, groups
+from coartic.analysis.study import Study
 from coartic.robot import Array
 
 
 def random_search_on(study: Study, task: str) -> list[str]:
     """Labels of the settings of random search that solved a task."""
-    return [
-        label
-        for (name, label), cell in study.cells.items()
-        if name == task and cell.method in RANDOM_SEARCHES and len(cell.good)
-    ]
-
-
-@cached
-def signature_of(study: Study, signature: str, task: str, label: str) -> Array:
-    """A signature of the runs of a method on a task that have it, shape ``(n,)``."""
-    return SIGNATURES[signature].of(study.executed(task, label))
+    labels = study.methods.index[study.methods.algorithm == "random search"]
+    cells = {label: study.cells.get((task, label)) for label in labels}
+    return [label for label, cell in cells.items() if cell is not None and len(cell.good)]
 
 
 def most_of_random_search(study: Study, signature: str, task: str) -> Array:
@@ -42,7 +32,7 @@ def most_of_random_search(study: Study, signature: str, task: str) -> Array:
     for each, other in study.tasks.items():
         if each == task or (family is not None and other.family == family):
             for label in random_search_on(study, each):
-                if len(values := signature_of(study, signature, each, label)):
+                if len(values := study.signature_of(signature, each, label)):
                     shown.setdefault(label, {})[each] = values
     most = max(shown.values(), key=lambda of: fmean(map(np.mean, of.values())), default={})
     return most.get(task, np.empty(0))
@@ -50,7 +40,8 @@ def most_of_random_search(study: Study, signature: str, task: str) -> Array:
 
 def selects(study: Study, label: str) -> bool:
     """Whether a method's solution may be one of many trials, selected by its reward."""
-    return label.partition(" ")[0] not in RANDOM_SEARCHES and groups(study)[label] == BY_TRIAL
+    method = study.methods.loc[label]
+    return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
 def random_search_for(study: Study, contexts: TwoContexts) -> TwoContexts | None:

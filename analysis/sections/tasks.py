@@ -20,7 +20,10 @@ from coartic.analysis.words import marked, number, titled_apart
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
-@table("task, arms, base, initial, best_hands, optimum, source, bound")
+@table(
+    "task; arms; base; initial .1; best_hands .1; optimum: best known; "
+    "source: best known from; bound: proven bound"
+)
 def list_tasks(study: Study) -> Rows:
     """One row a task: rewards of the corrective process alone, with the initial hands and with the
     best, and the best known reward."""

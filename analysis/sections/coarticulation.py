@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from statistics import fmean
@@ -14,31 +15,21 @@ from matplotlib.patheffects import withStroke
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
-from coartic.analysis.methods import (
-    LEARNERS,
-    RANDOM_SEARCH,
-    in_order,
-    is_built_in,
-    is_learner,
-    is_search,
-    is_setting,
-    main_methods,
-    name_of,
-)
-from coartic.analysis.settings import compares_settings
-from coartic.analysis.signatures.context_tests import smallest_p
-from coartic.analysis.signatures.measures import as_in_isolation, preshaping_of_the_other_arm
-from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.statistics.hypotheses import holm
-from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.random_search import (
+from coartic.analysis.method_frame import headline_methods
+from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH
+from coartic.analysis.random_search import (
     context_beyond_p,
     every_random_search_for,
     random_search_for,
     selects,
 )
-from coartic.analysis.topics.scores import failed_runs
+from coartic.analysis.signatures.context_tests import smallest_p
+from coartic.analysis.signatures.measures import as_in_isolation, preshaping_of_the_other_arm
+from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
+from coartic.analysis.standings import called, failed_runs
+from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked, number, p_value
 from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL
@@ -70,19 +61,24 @@ def shared_goal(study: Study) -> TwoContexts | None:
 
     None where no method has solved runs on two such tasks.
     """
-    labels = [label for _, label in study.cells]
-    subjects = sorted(filter(is_subject, labels), key=lambda label: not is_built_in(label))
-    order = dict.fromkeys([*LEARNERS, *subjects, *main_methods(labels), *labels])
-    return next((contexts for label in order for contexts in shared_goals(study, label)), None)
+    rows = study.methods
+    subjects = rows.index[is_subject(rows) & rows.built_in], rows.index[~rows.built_in]
+    single = rows[rows.parts.map(len) == 1]
+    order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(single), *rows.index]
+    every = (shared_goals(study, label) for label in dict.fromkeys(order))
+    return next(itertools.chain.from_iterable(every), None)
 
 
 @table(
-    "method, place, runs, distance, standardised_difference, p_holm, p_random_search, equivalent, "
-    "other"
+    "method; place: where; runs; distance: posture difference .2; "
+    "standardised_difference: standardised (SD of the runs) .1; p_holm: p (corrected) .p; "
+    "p_random_search: p beyond random search .p; "
+    "equivalent: difference that keeps the hand in place (null space, per dimension) .3; "
+    "other: difference that moves the hand (per dimension) .3"
 )
 def list_contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors; p is corrected by method (Holm)."""
-    for label in dict.fromkeys(label for _, label in study.cells):
+    for label in study.methods.index:
         every = list(shared_goals(study, label))
         p = holm(
             [
@@ -107,24 +103,30 @@ def list_contexts(study: Study) -> Rows:
             yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
 
 
-@table("task, method, runs, first, total, as_in_isolation, preshaping")
+@table(
+    "task; method; runs; first: first movement slower by (ticks) .1; "
+    "total: whole task slower by (ticks) .1; "
+    "as_in_isolation: same hand as for the goal alone (%) .0; "
+    "preshaping: idle hand nearer to its next goal (share) .2"
+)
 def list_signatures(study: Study) -> Rows:
-    """The main signatures of every main method on every task, means over runs and goals."""
-    for name, task in one_by_one(study).items():
-        labels = [label for on, label in study.cells if on == name]
-        for label in in_order(labels if compares_settings(study) else main_methods(labels)):
-            cell, runs = study.cells[name, label], study.executed(name, label)
-            if runs.runs and not is_search(label):
-                row: Row = {
-                    "task": marked(task),
-                    "method": label,
-                    "runs": len(cell.good),
-                    "first": mean_of_goals(runs.against_same_hands[:, :1]),
-                    "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),
-                    "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
-                    "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),
-                }
-                yield f"{name} {label}", row | runs_of(cell)
+    """The main signatures of every method on every task, means over runs and goals."""
+    labels = study.methods.index[study.methods.kind != "optimum search"]
+    for name, label in itertools.product(one_by_one(study), labels):
+        cell = study.cells.get((name, label))
+        if cell is None or not len(cell.good):
+            continue
+        runs = study.executed(name, label)
+        row: Row = {
+            "task": marked(study.tasks[name]),
+            "method": label,
+            "runs": len(cell.good),
+            "first": mean_of_goals(runs.against_same_hands[:, :1]),
+            "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),
+            "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
+            "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),
+        }
+        yield f"{name} {label}", row | runs_of(cell)
 
 
 def mean_of_goals(values: Array) -> float:
@@ -192,8 +194,9 @@ def draw_postures(study: Study) -> Parts | None:
     hands = [robot.forward_kinematics(q, shared.hand) for q in means]
     alt = (
         f"Two postures of one arm at goal {shared.goal}, which {first} and {second} share "
-        f"({name_of(shared.method)}): the posture difference is {shared.posture_difference:.2f}, "
-        f"while the distance of the hands is {np.linalg.norm(hands[0] - hands[1]):.2f}."
+        f"({study.methods.title[shared.method]}): the posture difference is "
+        f"{shared.posture_difference:.2f}, while the distance of the hands is "
+        f"{np.linalg.norm(hands[0] - hands[1]):.2f}."
     )
     return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
 
@@ -205,14 +208,16 @@ def next_goal(study: Study) -> str:
     many coarticulate, or cannot, by construction.
     """
     shared = shared_goal(study)
-    if shared is None or not is_subject(shared.method):
+    if shared is None or not is_subject(study.methods.loc[shared.method]):
         return ""
+    method: Any = study.methods.loc[shared.method]
+    titles = study.methods.title
     # A method whose runs differ by chance takes a test, and one that selects needs random search.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
-    drawn = study.declared[cells[0].method].stochastic
     needed, random_search = selects(study, shared.method), random_search_for(study, shared)
     beyond = shared.p_beyond(random_search) if needed and random_search is not None else math.nan
-    who = "The learner" if is_learner(shared.method) else name_of(shared.method)
+    drawn, who = method.stochastic, called(method)
+    who = "The learner" if who == "the learner" else who
     runs, p = counted(shared.n, "run"), p_value(shared.p)
     in_sd = not math.isnan(shared.standardised_posture_difference)
 
@@ -253,30 +258,32 @@ def next_goal(study: Study) -> str:
             "significantly more."
         )
     text += (
-        f"\nBetween next goals, the posture difference of {name_of(shared.method)} at goal "
+        f"\nBetween next goals, the posture difference of {method.title} at goal "
         f"{shared.goal} is {number(shared.posture_difference, 2)} (length units and rad; "
         f"{', '.join(filter(None, (runs, p)))})"
     )
     if random_search is not None:
         text += (
-            f", that of {name_of(random_search.method)} "
+            f", that of {titles[random_search.method]} "
             f"{number(random_search.posture_difference, 2)}"
         )
         text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
     elif needed:
         text += f". Run method {RANDOM_SEARCH} as well to tell"
-    return f"{text}.{failed_runs(cells, ' and are not counted')}"
+    return f"{text}.{failed_runs(study, cells, ' and are not counted')}"
 
 
-def is_subject(label: str) -> bool:
-    """Return whether a sentence may be about a method: the learner, or a method from a file."""
-    return label.partition(" ")[0] in LEARNERS or not is_built_in(label)
+def is_subject(rows: Any) -> Any:
+    """Return whether a sentence may be about a method: the learner, or a method from a file; of a
+    row of :attr:`.Study.methods`, or of each of several rows."""
+    return (rows.kind == "learner") | ~rows.built_in
 
 
 def joints_or_hand(study: Study) -> str:
     """Number of methods in which the next goal moves the joints more than the hand."""
     rows = list_contexts(study)
-    rows = rows[~rows.method.map(is_setting).astype(bool) & (rows.distance > 0.01)]
+    is_main = rows.method.map(study.methods.under) == ""
+    rows = rows[is_main & (rows.distance > 0.01)]
     if not len(rows):
         return ""
     larger = int((rows.equivalent > rows.other).sum())

@@ -8,33 +8,36 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import methods
+from coartic.analysis import standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.methods import EC1, LEARNERS, most_exploring
 from coartic.analysis.optima import initial_reward
-from coartic.analysis.settings import compares_settings, name_in
+from coartic.analysis.sections.costs import improvements
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics import scores
-from coartic.analysis.topics.costs import improvements
 from coartic.analysis.words import marked, number
 
 BUDGETS = (100, 1_000, 10_000)
 """Trials after which the table reads rewards."""
 WINDOW = 100
 """Trials over which a learning curve averages the reward of trials."""
-CURVES = (*methods.LEARNERS, "hill-climbing", "cma-es/bandit")
+CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 """Built-in methods whose learning curves are drawn; of others they all are."""
 
 
-@table("task, method, runs, initial, after_100, after_1000, after_10000, trials_to_half_gain[]")
+@table(
+    "task; method; runs; initial .1; after_100: after 100 trials .1; after_1000: after 1000 .1; "
+    "after_10000: after 10\u202f000 .1; "
+    "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]"
+)
 def list_learning(study: Study) -> Rows:
     """Best reward after so many trials (mean over runs), and the trial at which half of what a run
     gains on the initial solution is there (median and quartiles of the runs; ∞ without gain)."""
     for (task, label), cell in study.cells.items():
         learned = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
         runs = [run for run in learned if run is not None]
-        if task not in one_by_one(study) or not scores.is_compared(study, label):
+        if task not in one_by_one(study) or study.methods.kind[label] == "optimum search":
             continue
         if not len(learned) == len(runs) == len(cell.good) > 0:
             continue
@@ -79,7 +82,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
     if not len(data):
         return None
     tasks = [study.tasks[name] for name in data.task.unique()]
-    labels = methods.in_order(data.method.unique())
+    labels = [label for label in study.methods.index if label in {*data.method}]
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
     drawing, panels = style.panels((rows, columns), size, len(tasks))
@@ -110,15 +113,15 @@ def draw_learning_curves(study: Study) -> Parts | None:
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.legend_line(name_in(study, label), linewidth=1.3, **look)
+        style.legend_line(study.methods.title[label], linewidth=1.3, **look)
         for label, look in looks.items()
     ]
     handles += [style.legend_line("initial solution", **style.INITIAL)]
     if known := [task.name for task in tasks if task.name in study.optima]:
-        handles.append(style.legend_line(scores.reference(study, known), **style.OPTIMUM))
+        handles.append(style.legend_line(standings.reference(study, known), **style.OPTIMUM))
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
-    words = spoken(ends, "{task}, {method}: {best:.0f}")
+    words = spoken(ends.join(study.methods.title, on="method"), "{task}, {title}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."
     return drawing, data, alt, tasks
 
@@ -130,16 +133,13 @@ def learning_curves(study: Study) -> pd.DataFrame:
     ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
     ``best_high``, ``trials`` (mean over runs and the last :data:`WINDOW` trials).
     """
-    shown: list[tuple[str, str]] = []
+    shown, methods = list[tuple[str, str]](), study.methods
+    drawn = methods.index[methods.headline & (methods.base.isin(CURVES) | ~methods.built_in)]
     for task in one_by_one(study):
-        labels = [
-            label
-            for label in methods.in_order([label for name, label in study.cells if name == task])
-            if len(study.cells[task, label].good)
-            and (label in CURVES or not methods.is_built_in(label) or compares_settings(study))
-        ]
-        two_armed = {*methods.LEARNERS} & {*labels} - {methods.EC1}
-        shown += [(task, label) for label in labels if not (two_armed and label == methods.EC1)]
+        keys = [(task, label) for label in drawn if (task, label) in study.cells]
+        labels = [label for _, label in keys if len(study.cells[task, label].good)]
+        two_armed = {*LEARNERS} & {*labels} - {EC1}
+        shown += [(task, label) for label in labels if not (two_armed and label == EC1)]
     wanted = {run for key in shown for run in study.cells[key].good.run_id}
     trials_of = {run: rewards for run, rewards in study.rewards() if run in wanted}
     curves = [pd.DataFrame()]
@@ -173,7 +173,7 @@ def how_fast(study: Study) -> str:
     after = [
         f"{number(float(f'{half[row]:.2g}'))} trials on {marked(task)}"
         for name, task in study.tasks.items()
-        if half.get(row := f"{name} {methods.most_exploring(task)}", math.inf) < math.inf
+        if half.get(row := f"{name} {most_exploring(task)}", math.inf) < math.inf
     ]
     if not after:
         return ""

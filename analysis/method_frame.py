@@ -1,0 +1,146 @@
+"""A row for each method of a study, with what it is."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from coartic.analysis.methods import CONDITION_OF, EC1, KNOWN_METHODS, LEARNERS, title_of
+from coartic.internal.text import one_line
+from coartic.learner.conditions import CONDITIONS, METHOD_PREFIX
+from coartic.method import Information
+
+if TYPE_CHECKING:
+    from coartic.analysis.study import CellRuns
+    from coartic.runs.method_info import MethodInfo
+
+BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
+    "using the reward of each trial",
+    "using the reward as a formula",
+    "not using the reward",
+)
+"""Groups of methods by their use of the reward."""
+COLORS = ("sky", "vermillion", "orange", "purple", "blue")
+DASHES = ("dashed", "dotted", "dash-dotted", "solid")
+OWN_COLOR = "brown"
+"""Colour of methods from files: no built-in method has it."""
+
+
+def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
+    """Return a row for each method of some cells, in the order of lists and figures.
+
+    Parameters
+    ----------
+    cells : iterable of CellRuns
+        Runs of the methods, in the order of the suite.
+    declared : mapping of str to MethodInfo
+        What each method declares, by its id without a setting.
+
+    Returns
+    -------
+    DataFrame
+        By the label of the method, with the columns of :attr:`.Study.methods`.
+    """
+    by_label: dict[str, list[CellRuns]] = {}
+    for cell in cells:
+        by_label.setdefault(cell.label, []).append(cell)
+    rows = {label: row_of(of_label, declared, by_label) for label, of_label in by_label.items()}
+    rows |= joined_conditions(by_label, rows)
+    for label, look in looks_of(rows):
+        rows[label]["look"] = look
+    place = {name: number for number, name in enumerate(KNOWN_METHODS)}
+    ordered = sorted(rows, key=lambda label: place.get(rows[label]["base"], len(place)))
+    columns = [
+        "base", "condition", "setting", "parts", "title", "algorithm", "kind", "information",
+        "built_in", "stochastic", "headline", "under", "look",
+    ]  # fmt: skip
+    frame = pd.DataFrame([rows[label] for label in ordered], ordered, columns)
+    return frame.rename_axis("method")
+
+
+def row_of(
+    cells: Sequence[CellRuns], declared: Mapping[str, MethodInfo], labels: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the row of a method by its cells; ``labels``: of all methods of the study."""
+    base, setting, label = cells[0].method, cells[0].setting, cells[0].label
+    info = declared[base]
+    known = KNOWN_METHODS.get(base) if info.is_ours else None
+    default = base if setting else known.ablation_of if known else ""
+    under = default if default in labels else ""
+    return {
+        "base": base,
+        "condition": CONDITION_OF.get(base, ""),
+        "setting": setting,
+        "parts": (label,),
+        "title": title_of(base, setting),
+        "algorithm": known.algorithm if known else one_line(label),
+        "kind": known.kind if known else "",
+        "information": group_of(cells),
+        "built_in": info.is_ours,
+        "stochastic": info.stochastic,
+        "headline": not under and (known is None or known.headline),
+        "under": under,
+        "look": tuple(known.look) if known and not setting else (),
+    }
+
+
+def group_of(cells: Iterable[CellRuns]) -> str:
+    """Return which of :data:`GROUPS` a method belongs to.
+
+    A method that makes a single trial on every task makes no use of the reward of a trial.
+    """
+    parts = [cell.runs for cell in cells]
+    information = {each for runs in parts for text in runs.information.unique()
+                   for each in text.split(", ")}  # fmt: skip
+    if Information.REWARD_FORMULA.value in information:
+        return BY_FORMULA
+    several = any((runs.trials > 1).any() for runs in parts)
+    learns = several and Information.REWARD_BY_TRIAL.value in information
+    return BY_TRIAL if learns else WITHOUT_REWARD
+
+
+def joined_conditions(
+    cells: Mapping[str, Sequence[CellRuns]], rows: Mapping[str, dict[str, Any]]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield rows of the learner over one-armed and two-armed tasks, which it explores under
+    different conditions: EC1, and on tasks where it ran a condition that draws hands at random."""
+    one_armed = {cell.task for cell in cells.get(EC1, ())}
+    for label in LEARNERS:
+        two_armed = {cell.task for cell in cells.get(label, ())}
+        draws_hands = CONDITIONS[CONDITION_OF[label]].hand_exploration == "random"
+        if draws_hands and two_armed and one_armed - two_armed:
+            both = f"{CONDITION_OF[EC1]}, {CONDITION_OF[label]}"
+            row = {"parts": (EC1, label), "title": f"learner ({both})"}
+            yield f"{METHOD_PREFIX.rstrip('/')} ({both})", rows[label] | row
+
+
+def looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield the colour and dash of each method, the same in all figures of a report.
+
+    Built-in methods may have a look of their own. Methods from files are brown; more than four of
+    them, and the others, get what is free.
+    """
+    fixed = {row["look"] for row in rows.values()}
+    free = itertools.cycle((c, d) for d in DASHES for c in COLORS if (c, d) not in fixed)
+    theirs = itertools.chain(((OWN_COLOR, dash) for dash in DASHES), free)
+    for label in sorted(rows, key=lambda label: bool(rows[label]["built_in"])):
+        row = rows[label]
+        yield label, row["look"] or next(free if row["built_in"] else theirs)
+
+
+def headline_methods(rows: pd.DataFrame) -> list[str]:
+    """Return the methods that stand for their algorithms, of some rows of
+    :attr:`.Study.methods`; all if none does.
+
+    The learner over all tasks, with the condition that explores most, takes the place of its
+    single conditions.
+    """
+    kept = rows[rows.headline]
+    joined = kept.condition[kept.parts.map(len) > 1]
+    if len(joined):
+        most = max(joined.index, key=lambda label: [*CONDITIONS].index(joined[label]))
+        kept = kept[(kept.kind != "learner") | (kept.index == most)]
+    return [*(kept if len(kept) else rows).index]

@@ -1,0 +1,47 @@
+"""Every method on every task, with rewards, hands and costs."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from coartic.analysis.sections.costs import solve_times
+from coartic.analysis.study import Study, one_by_one, typical_run
+from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
+from coartic.analysis.words import marked, tally
+from coartic.estimates import standard_deviation
+
+
+@table(
+    "task; method; runs; solved: -; reward± .1; gap: gap (%) .1; hands; trials; "
+    "forward_kinematics: forward-kinematics evaluations; solve_s: seconds; median_run"
+)
+def list_methods(study: Study) -> Rows:
+    """Every method on every task: mean reward, gap, hands and costs (medians).
+
+    Within a task searches for the optimum come first, then the highest mean reward.
+    ``median_run``: beginning of the id of the run whose reward is nearest the median.
+    """
+    places = {task: place for place, task in enumerate(one_by_one(study))}
+    cells = [cell for cell in study.cells.values() if cell.task in places]
+    means = {id(cell): cell.rewards.mean() if len(cell.good) else -math.inf for cell in cells}
+    is_search = study.methods.kind == "optimum search"
+    cells.sort(key=lambda c: (places[c.task], not is_search[c.label], -means[id(c)]))
+    for cell in cells:
+        good, runs = cell.good, cell.runs
+        row = {
+            "task": marked(study.tasks[cell.task]),
+            "method": cell.label,
+            "runs": len(runs),
+            "solved": len(good),
+            "reward": means[id(cell)] if len(good) else math.nan,
+            "reward_sd": standard_deviation(cell.rewards),
+            "gap": cell.gap,
+            "hands": tally(Counter(good.hands)) if len(good) > 1 else "".join(good.hands),
+            "trials": runs.trials.astype(float).median(),
+            "forward_kinematics": runs.forward_kinematics.astype(float).median(),
+            "solve_s": solve_times(good).astype(float).median(),
+        }
+        if len(good):
+            row["median_run"] = typical_run(good)[:SHORT_ID]
+        yield f"{cell.task} {cell.label}", row | runs_of(cell)

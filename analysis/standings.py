@@ -1,0 +1,196 @@
+"""Which methods are compared, on which tasks, and how far they stay behind the best known reward.
+
+Methods are compared by the gap of their mean reward to the best known reward of a task. Searches
+for the optimum are references and not compared; neither are runs that lock the base, which solve
+another problem.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.optima import BestKnown
+from coartic.analysis.statistics.hypotheses import sign_flip_test
+from coartic.analysis.statistics.instances import task_mean
+from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.words import number
+from coartic.estimates import Estimate
+from coartic.internal.text import counted
+from coartic.learner.conditions import CONDITIONS
+
+
+def reference(study: Study, tasks: Iterable[str]) -> str:
+    """Return what gaps on these tasks are to: ``optimum`` where all are proven, ``best of this
+    folder`` where nothing else is known of any, or else ``best known reward``."""
+    best = [study.optima[task] for task in tasks]
+    if all(each.proven for each in best):
+        return "optimum"
+    return "best of this folder" if all(each.only_here for each in best) else "best known reward"
+
+
+@cached
+def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
+    """Return the cells of every compared method by task, on tasks with a best known reward."""
+    rows, by_method = study.methods, dict[str, dict[str, CellRuns]]()
+    for method, parts in rows.parts[rows.kind != "optimum search"].items():
+        keys = [(task, part) for part in parts for task in study.tasks]
+        found = {key[0]: study.cells[key] for key in keys if key in study.cells}
+        cells = {task: cell for task, cell in found.items() if cell.has_best_known}
+        if len({cell.label for cell in cells.values()}) == len(parts):
+            by_method[str(method)] = cells
+    return by_method
+
+
+def cells_on(study: Study, method: str, tasks: Iterable[str]) -> list[CellRuns]:
+    """Return the cells of a compared method on some tasks; none where it lacks one of them, or
+    where one condition of several together ran on all."""
+    of_method, tasks = compared(study)[method], [*tasks]
+    cells = [of_method[task] for task in tasks if task in of_method]
+    whole = len(cells) == len(tasks)
+    return cells if whole and {c.label for c in cells} == {*study.methods.parts[method]} else []
+
+
+def widest_tasks(ran_on: Iterable[tuple[str, Iterable[str]]], least: int = 1) -> set[str]:
+    """Return the tasks that a mean is over, which are all tasks unless too few things ran on all.
+
+    ``ran_on``: names, and the tasks on which each ran. Of these sets of tasks, the set with the
+    most pairs of a task and a name that ran on the whole set, of ``least`` names at least if it
+    can be.
+    """
+    sets = [(name, {*tasks}) for name, tasks in ran_on]
+
+    def pairs(tasks: set[str]) -> tuple[bool, int, int]:
+        names = len({name for name, on in sets if on >= tasks})
+        return names >= least, len(tasks) * names, len(tasks)
+
+    return max((tasks for _, tasks in sets), key=pairs, default=set())
+
+
+@cached
+def common_tasks(study: Study) -> tuple[str, ...]:
+    """Return the tasks over which algorithms are compared (:func:`widest_tasks`)."""
+    algorithms = study.methods.algorithm
+    widest = widest_tasks((algorithms[m], cells) for m, cells in compared(study).items())
+    return tuple(task for task in study.tasks if task in widest)
+
+
+@cached
+def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
+    """Return the tasks on which a compared method solved every run."""
+    return tuple(task for task, cell in compared(study)[method].items() if cell.all_good)
+
+
+def coverage(study: Study, method: str) -> str:
+    """Return on how many of the compared tasks a method solved every run, as ``10 of 50 tasks``;
+    empty where it did on all."""
+    every = {task for cells in compared(study).values() for task in cells}
+    solved = len(solved_tasks(study, method))
+    return f"{solved} of {counted(len(every), 'task')}" if solved < len(every) else ""
+
+
+def best_of_instances(study: Study) -> dict[str, BestKnown]:
+    """Return the best known reward of each instance of a family that has one."""
+    optima = study.optima.items()
+    return {name: best for name, best in optima if study.tasks[name].family is not None}
+
+
+def shown_name(study: Study, method: str) -> str:
+    """Return the name of a method; of a method from a file that did not solve all of
+    :func:`common_tasks` with the number of its tasks."""
+    row = study.methods.loc[method]
+    if row.built_in or {*common_tasks(study)} <= {*solved_tasks(study, method)}:
+        return str(row.title)
+    return f"{row.title} ({coverage(study, method)})"
+
+
+@cached
+def gaps_on(study: Study, tasks: tuple[str, ...]) -> pd.DataFrame:
+    """Return the mean gap over some tasks of each method that solved every run on all of them,
+    nearest first.
+
+    Columns ``method``, ``gap`` with its interval for other runs on the same tasks, ``tasks`` (their
+    number) and ``runs``, and those of :attr:`.Study.methods`.
+    """
+    rows = []
+    for method in compared(study):
+        cells = sorted(cells_on(study, method, tasks), key=lambda cell: cell.task)
+        if cells and all(cell.all_good for cell in cells):
+            gap = task_mean([cell.gaps for cell in cells])
+            runs = sum(len(cell.runs) for cell in cells)
+            rows.append((method, gap.value, gap.low, gap.high, len(cells), runs))
+    columns = ["method", "gap", "gap_low", "gap_high", "tasks", "runs"]
+    frame = pd.DataFrame(rows, columns=columns).sort_values("gap", kind="stable")
+    return frame.join(study.methods, on="method")
+
+
+def main_gaps(study: Study) -> pd.DataFrame:
+    """Return :func:`gaps_on` the tasks over which algorithms are compared."""
+    return gaps_on(study, common_tasks(study))
+
+
+def leaders(rows: pd.DataFrame, group: str) -> pd.DataFrame:
+    """Return the best form of each algorithm of a group, of rows of :func:`gaps_on`, nearest first.
+
+    The learner is there by the form that explores most. A setting counts where its method's
+    defaults did not run.
+    """
+    rows = rows[(rows.information == group) & (rows.under == "")]
+    is_learner, conditions = rows.kind == "learner", [*CONDITIONS]
+    most = max(rows.condition[is_learner], key=conditions.index, default="")
+    kept = rows[~is_learner | (rows.condition == most)]
+    return kept.drop_duplicates("algorithm").reset_index(drop=True)
+
+
+def is_learner(rows: Any) -> Any:
+    """Return whether a row of :attr:`.Study.methods`, or each of several rows, is the paper's
+    learner with its own parameters."""
+    return (rows["kind"] == "learner") & (rows["setting"] == "")
+
+
+def called(row: Mapping[Any, Any] | pd.Series) -> str:
+    """Return the name of a method in sentences, by its row of :attr:`.Study.methods`."""
+    return "the learner" if is_learner(row) else str(row["title"])
+
+
+def paired_difference(study: Study, first: str, second: str, tasks: Iterable[str]) -> Estimate:
+    """Two-tailed test of the difference of mean gaps of two methods over some tasks.
+
+    A sign-flip test of runs paired by seed within their task; a method that is run once is compared
+    with every run of the other. All tasks count the same; NaN without pairs on one of them. Runs
+    that only one of them has do not count, unlike in the table ``against-learner``.
+    """
+    differences = []
+    tasks = [*tasks]
+    both = (cells_on(study, method, tasks) for method in (first, second))
+    for cells in zip(*both, strict=True):
+        a, b = (cell.good[["seed"]].assign(gap=cell.gaps) for cell in cells)
+        once = min(len(a), len(b)) == 1
+        pairs = a.merge(b, "cross") if once else a.merge(b, on="seed")
+        differences.append((pairs.gap_x - pairs.gap_y).to_numpy())
+    if not differences or not all(map(len, differences)):
+        return Estimate(math.nan)
+    return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences]))
+
+
+def failed_runs(study: Study, cells: Iterable[CellRuns], consequence: str) -> str:
+    """Return a sentence with a leading space; empty where none of the cells' runs failed.
+
+    It counts all runs of the methods of which some failed, and ends with the ``consequence``:
+    `` 3 of 40 runs of hill climbing failed and are not counted.``
+    """
+    runs, failed = Counter[str](), Counter[str]()
+    for cell in {(cell.task, cell.label): cell for cell in cells}.values():
+        runs[cell.label] += len(cell.runs)
+        failed[cell.label] += len(cell.runs) - len(cell.good)
+    who = [label for label in failed if failed[label]]
+    if not who:
+        return ""
+    names = f"{len(who)} methods" if len(who) > 2 else " and ".join(study.methods.title[who])
+    total = sum(runs[label] for label in who)
+    return f" {number(failed.total())} of {number(total)} runs of {names} failed{consequence}."
