@@ -26,7 +26,7 @@ from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
-from coartic.motion.initial import ranked_sequences
+from coartic.motion.trial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, label_of, size_of
@@ -280,8 +280,7 @@ class Study:
         except NotApplicableError:
             names = []
         ranked = ranked_sequences(self.tasks[task], names)
-        rows = [(hands, trial.reward, trial.reason) for hands, trial in ranked]
-        frame = pd.DataFrame(rows, columns=["hands", "reward", "reason"])
+        frame = pd.DataFrame([trial[:3] for trial in ranked], columns=["hands", "reward", "reason"])
         return frame.astype({"reward": "Int64"})
 
     @cached_property

@@ -37,7 +37,7 @@ import numpy as np
 from coartic import MotionModel, Task
 from coartic.baselines.relaxation import Lagrangian, PartialSequence, Relaxation, Relaxed, split
 from coartic.baselines.whole_ticks import mergeable
-from coartic.motion.initial import too_many_sequences
+from coartic.motion.trial import too_many_sequences
 from coartic.robot import HANDS, Array, Hand
 
 _TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below

@@ -35,7 +35,7 @@ from pydantic import Field
 from coartic import Movement
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.compiled import chain_by, entry, joint_lever
+from coartic.motion.compile import chain_by, entry, joint_lever
 from coartic.robot import BASE_DOF, Array, Hand
 
 Mask = NDArray[np.bool_]

@@ -16,7 +16,8 @@ from pydantic import Field
 
 from coartic.learner.learning import TRIALS
 from coartic.method import MethodError, Parameters, Result, Session
-from coartic.motion.trials import Trials, movements_of
+from coartic.motion.solution import movements_of
+from coartic.motion.trial import Trials
 from coartic.optimisers import explored_joints
 from coartic.robot import Array
 

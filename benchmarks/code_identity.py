@@ -18,7 +18,7 @@ from pathlib import Path
 
 import coartic
 from coartic.benchmarks.syntax import statements_in, text_of
-from coartic.motion.sources import PACKAGE
+from coartic.motion.compile import PACKAGE
 
 _API = PACKAGE / "__init__.py"
 """It imports nothing before it is asked for: names count where they are at home."""

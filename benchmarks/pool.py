@@ -366,7 +366,7 @@ def start_process(process: Any) -> None:
         if _START == "forkserver":
             from multiprocessing import resource_tracker
 
-            multiprocessing.set_forkserver_preload([__name__, "coartic.motion.compiler"])
+            multiprocessing.set_forkserver_preload([__name__, "coartic.benchmarks.preload"])
             resource_tracker.ensure_running()  # first: it lets signals through again
         sys.modules["__main__"] = ModuleType("__main__")
         try:

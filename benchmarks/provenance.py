@@ -20,7 +20,7 @@ import numpy as np
 import coartic
 from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import ONE_THREAD, threads_for
-from coartic.motion.sources import FINGERPRINT, PACKAGE
+from coartic.motion.compile import FINGERPRINT, PACKAGE
 
 _LIBRARIES = (
     "casadi",

@@ -30,8 +30,8 @@ from coartic.method import (
     UndeclaredError,
     outline_of,
 )
-from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
+from coartic.motion.trial import trials_outside
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import SEARCH, Job
 from coartic.runs.record import PARTS, Outcome, Times

@@ -15,11 +15,16 @@ if TYPE_CHECKING:
     from coartic.learner.run import LearningRun
     from coartic.method import BudgetError, MethodError, UndeclaredError
     from coartic.model import PAPER, MotionModel
-    from coartic.motion.corrective import Correction, correct
-    from coartic.motion.initial import corrective_trial, hand_sequences, initial_hands
-    from coartic.motion.movement import MoveResult, move
-    from coartic.motion.solution import Execution, Movement, execute
-    from coartic.motion.trials import movements_of
+    from coartic.motion.movement import Correction, MoveResult, correct, move
+    from coartic.motion.solution import (
+        Execution,
+        Movement,
+        corrective_trial,
+        execute,
+        hand_sequences,
+        initial_hands,
+        movements_of,
+    )
     from coartic.optimisers import Objective, Optimiser, objective, problems
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
@@ -79,11 +84,11 @@ _HOMES = {
     "learner.run": ("LearningRun",),
     "method": ("BudgetError", "MethodError", "UndeclaredError"),
     "model": ("PAPER", "MotionModel"),
-    "motion.corrective": ("Correction", "correct"),
-    "motion.initial": ("corrective_trial", "hand_sequences", "initial_hands"),
-    "motion.movement": ("MoveResult", "move"),
-    "motion.solution": ("Execution", "Movement", "execute"),
-    "motion.trials": ("movements_of",),
+    "motion.movement": ("Correction", "MoveResult", "correct", "move"),
+    "motion.solution": (
+        *("Execution", "Movement", "corrective_trial", "execute"),
+        *("hand_sequences", "initial_hands", "movements_of"),
+    ),
     "optimisers": ("Objective", "Optimiser", "objective", "problems"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),

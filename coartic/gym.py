@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -27,20 +27,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.estimates import Estimate, mean
+from coartic.gym_kernel import VectorState, observe, step_robots
 from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
 from coartic.internal.text import unknown
-from coartic.method import Method, MethodError, Session
+from coartic.method import Method, MethodError, run_method
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.initial import initial_reward
-from coartic.motion.robot_parameters import robot_parameters_for
-from coartic.motion.slots import SLOTS, runs_for, slots_for
-from coartic.motion.solution import execute
-from coartic.motion.steps import VectorState, look, step_robots
+from coartic.motion.batch import robot_parameters
+from coartic.motion.solution import execute, initial_reward
 from coartic.optimisers import FAILED
-from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
+from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Hand, Robot
+from coartic.tasks.catalogue import as_task
 from coartic.tasks.families import LOCKED, instance_names, shipped_families
 from coartic.tasks.optima import best_shipped
-from coartic.tasks.task import MOST_GOALS, Split, Task, as_task, parse_task
+from coartic.tasks.task import MOST_GOALS, Split, Task, parse_task
 
 if TYPE_CHECKING:
     from coartic.sb3 import RobotEnvs
@@ -74,6 +73,40 @@ def plain_options(options: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(model := plain.get("model"), MotionModel):
         plain["model"] = model._asdict()
     return plain
+
+
+class Scope(NamedTuple):
+    """The tasks of an environment, and what their robots have in common."""
+
+    tasks: list[Task | str]
+    """Tasks, or names of instances."""
+    goals: int
+    """Most goals of a task."""
+    links: int
+    """Most links of an arm."""
+    hands: tuple[Hand, ...]
+    locked: tuple[str, ...]
+    """Base coordinates that no robot can move."""
+    differs: bool
+    """Whether the robots differ in links."""
+
+
+def scope_of(
+    task: Task | str | Path, split: Split | None, count: int | None, year: int | None
+) -> Scope:
+    """The scope of a task, or of a family with a split of its instances. Raises ValueError for a
+    split of a task."""
+    if isinstance(task, str) and task in shipped_families():
+        family = shipped_families()[task]
+        names = instance_names(task, split or "development", count, year)
+        locked = tuple(set.intersection(*({*LOCKED[base]} for base in family.base)))
+        (fewest, links), hands = family.links, family.hands
+        return Scope([*names], family.goals[1], links, hands, locked, fewest < links)
+    if (split, count, year) != (None, None, None):
+        raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
+    only = as_task(task)
+    links = only.robot.most_links
+    return Scope([only], len(only.goals), links, only.hands, only.locked_base, False)
 
 
 class TaskVectorEnv(Recorded, VectorEnv):
@@ -145,59 +178,33 @@ class TaskVectorEnv(Recorded, VectorEnv):
         model = MotionModel(**model) if isinstance(model, dict) else model
         self.num_envs, self.model = num_envs, check_model(model)
         self.options = {"task": task, "ahead": ahead, "model": model}
-        if isinstance(task, str) and task in shipped_families():
-            family = shipped_families()[task]
-            instances = instance_names(task, split or "development", count, year)
-            self.tasks: list[Task | str] = [*instances]
-            goals, links, hands = family.goals[1], family.links[1], family.hands
-            locked = set.intersection(*({*LOCKED[base]} for base in family.base))
-            differ = family.links[0] < links
-        elif (split, count, year) != (None, None, None):
-            raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
-        else:
-            only = as_task(task)
-            self.tasks = [only]
-            goals, links, hands = len(only.goals), only.robot.most_links, only.hands
-            locked, differ = {*only.locked_base}, False
+        scope = scope_of(task, split, count, year)
+        self.tasks = scope.tasks
         self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
         # All robots are taken for the widest, some of whose links have no length.
-        self.links = links
-        self.widest = widest = Robot((1.0,) * links, (1.0,) * links)
-        arms = [np.arange(widest.dof)[widest.joints(hand)] for hand in hands]
-        base = [place for place, axis in enumerate("xy") if axis not in locked]
-        joints, number = np.concatenate([base, *arms]).astype(np.int64), len(self.tasks)
-        entries, view = len(hands) - 1 + len(joints), ahead + 1
-        self.starts = np.zeros((number, widest.dof))
+        self.widest = Robot((1.0,) * scope.links, (1.0,) * scope.links)
+        self.starts = np.zeros((len(self.tasks), self.widest.dof))
         self.kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
-        self.single_action_space = Box(-1.0, 1.0, (entries,), np.float32)
-        sizes = [view, 2 * view + len(joints), len(joints) * differ]
+        base = [place for place, axis in enumerate("xy") if axis not in scope.locked]
+        arms = [np.arange(self.widest.dof)[self.widest.joints(hand)] for hand in scope.hands]
+        joints, view = np.concatenate([base, *arms]).astype(np.int64), ahead + 1
+        sizes = [view, 2 * view + len(joints), len(joints) * scope.differs]
         high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
+        self.state = VectorState.empty(
+            self.widest,
+            (num_envs, len(self.tasks), scope.goals),
+            joints,
+            np.array([HANDS.index(hand) for hand in scope.hands]),
+            len(high),
+            ahead=ahead,
+            reach=REACH,
+            failed=-float(FAILED),
+        )
+        self.single_action_space = Box(-1.0, 1.0, self.state.actions.shape[1:], np.float32)
         self.single_observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._rngs: list[Any] = [None] * num_envs
-        self.state = VectorState(
-            task=np.zeros(num_envs, np.int64),
-            goal=np.zeros(num_envs, np.int64),
-            q=np.zeros((num_envs, widest.dof)),
-            going=np.zeros(num_envs, np.bool_),
-            actions=np.zeros((num_envs, entries)),
-            rewards=np.zeros(num_envs),
-            seen=np.zeros((num_envs, len(high)), np.float32),
-            robot_parameters=robot_parameters_for(widest)[:0],
-            kinds=np.full(number, -1),
-            goals=np.zeros((number, goals, 2)),
-            counts=np.zeros(number, np.int64),
-            movable=np.zeros((number, len(joints)), np.bool_),
-            joints=joints,
-            sides=np.array([HANDS.index(hand) for hand in hands]),
-            ahead=ahead,
-            reach=REACH,
-            failed=-float(FAILED),
-            runs=runs_for(len(hands) * SLOTS, widest).reshape(len(hands), SLOTS),
-            slots=slots_for(widest),
-            indices=np.zeros(SLOTS, np.int64),
-        )
 
     def task_at(self, number: int) -> Task:
         """A task by its number; it is loaded when it is first asked for."""
@@ -212,23 +219,22 @@ class TaskVectorEnv(Recorded, VectorEnv):
             state.counts[number] = len(task.goals)
             kind = task.robot, float(task.radius), task.locked_base
             if kind not in self.kind_of:
-                self.kind_of[kind] = len(state.robot_parameters)
-                robot_parameters = robot_parameters_for(
+                self.kind_of[kind] = len(state.parameters)
+                parameters = robot_parameters(
                     self.widest, task.radius, locked_base=task.locked_base, model=self.model
                 ).copy()
-                for hand, arm in zip(HANDS, robot_parameters["arms"][0], strict=True):
+                for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
                     _, links, arm["shoulder_x"], arm["shoulder_y"] = task.robot.arm(hand)
                     arm["links"] = np.pad(links, (0, len(arm["links"]) - len(links)))
-                self.state = state._replace(
-                    robot_parameters=np.concatenate([state.robot_parameters, robot_parameters])
-                )
+                known = np.concatenate([state.parameters, parameters])
+                self.state = state._replace(parameters=known)
             state.kinds[number] = self.kind_of[kind]
         return task
 
     def places_of(self, robot: Robot) -> NDArray[np.int64]:
         """Where the entries of a robot's configurations are among those of the widest one."""
         left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
-        return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self.links + right])
+        return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self.widest.most_links + right])
 
     def begin(self, rows: Rows, numbers: ArrayLike) -> None:
         """Put robots at the start of the tasks of these numbers."""
@@ -237,7 +243,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         for number in {*state.task[rows].tolist()}:
             self.task_at(number)
         state.q[rows] = self.starts[state.task[rows]]
-        look(self.state)
+        observe(self.state)
 
     def move(self, actions: ArrayLike, rows: Rows = slice(None)) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
@@ -473,46 +479,65 @@ def score(
     model, shape = setting.model, setting.single_action_space.shape
     tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
     policies = policy if isinstance(policy, Mapping) else {"policy": policy}
-    policies = {name: each for name, each in policies.items() if each is not None}
-    for each in policies.values():
-        if not (callable(each) or hasattr(each, "predict") or isinstance(each, Method)):
-            raise TypeError(
-                f"policy is {brief_value(each)}; it must be a function of observations, an agent "
-                "with predict, or a Method"
-            )
-
-    def run(act: Any, trials: int = 1) -> Array:
-        """Rewards of trials on each task, ``(K, trials)``; NaN where one failed."""
-        rows = np.arange(trials * len(tasks))
-        robots, totals = TaskVectorEnv(len(rows), **given), np.zeros(len(rows))
-        robots.begin(rows, rows // trials)
-        while len(rows):
-            robots.move(act(robots.state.seen[rows]), rows)
-            totals[rows] += robots.state.rewards[rows]
-            rows = np.flatnonzero(robots.state.going)
-        return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
-
-    def column(values: Iterable[float | None]) -> Array:
-        return np.array([[np.nan if each is None else each] for each in values])
-
     rewards = {}
     for name, each in policies.items():
         if isinstance(each, Method):
             rewards[name] = column(reward_of(each, task, seed, model) for task in tasks)
-        elif hasattr(each, "predict"):
-            rewards[name] = run(lambda seen, each=each: each.predict(seen, deterministic=True)[0])
-        else:
-            rewards[name] = run(each)
+        elif each is not None:
+            rewards[name] = rollout(acting(each), given, len(tasks))
     rng = np.random.default_rng(seed)
-    shipped = [best_shipped(task) if model == PAPER else None for task in tasks]
-    best = column(None if each is None else each.reward for each in shipped)
-    rewards["random actions"] = run(lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), episodes)
+    rewards["random actions"] = rollout(
+        lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), given, len(tasks), episodes
+    )
     rewards["corrective process"] = column(initial_reward(task, model) for task in tasks)
-    rewards["best known"] = best
+    shipped = [best_shipped(task) if model == PAPER else None for task in tasks]
+    return gaps(rewards, column(None if each is None else each.reward for each in shipped))
+
+
+def column(rewards: Iterable[float | None]) -> Array:
+    """Rewards as a column, shape ``(K, 1)``; NaN for None."""
+    return np.array([[np.nan if reward is None else reward] for reward in rewards])
+
+
+def acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
+    """The function of observations that a policy is. Raises TypeError where it is none."""
+    if hasattr(policy, "predict"):
+        return lambda seen: policy.predict(seen, deterministic=True)[0]
+    if callable(policy):
+        return policy  # type: ignore[no-any-return]
+    raise TypeError(
+        f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
+        "with predict, or a Method"
+    )
+
+
+def rollout(
+    act: Callable[[NDArray[np.float32]], ArrayLike],
+    options: Mapping[str, Any],
+    tasks: int,
+    trials: int = 1,
+) -> Array:
+    """Let a policy make trials on each of so many tasks of an environment with these options.
+
+    Returns rewards, shape ``(tasks, trials)``; NaN where a trial failed.
+    """
+    rows = np.arange(trials * tasks)
+    robots, totals = TaskVectorEnv(len(rows), **options), np.zeros(len(rows))
+    robots.begin(rows, rows // trials)
+    while len(rows):
+        robots.move(act(robots.state.seen[rows]), rows)
+        totals[rows] += robots.state.rewards[rows]
+        rows = np.flatnonzero(robots.state.going)
+    return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
+
+
+def gaps(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
+    """Rewards of policies, shapes ``(K, trials)``, beside the best known ones, ``(K, 1)``, as
+    :func:`score` returns them."""
     rows = {}
-    for name, earned in rewards.items():
-        gaps = pd.DataFrame(100.0 * (best - earned) / np.abs(best))
-        values = (gaps.iloc[0] if len(gaps) == 1 else gaps.mean(axis=1)).dropna()
+    for name, earned in {**rewards, "best known": best}.items():
+        gap = pd.DataFrame(100.0 * (best - earned) / np.abs(best))
+        values = (gap.iloc[0] if len(gap) == 1 else gap.mean(axis=1)).dropna()
         rows[name] = {
             "reward": pd.DataFrame(earned).mean(axis=1).mean(),
             **(mean(values) if len(values) else Estimate(np.nan)).columns("gap"),
@@ -541,17 +566,10 @@ def options_of(env: Any) -> dict[str, Any]:
 
 
 def reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Reward of a method's solution of a task; None where it has none.
-
-    Methods of this project are trusted, as in a suite; any other gets the information that it
-    declares.
-    """
-    trusted = type(method).__module__.startswith(("coartic.baselines.", "coartic.learner."))
-    session = Session(task, seed, method.information, model=model, trusted=trusted)
+    """Reward of a method's solution of a task; None where it has none."""
     with suppress(MethodError, NotApplicableError):
-        solution = method.solve(session).solution
-        session.check_solution(solution)
-        return execute(task, solution, model=model).reward
+        result, _ = run_method(method, task, seed, model=model)
+        return execute(task, result.solution, model=model).reward
     return None
 
 

@@ -21,19 +21,33 @@ from threading import RLock
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
 from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
-from coartic.motion.corrective import Correction, correct
-from coartic.motion.initial import search_initial_hands, too_many_sequences
-from coartic.motion.outside import inside, note_trials
-from coartic.motion.reach import CompiledTask, compiled_task, reach_all
-from coartic.motion.solution import Execution, Movement, execute_many
-from coartic.motion.trials import HandSequences, Trials, check_targets, hand_codes, trials_on
-from coartic.robot import Array, Hand, Robot
+from coartic.motion.movement import Correction, correct
+from coartic.motion.solution import Execution, Movement, check_targets, execute_many
+from coartic.motion.trial import (
+    COUNTED,
+    ITERATIONS,
+    NO_REWARD,
+    Accounts,
+    CompiledTask,
+    HandSequences,
+    Trials,
+    compiled_task,
+    hand_codes,
+    inside,
+    make_trials,
+    note_trials,
+    search_initial_hands,
+    too_many_sequences,
+    trials_of,
+)
+from coartic.robot import Array, Configs, Hand, Hands, Robot
+from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import INITIAL_POLICIES, Task
 
 
@@ -156,13 +170,11 @@ class Meter:
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
 MOST_COUNT = 2**63 - 1
 """Largest count that can be stored."""
-_NO_REWARD = -MOST_COUNT
-"""Reward of a trial that failed, where rewards are kept."""
 
 
 def pack_rewards(rewards: Iterable[int | None]) -> array[int]:
     """Pack rewards of trials as a session keeps them, in 8 bytes each."""
-    return array("q", [_NO_REWARD if reward is None else reward for reward in rewards])
+    return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
 
 
 @dataclass(frozen=True)
@@ -214,7 +226,7 @@ class Session:
     The declaration is enforced, and calls are counted. This is no sandbox.
     ``trusted`` methods, this project's own, may also take the task to their compiled
     kernels and state the counts themselves. Trials that a process makes outside the
-    sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`). Threads can share
+    sessions ``of_run`` are counted as well (:mod:`coartic.motion.trial`). Threads can share
     a session: they make trials one after the other, of one budget.
     """
 
@@ -390,13 +402,9 @@ class Session:
                 (execution,) = execute_many(self._compiled, [solution])
             if isinstance(execution, Exception):
                 raise execution
-            self._count(
-                pack_rewards([execution.reward]),
-                execution.ticks,
-                execution.corrections,
-                execution.iterations,
-                execution.evaluations,
-            )
+            spent = execution.ticks, execution.evaluations, execution.iterations
+            failed = not execution.completed
+            self._count(pack_rewards([execution.reward]), *spent, execution.corrections, failed)
         if Information.CORRECTIVE_PROCESS in self._information:
             return execution
         return replace(
@@ -428,7 +436,8 @@ class Session:
         codes = hand_codes(self._task, hands, len(given))
         with self.lock:
             left = self._affordable(len(given))
-            trials = self.unchecked_trials(codes[:left], given[:left], until=until)
+            accounts = self.make_trials(codes[:left], given[:left], until=until)
+        trials = trials_of(accounts, self.dof)
         if Information.CORRECTIVE_PROCESS in self._information:
             return trials
         return trials._replace(
@@ -453,42 +462,25 @@ class Session:
     def _compiled(self) -> CompiledTask:
         return compiled_task(self._task, self.model)
 
-    def hand_codes(self, hands: HandSequences, count: int) -> NDArray[np.int64]:
+    def hand_codes(self, hands: HandSequences, count: int) -> Hands:
         """Hands of trials as indices into HANDS, shape ``(count, G)``; ValueError where they do
         not fit."""
         return hand_codes(self._task, hands, count)
 
-    def unchecked_trials(
-        self, codes: NDArray[np.int64], targets: Array, *, until: Any = None
-    ) -> Trials:
-        """:meth:`trials` with hands ``(N, G)`` as indices into HANDS and with ``targets`` that are
-        its own: joints without one are filled in."""
+    def make_trials(
+        self, codes: Hands, targets: Configs, *, until: ArrayLike | None = None
+    ) -> Accounts:
+        """Make trials that fit the task and the budget, as :meth:`trials` does, with hands of shape
+        ``(N, G)``."""
         note_trials(0 if self._of_run else len(targets))
-        trials = trials_on(self._compiled, codes, targets)
+        accounts = make_trials(self._compiled, codes, targets[:, :, None])
         if until is not None:
-            better = trials.rewards > np.asarray(until)[: len(targets)]
+            better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]
             if better.any():
-                trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
-        rewards = np.where(trials.completed, -trials.ticks, _NO_REWARD)
-        spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
-        self._count(array("q", rewards.tobytes()), *(int(each.sum()) for each in spent))
-        return trials
-
-    def unchecked_trial(self, codes: NDArray[np.int64], targets: Array) -> int | None:
-        """The reward of one trial, None where it fails; as :meth:`unchecked_trials` for N = 1."""
-        note_trials(0 if self._of_run else 1)
-        reached = reach_all(self._compiled, codes, targets[:, :, None])
-        completed = bool(reached.hit[0, -1])
-        ticks = sum(reached.ticks[0].tolist())
-        reward = -ticks if completed else None
-        self._count(
-            pack_rewards([reward]),
-            ticks,
-            sum(reached.corrections[0].tolist()),
-            sum(reached.iterations[0].tolist()),
-            sum(reached.evaluations[0].tolist()),
-        )
-        return reward
+                made = int(better.argmax()) + 1
+                accounts = Accounts._make(each[:made] for each in accounts)
+        self._count(accounts.rewards, *np.add.reduce(accounts.counts).tolist())
+        return accounts
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """The hand sequence of a first trial, for a robot with these hands (all by default).
@@ -503,24 +495,13 @@ class Session:
         self._meter.add(**spent)
         return chosen
 
-    def _count(
-        self,
-        rewards: array[int],
-        ticks: int,
-        corrections: int,
-        iterations: int,
-        evaluations: int,
-    ) -> None:
-        """Count trials by their rewards and what they spent in all."""
-        meter = self._meter
-        meter.trials += len(rewards)
-        meter.movement_ticks += ticks
-        meter.corrections += corrections
-        meter.corrective_iterations += iterations
-        meter.jacobians += iterations
-        meter.forward_kinematics += evaluations
-        meter.failed_trials += rewards.count(_NO_REWARD)
-        self._rewards.extend(rewards)
+    def _count(self, rewards: NDArray[np.int64] | array[int], *counts: int) -> None:
+        """Count trials by their rewards, and what they took in all, by ``COUNTED``."""
+        before, meter = len(self._rewards), self._meter
+        self._rewards.frombytes(bytes(rewards))
+        meter.trials += len(self._rewards) - before
+        meter.add(**dict(zip(COUNTED, counts, strict=True)))
+        meter.jacobians += counts[ITERATIONS]
 
     @property
     def trials_left(self) -> int | None:
@@ -537,7 +518,7 @@ class Session:
     @property
     def rewards(self) -> list[int | None]:
         """Reward of each trial made, in order; None where it failed."""
-        return [None if reward == _NO_REWARD else reward for reward in self._rewards]
+        return [None if reward == NO_REWARD else reward for reward in self._rewards]
 
     # Counts that the method adds itself.
 
@@ -649,3 +630,44 @@ class Method(ABC):
             except MethodError as error:
                 results.append(error)
         return results
+
+
+def run_method(
+    method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
+) -> tuple[Result, Session]:
+    """Let a method solve a task, as it does in a suite.
+
+    Methods of this project are trusted to count by themselves; any other method gets the
+    information that it declares.
+
+    Parameters
+    ----------
+    method : Method
+        The method, with its parameters.
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    seed : int
+        Seed of its random numbers.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    tuple of Result and Session
+        The solution with its details, and the session in which it was found, with its counts and
+        rewards.
+
+    Raises
+    ------
+    MethodError
+        The method finds no solution.
+    UndeclaredError
+        It uses information that it does not declare.
+    NotApplicableError
+        It does not apply to the task.
+    """
+    is_ours = type(method).__module__.startswith(("coartic.baselines.", "coartic.learner."))
+    session = Session(as_task(task), seed, method.information, model=model, trusted=is_ours)
+    result = method.solve(session)
+    session.check_solution(result.solution)
+    return result, session

@@ -31,15 +31,21 @@ from coartic.method import (
     UndeclaredError,
 )
 from coartic.model import PAPER, MotionModel
-from coartic.motion.initial import corrective_trial, sequences_with, too_many_sequences
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.motion.reach import compiled_task
-from coartic.motion.solution import Movement
-from coartic.motion.trials import HandSequences, movements_of, trials_on
-from coartic.robot import HANDS, Array
+from coartic.motion.solution import Movement, corrective_trial, movements_of
+from coartic.motion.trial import (
+    Accounts,
+    HandSequences,
+    compiled_task,
+    make_trials,
+    sequences_with,
+    too_many_sequences,
+)
+from coartic.robot import HANDS, Array, Configs, Hands
+from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.families import instance_names
 from coartic.tasks.optima import KnownOptimum, best_shipped
-from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
+from coartic.tasks.task import Task, hands_of, letters_of
 
 if TYPE_CHECKING:  # workers do without pandas
     import pandas as pd
@@ -285,10 +291,11 @@ class Objective:
         self._check(point[None])
         chosen = self.hands if hands is None else hands
         codes, targets = self._trials_of(point[None], self._session.hand_codes(chosen, 1))
-        given = ~np.isnan(targets[0]).all(axis=1)
-        trials_on(compiled_task(task, self._session.model), codes, targets)  # fills in joints
-        after = np.isnan(targets[0]) & given[:, None]  # goals after one where the trial failed
-        return movements_of(chosen, np.where(after, task.q0, targets[0]))
+        made = make_trials(compiled_task(task, self._session.model), codes, targets[:, :, None])
+        given = ~np.isnan(targets[0]).all(axis=1, keepdims=True)
+        targets = self._targets_in(made, 0)
+        after = np.isnan(targets) & given  # goals after one where the trial failed
+        return movements_of(chosen, np.where(after, task.q0, targets))
 
     def fresh(self) -> Objective:
         """The same problem with nothing evaluated and its whole budget: for another run.
@@ -330,11 +337,11 @@ class Objective:
             self._trials_left(1)
             targets = self._no_targets.copy()
             targets.put(self._entries, point)
-            reward = self._session.unchecked_trial(self._codes, targets)
-            cost = float(FAILED if reward is None else min(-reward, FAILED))
+            made = self._session.make_trials(self._codes, targets)
+            cost = float(min(-made.rewards.item(), FAILED))
             self.evaluations += 1
             if cost < self.best_cost:
-                self._keep(cost, self.evaluations, point, self._codes[0], targets[0])
+                self._keep(cost, self.evaluations, point, self._codes, made, 0)
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
@@ -378,28 +385,32 @@ class Objective:
             raise BudgetError("all trials of the budget are made")
         return costs
 
-    def _evaluate(self, points: Array, codes: Any, costs: Array) -> None:
+    def _evaluate(self, points: Array, codes: Hands | None, costs: Array) -> None:
         """Fill in the costs of points, and note the best one."""
         codes, targets = self._trials_of(points, codes)
-        trials = self._session.unchecked_trials(codes, targets)
-        np.minimum(-trials.rewards, FAILED, out=costs)
+        made = self._session.make_trials(codes, targets)
+        np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self.best_cost:
             lowest = np.minimum.accumulate(costs)
             for n in np.flatnonzero(lowest < np.append(self.best_cost, lowest[:-1])).tolist():
                 at = self.evaluations + n + 1
-                self._keep(float(costs[n]), at, points[n], codes[n], targets[n])
+                self._keep(float(costs[n]), at, points[n], codes, made, n)
         self.evaluations += len(points)
 
     def _keep(
-        self, cost: float, evaluations: int, point: Array, codes: Any, targets: Array
+        self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
         """Note the best trial so far."""
         self.best_cost, self._best_x = cost, point.copy()
-        self._best_targets = targets.copy()
-        self.best_hands = letters_of([HANDS[code] for code in codes])
+        self._best_targets = self._targets_in(made, trial)
+        self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
         self._better.append((evaluations, cost))
 
-    def _trials_of(self, points: Array, codes: Any) -> tuple[NDArray[np.int64], Array]:
+    def _targets_in(self, made: Accounts, trial: int) -> Configs:
+        """Targets of a trial as moved to, ``(G, dof)``."""
+        return made.goals["target"][trial, :, 0, : self._session.dof].copy()
+
+    def _trials_of(self, points: Array, codes: Hands | None) -> tuple[Hands, Configs]:
         """Hands ``(N, G)``, and targets ``(N, G, dof)``, NaN for joints that have none."""
         targets = np.repeat(self._no_targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points

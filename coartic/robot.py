@@ -28,6 +28,12 @@ from coartic.internal.validation import in_sentences
 Hand = Literal["left", "right"]
 """Which hand: ``"left"`` or ``"right"``."""
 Array = NDArray[np.float64]
+Configs = NDArray[np.float64]
+"""Configurations, shape ``(..., dof)``: base x and y (length unit), then joint angles (rad)."""
+Points = NDArray[np.float64]
+"""Places, shape ``(..., 2)``: x and y, length unit."""
+Hands = NDArray[np.int64]
+"""Hands as places in :data:`HANDS`: 0 left, 1 right."""
 LARGEST_FIGURE = 1e4  # of any figure: far beyond use, and exact in all that follows
 MOST_LINKS = 100  # of an arm
 Finite = Annotated[

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from coartic.motion.initial import initial_reward
+from coartic.motion.solution import initial_reward
 from coartic.optimisers import FAILED
 from coartic.robot import Array
 

@@ -18,7 +18,8 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import path_points
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import HANDS, Array, Hand
-from coartic.tasks.task import Task, TaskLike, as_task, hands_of
+from coartic.tasks.catalogue import TaskLike, as_task
+from coartic.tasks.task import Task, hands_of
 
 if TYPE_CHECKING:
     import pandas as pd

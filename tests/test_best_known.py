@@ -10,7 +10,7 @@ import pytest
 from renew_best_known import movements_of
 
 from coartic import execute, load_task
-from coartic.motion.initial import corrective_trial
+from coartic.motion.solution import corrective_trial
 from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import BEST_KNOWN, best_shipped, essence
 

@@ -14,8 +14,7 @@ from coartic.baselines.certificate import certify, fastest_hand, ticks_for_dista
 from coartic.baselines.relaxation import Relaxation, split, support_of
 from coartic.baselines.trajectory_problem import held_joints
 from coartic.baselines.whole_ticks import mergeable
-from coartic.motion.initial import hand_sequences
-from coartic.motion.solution import Movement
+from coartic.motion.solution import Movement, hand_sequences
 from coartic.robot import directions
 from coartic.tasks.task import hands_of, letters_of
 from tests.support.strategies import UNEVEN, changed, make_trials, uneven_task

@@ -14,7 +14,7 @@ import pytest
 from coartic.benchmarks import syntax
 from coartic.benchmarks.code_identity import code_of, files_of
 from coartic.benchmarks.registry import MODULES
-from coartic.motion.sources import PACKAGE
+from coartic.motion.compile import PACKAGE
 
 FILES = {name.split(".")[-1]: Path(inspect.getfile(importlib.import_module(name)))
          for name in MODULES}  # fmt: skip
@@ -67,7 +67,7 @@ def test_what_plans_stores_reads_and_shows_runs_does_not_count():
         ("baselines/evolution.py", {"cma_es"}),
         ("baselines/trajectory_problem.py", PLANNERS),
         ("learner/kernel.py", WITH_TRIALS),
-        ("motion/reach.py", {*FILES}),
+        ("motion/trial.py", {*FILES}),
         ("robot.py", {*FILES}),
         ("benchmarks/worker.py", {*FILES}),
     ],
@@ -78,7 +78,7 @@ def test_a_number_counts_where_it_is_executed(after, place, methods):
 
 
 def test_words_for_readers_and_type_checkers_do_not_count(after):
-    assert not after("motion/reach.py", b"Nothing is checked.", b"No check is made.")
+    assert not after("motion/trial.py", b"Arguments are not checked.", b"No check is made.")
     type_checking, imports = b"if TYPE_CHECKING:\n", b"if TYPE_CHECKING:\n    import this\n"
     assert not after("learner/conditions.py", type_checking, imports)
 

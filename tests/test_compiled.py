@@ -16,7 +16,7 @@ pytestmark = pytest.mark.process
 
 ROOT = Path(__file__).parent.parent
 KERNEL = """
-from coartic.motion.compiled import entry, joint_lever
+from coartic.motion.compile import entry, joint_lever
 
 @entry
 def across(xs, ys):
@@ -46,7 +46,8 @@ def lever(folder):
 
 def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
     code = """if True:
-        import coartic.motion.compiler
+        from coartic.motion.compile import import_numba
+        import_numba()
         from numba.core import config
         config.reload_config()
         print(config.CACHE_DIR, config.DISABLE_JIT)"""
@@ -83,8 +84,8 @@ def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
 
 SLOTS = """
 from coartic import Robot
-from coartic.motion.compiled import entry, inner
-from coartic.motion.slots import slots_for
+from coartic.motion.compile import entry, inner
+from coartic.motion.batch import batch_for
 
 @inner
 def add_links(at):
@@ -98,7 +99,7 @@ def length(at):
     return at[0]["x"][-1, 0]
 
 def reach_of(links):
-    at = slots_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).at
+    at = batch_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).slots.at
     at["length"][:] = 1.0
     return length(at)
 """

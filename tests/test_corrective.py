@@ -23,7 +23,7 @@ from coartic import (
 )
 from coartic.baselines.corrective_alone import BestHands
 from coartic.method import MethodError, Session
-from coartic.motion.compiled import entry, joint_lever
+from coartic.motion.compile import entry, joint_lever
 from coartic.motion.movement import largest_square
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS

@@ -21,9 +21,9 @@ from coartic import (
 )
 from coartic.analysis import verify as checker
 from coartic.method import Meter, MethodError, Session
-from coartic.motion.reach import compiled_task
-from coartic.motion.slots import SLOTS
+from coartic.motion.batch import SLOTS
 from coartic.motion.solution import execute_many, other_arm_travel
+from coartic.motion.trial import compiled_task
 from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, explored_joints
 from coartic.tasks.task import hands_of
 from tests.support import reference

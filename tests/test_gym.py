@@ -26,7 +26,7 @@ from coartic import (
 )
 from coartic.baselines.corrective_alone import METHODS as ALONE
 from coartic.learner.method import METHODS as LEARNERS
-from coartic.motion.trials import movements_of
+from coartic.motion.solution import movements_of
 from coartic.optimisers import FAILED
 from coartic.tasks import families
 from coartic.tasks.optima import best_shipped

@@ -26,7 +26,7 @@ from coartic import (
 from coartic.learner import learning
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
-from coartic.motion.slots import SLOTS
+from coartic.motion.batch import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
 from tests.support.strategies import (

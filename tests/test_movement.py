@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coartic import PAPER, MotionModel, Robot, move
-from coartic.motion.compiled import entry
+from coartic.motion.compile import entry
 from coartic.motion.movement import clear_steps
 from coartic.robot import HANDS
 from tests.support import reference

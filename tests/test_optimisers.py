@@ -17,7 +17,7 @@ from coartic import MotionModel, corrective_trial, execute, load_task
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session
-from coartic.motion.trials import movements_of
+from coartic.motion.solution import movements_of
 from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
 from tests.support.strategies import tiny_task
 

@@ -9,7 +9,7 @@ import pytest
 
 from coartic import MotionModel, Movement, execute, learn, load_task, trajectory
 from coartic.baselines.random_search import RandomSearch
-from coartic.motion.initial import hand_sequences, initial_hands
+from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play.page import FOLDER
 from tests.support.strategies import (
     PAPER_CELLS,

@@ -10,7 +10,7 @@ from axe_playwright_python.sync_playwright import Axe
 from coartic import Movement, Task, corrective_trial, execute, learn, load_task
 from coartic.analysis.signatures.context_tests import standardised_posture_difference
 from coartic.baselines.random_search import RandomSearch
-from coartic.motion.initial import hand_sequences, initial_hands
+from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play import page as pages
 from tests.support.strategies import changed, solve
 

@@ -6,7 +6,7 @@ import pytest
 import coartic
 from coartic import BudgetError, CoarticError, UndeclaredError, execute, load_task
 from coartic.method import Session
-from coartic.motion.trials import movements_of
+from coartic.motion.solution import movements_of
 from coartic.optimisers import OPTIMISER_INFORMATION, Objective
 from tests.support.strategies import shipped_optima
 

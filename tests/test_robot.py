@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 import pytest
 
-from coartic.motion.compiled import entry, joint_lever
+from coartic.motion.compile import entry, joint_lever
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS, Robot
 from tests.support.strategies import UNEVEN

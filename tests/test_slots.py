@@ -7,7 +7,7 @@ import pytest
 
 from coartic import PAPER, MotionModel, learn, learn_many, load_task
 from coartic.benchmarks.worker import fail
-from coartic.motion.slots import SLOTS
+from coartic.motion.batch import SLOTS
 from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
 
 SOON_FAILED = MotionModel(max_iterations=60)

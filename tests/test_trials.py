@@ -5,7 +5,7 @@ import pytest
 
 from coartic import load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
-from coartic.motion.trials import movements_of
+from coartic.motion.solution import movements_of
 from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import make_trials, sample
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from coartic import Execution, Hand, Task
 from coartic.analysis.solutions import Solutions, initial_solution
-from coartic.motion.reach import reach_unchecked
+from coartic.motion.trial import reach_goals
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
 
@@ -36,7 +36,7 @@ def isolated_reaches(
     NaN ticks where the corrective process brings it to no hit.
     """
     shape = q.shape[:-1]
-    reached = reach_unchecked(
+    reached = reach_goals(
         task.robot,
         q.reshape(-1, q.shape[-1]),
         np.broadcast_to(hands, shape).ravel(),

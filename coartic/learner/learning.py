@@ -9,37 +9,37 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.internal.limits import MOST_TRIALS, brief_value, check_limits
 from coartic.internal.threads import threads_for
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
-    COUNTED,
-    LEARNED,
     TENTHS,
     Results,
-    TrialLog,
-    empty_log,
     empty_tables,
     learn_kernel,
-    learner_parameters_of,
+    learner_parameters,
     workspace_for,
 )
 from coartic.learner.run import LearningRun
 from coartic.method import Meter
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.compiled import addresses
-from coartic.motion.corrective import correct
-from coartic.motion.initial import corrective_movements, initial_hands
-from coartic.motion.movement import move
-from coartic.motion.outside import note_trials
-from coartic.motion.reach import compiled_task
-from coartic.motion.slots import SLOTS
-from coartic.motion.solution import Movement, hands_in, movements_by_goal
-from coartic.motion.trials import trials_on
-from coartic.robot import HANDS
-from coartic.tasks.task import Task, TaskLike, as_task, check_hands, letters_of
+from coartic.motion.batch import SLOTS
+from coartic.motion.compile import addresses
+from coartic.motion.movement import correct, move
+from coartic.motion.solution import (
+    Movement,
+    corrective_movements,
+    hands_in,
+    initial_hands,
+    movements_by_goal,
+    movements_in,
+)
+from coartic.motion.trial import COUNTED, compiled_task, empty_accounts, make_trials, note_trials
+from coartic.tasks.catalogue import TaskLike, as_task
+from coartic.tasks.task import Task, check_hands, letters_of
 
 TRIALS = 10_000  # trials of one run (published)
 _MOST_SEED = 2**128 - 1  # seeds of runs are hashes
@@ -225,32 +225,30 @@ def learn_together(
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
+    empty = np.zeros_like(empty_accounts(task.robot, runs, len(task.goals)).goals)
     results = Results(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
         best_trial=np.full(runs, -1),
-        replayed=np.zeros(runs, dtype=np.bool_),
-        replay_rewards=np.zeros(runs, dtype=np.int64),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
         corrections=np.zeros((runs, 1 + TENTHS), dtype=np.int64),
-        first=empty_log(runs, task),
-        best=empty_log(runs, task),
-        replay=empty_log(runs, task),
+        first=empty,
+        best=empty.copy(),
+        last=empty.copy(),
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
-    arguments = (
-        compiled.robot_parameters,
-        learner_parameters_of(compiled, condition, first),
-        tables,
-        results,
-        empty_log(runs, task),
-        addresses(generators),
-        workspace_for(runs, task),
-    )
+    learner, rngs = learner_parameters(compiled, condition, first), addresses(generators)
+    workspace = workspace_for(runs, task)
     clock = time.perf_counter()
-    learn_kernel(*arguments)
+    learn_kernel(compiled.parameters, learner, tables, results, rngs, workspace)
     wall = time.perf_counter() - clock
-    counts = [dict(zip(COUNTED, row, strict=True)) for row in results.counts.tolist()]
+
+    def movements(accounts: NDArray[np.void]) -> list[tuple[Movement, ...]]:
+        each = movements_in(accounts, dof, [[["learned"]] * len(task.goals)] * runs)
+        completed = accounts["hit"][:, -1]
+        return [tuple(some) if whole else () for some, whole in zip(each, completed, strict=True)]
+
+    initial, best, replay = map(movements, (results.first, results.best, results.last))
     return [
         LearningRun(
             task=task,
@@ -260,19 +258,18 @@ def learn_together(
             first_hands=hands_in(first),
             rewards=np.ma.array(results.rewards[n], mask=~results.completed[n]),
             best_trial=int(results.best_trial[n]) if results.best_trial[n] >= 0 else None,
-            initial=logged_movements(results.first, n, dof),
-            solution=logged_movements(results.best, n, dof),
-            replay=logged_movements(results.replay, n, dof) if results.replayed[n] else (),
-            replay_reward=int(results.replay_rewards[n]) if results.replayed[n] else None,
+            initial=initial[n],
+            solution=best[n],
+            replay=replay[n],
+            replay_reward=-int(results.last["ticks"][n].sum()) if replay[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=results.corrections[n],
-            counters=Meter(
-                trials=trials, jacobians=counts[n]["corrective_iterations"], **counts[n]
-            ),
+            counters=Meter(trials=trials, jacobians=counts["corrective_iterations"], **counts),
             wall_s=wall / runs,
         )
         for n, seed in enumerate(seeds)
+        for counts in [dict(zip(COUNTED, results.counts[n].tolist(), strict=True))]
     ]
 
 
@@ -293,25 +290,8 @@ def warm_up(task: Task, *parts: Part) -> None:
         learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)
     if "trials" in wanted:
         shape = 0, len(task.goals)
-        trials_on(
-            compiled_task(task, PAPER),
-            np.empty(shape, np.int64),
-            np.empty((*shape, task.robot.dof)),
-        )
+        targets = np.empty((*shape, 1, task.robot.dof))
+        make_trials(compiled_task(task, PAPER), np.empty(shape, np.int64), targets)
     if "motion" in wanted:
         move(task.robot, task.q0, task.q0, hand, goal, task.radius)
         correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
-
-
-def logged_movements(log: TrialLog, run: int, dof: int) -> tuple[Movement, ...]:
-    """The movements of a run in a log of the kernel."""
-    return tuple(
-        Movement(
-            goal=int(row["goal"]) + 1,
-            hand=HANDS[row["hand"]],
-            kind="learned" if row["kind"] == LEARNED else "corrective",
-            target=np.array(row["target"][:dof]),
-            ticks=int(row["ticks"]),
-        )
-        for row in log.movements[run, : log.count[run]]
-    )

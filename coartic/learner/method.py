@@ -34,7 +34,7 @@ from coartic.method import (
     Result,
     Session,
 )
-from coartic.motion.slots import SLOTS
+from coartic.motion.batch import SLOTS
 
 _MOST_TRIALS = 4_000_000  # of runs that are performed together
 

@@ -1,24 +1,27 @@
-"""Movement: straight lines in joint space, one step at a time, -1 a tick.
+"""Movements and the corrective process: what the robot does for one goal.
 
-The paper's **Move** (section *Generating Movement for Each Goal*). The k-th point
-of a movement from q to q^t is ``q + k m (q^t - q) / |q^t - q|`` for k < n and q^t
-for k = n = ceil(|q^t - q| / m). Before each step the stopping rule is evaluated: the
-chosen hand is within the goal's radius, or, for a movement towards a learned or
-planned target, within θ^a of where the target would put it. A movement of k steps
-takes k + 1 ticks, the last one being the tick that detects arrival (inferred: it
-gives the published initial rewards exactly).
+**Move** (paper, section *Generating Movement for Each Goal*): straight lines in joint space, one
+step at a time, -1 a tick. The k-th point of a movement from q to q^t is
+``q + k m (q^t - q) / |q^t - q|`` for k < n and q^t for k = n = ceil(|q^t - q| / m). Before each
+step the stopping rule is evaluated: the chosen hand is within the goal's radius, or, for a movement
+towards a learned or planned target, within θ^a of where the target would put it. A movement of k
+steps takes k + 1 ticks, the last one being the tick that detects arrival (inferred: it gives the
+published initial rewards exactly).
 
-The kernel gives the result of that loop without visiting every step. Along the
-line every absolute link angle turns at a constant rate, so per step the hand moves
-by at most ``s = |Δbase| + Σ length |Δangle|``, its velocity changes by at most
-``c = Σ length Δangle²``, and, since a norm lies above its tangents, its distance to
-a fixed point after τ steps is at least ``d - uτ - cτ²/2`` with u its closing speed
-now. Steps that either bound keeps clear of both stopping discs are skipped.
+**A**, the corrective process (section *The Corrective Process*, Figure 2): Jacobian-transpose
+descent on the distance to the goal, ``q += α Jᵀ e`` with the error e of the hand. It is informed by
+the primary objective only: where the goal is and how the chosen hand's position depends on the base
+and the chosen arm. The other arm's joints do not change, and a locked base coordinate has no column
+in the Jacobian.
+
+The kernels give the results of these loops for many arms side by side. Movements are made without
+visiting every step (:func:`clear_steps`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,28 +30,32 @@ from coartic.internal.limits import real_array
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
-from coartic.motion.compiled import entry, fill_row, inner, shared
-from coartic.motion.robot_parameters import arm_of, robot_parameters_for
-from coartic.motion.slots import (
+from coartic.motion.batch import (
     GOING,
+    are_near,
+    arm_of,
+    batch_for,
     compact,
+    load,
     padded_count,
     place,
-    runs_for,
-    slots_for,
+    robot_parameters,
     start,
+    store,
     winding,
 )
+from coartic.motion.compile import entry, fill_row, inlined, inner, joint_lever, shared
 from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 
-# Distance kept clear beyond what the bounds ask for, which is more where positions are rounded by
-# more: a joint's share of how far from 0 they, and the angles of the arm times its length, can be.
+# Distance kept clear beyond what the bounds ask for. Rounding grows with the size of positions and
+# angles: _ROUNDING is relative to it, for each joint.
 _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 # The bounds are in single precision: these outweigh its rounding (6e-8) and what it takes for 0.
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
-_IN_GOAL, _MISSED = 1.0, 2.0  # statuses of a slot
+_IN_GOAL, _MISSED = 1.0, 2.0  # statuses of a slot that has moved
+_AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # and of one that has been corrected
 LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
@@ -69,6 +76,21 @@ class MoveResult(NamedTuple):
         return short_repr(self, ticks=self.ticks, hit=self.hit, q=self.q)
 
 
+class Correction(NamedTuple):
+    """Result of the corrective process (:func:`correct`)."""
+
+    q: Array
+    """Configuration found, shape ``(dof,)``, length unit (base) and rad (joints); the last
+    iterate if not converged."""
+    converged: bool
+    """Whether the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
+    iterations: int
+    """Descent steps, each with one Jacobian and one forward-kinematics evaluation."""
+
+    def __repr__(self) -> str:
+        return short_repr(self, converged=self.converged, iterations=self.iterations, q=self.q)
+
+
 @inner
 def largest_square(length: float) -> float:
     """The largest number whose square root, as it is rounded, does not exceed a length."""
@@ -84,8 +106,16 @@ def largest_square(length: float) -> float:
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
     """Number of steps during which the hand provably stays out of a disc.
 
-    ``square`` is that of the distance d to its centre, of which ``rim`` is too near, ``closing``
-    d times the closing speed u; ``slowness`` is 1 / s, and ``bend`` c of the module's text. In
+    Along the line of a movement every absolute link angle turns at a constant rate. So per step the
+    hand moves by at most ``s = |Δbase| + Σ length |Δangle|``, and its velocity changes by at most
+    ``c = Σ length Δangle²``. A norm lies above its tangents: with the closing speed u now, the
+    distance to a fixed point after τ steps is at least ``d - u τ - c τ² / 2``. Either bound keeps
+    the hand out of a disc of radius r < d around the point for ::
+
+        max((d - r) / s, (sqrt(u² + 2 c (d - r)) - u) / c)
+
+    steps. Here ``square`` is d², ``rim`` r, ``closing`` d u, ``slowness`` 1 / s and ``bend`` c. The
+    root is taken of d² times its content, its difference from u without cancellation, and all in
     single precision, in which roots and quotients, most of the work, cost a third.
     """
     distance = np.sqrt(_single(square))
@@ -147,19 +177,11 @@ def place_between(at: Any, count: int, step: float) -> None:
 
 
 @inner
-def look(
-    at: Any,
-    count: int,
-    radius: float,
-    stop_on_arrival: bool,
-    near: float,
-    hit: float,
-    arrived: float,
-) -> int:
+def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
     """Evaluate the stopping rule, or skip the steps that are clear; slots that have ended.
 
-    A movement on arrival stops ``near`` the end. ``hit`` and ``arrived`` are the largest squares of
-    distances to the goal and to the end at which a movement stops.
+    A movement stops within ``rims`` of goal and end, on arrival, length unit: at no larger
+    ``squares`` of the distances.
     """
     ended = 0
     tip = len(at.length)
@@ -172,18 +194,18 @@ def look(
         dx, dy = at.goal[0, i] - at.x[tip, i], at.goal[1, i] - at.y[tip, i]
         to_goal = dx * dx + dy * dy
         closing = velocity_x * dx + velocity_y * dy
-        rim = radius + at.clearance[i]
+        rim = rims[0] + at.clearance[i]
         clear = clear_steps(to_goal, rim, closing, at.slowness[i], at.bend[i])
         stop = at.step[i] == at.last[i]
         if stop_on_arrival:
             dx, dy = at.end[0, i] - at.x[tip, i], at.end[1, i] - at.y[tip, i]
             to_end = dx * dx + dy * dy
-            stop |= to_end <= arrived
+            stop |= to_end <= squares[1]
             closing = velocity_x * dx + velocity_y * dy
-            rim = near + at.clearance[i]
+            rim = rims[1] + at.clearance[i]
             clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
         status = _MISSED if stop else GOING
-        status = _IN_GOAL if to_goal <= hit else status
+        status = _IN_GOAL if to_goal <= squares[0] else status
         # Every step up to step + clear is clear of both discs.
         after = min(at.step[i] + 1.0 + np.floor(min(clear, at.last[i])), at.last[i])
         at.step[i] = after if status == GOING else at.step[i]
@@ -193,31 +215,28 @@ def look(
 
 
 @shared
-def move_slots(
-    slots: Any, count: int, stop_on_arrival: bool, robot_parameters: Any, runs: Any
-) -> None:
+def move_slots(slots: Any, count: int, stop_on_arrival: bool, robot: Any, runs: Any) -> None:
     """Move the first ``count`` slots until each has ended.
 
     Each run's ``q``, from which it started to its ``target``, becomes the configuration in
-    which it stopped; the rest of its record says how.
+    which it stopped; ``hit`` and ``ticks`` of its record are set.
     """
-    at, evaluations = slots.at[0], 0
-    step, near = robot_parameters.model.step, robot_parameters.model.arrival_tolerance
-    radius = robot_parameters.radius
-    hit, arrived = largest_square(radius), largest_square(near)
-    is_near = set_off(at, count, step)
+    at, evaluations, step = slots.at[0], 0, robot.model.step
+    rims = robot.radius, robot.model.arrival_tolerance
+    squares = largest_square(rims[0]), largest_square(rims[1])
+    near = set_off(at, count, step)
     if stop_on_arrival:
         for j in range(len(at.q)):
             fill_row(at.q[j], at.target[j])
-        place(at, count, is_near)
+        place(at, count, near)
         fill_row(at.end[0], at.x[-1])
         fill_row(at.end[1], at.y[-1])
         evaluations += 1
     while count > 0:
         place_between(at, count, step)
-        place(at, count, is_near)
+        place(at, count, near)
         evaluations += 1
-        ended = look(at, count, radius, stop_on_arrival, near, hit, arrived)
+        ended = check(at, count, stop_on_arrival, rims, squares)
         if ended == 0:
             continue
         for slot in range(count - 1, -1, -1):
@@ -241,11 +260,11 @@ def move_slots(
 
 
 @entry
-def move_kernel(stop_on_arrival: bool, robot_parameters: Any, slots: Any, runs: Any) -> None:
+def move_kernel(stop_on_arrival: bool, robot: Any, batch: Any) -> None:
     """Move the only run."""
-    run = runs[0]
-    start(slots.at[0], 0, 0, run.q, run.target, arm_of(robot_parameters[0], run.hand), run.goal)
-    move_slots(slots, 1, stop_on_arrival, robot_parameters[0], runs)
+    run = batch.runs[0]
+    start(batch.slots.at[0], 0, 0, run, arm_of(robot[0], run.hand))
+    move_slots(batch.slots, 1, stop_on_arrival, robot[0], batch.runs)
 
 
 def move(
@@ -296,15 +315,202 @@ def move(
     Source: paper, section *Generating Movement for Each Goal*.
     """
     robot.arm(hand)  # refuses what is no hand
-    runs = runs_for(1, robot)
-    run, figures = runs[0], slice(robot.dof)
+    batch = batch_for(robot, 1)
+    run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = configuration(robot, q)
     run["target"][figures] = configuration(robot, target)
     run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
-    robot_parameters = robot_parameters_for(robot, radius, model=check_model(model))
-    move_kernel(stop_on_arrival, robot_parameters, slots_for(robot), runs)
+    parameters = robot_parameters(robot, radius, model=check_model(model))
+    move_kernel(stop_on_arrival, parameters, batch)
     return MoveResult(
         run["q"][figures].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
+    )
+
+
+@inner
+def find_statuses(at: Any, count: int, square: float) -> None:
+    """Set the status of slots whose hand is near enough, or nowhere."""
+    tip = len(at.length)
+    for i in range(padded_count(count)):
+        error_x = at.goal[0, i] - at.x[tip, i]
+        error_y = at.goal[1, i] - at.y[tip, i]
+        error = error_x * error_x + error_y * error_y
+        status = GOING if error < math.inf else _FAILED
+        at.status[i] = _AT_GOAL if error <= square else status
+
+
+@inlined
+def descend(at: Any, count: int, robot: Any, pull: Any) -> tuple[int, bool]:
+    """q += α Jᵀ e in every slot that goes on, plus its rows ``pull`` where there is one (see
+    :func:`descend_to_goals`); number of slots that have ended, and :func:`are_near`."""
+    ended = 0
+    far = 0
+    tip = len(at.length)
+    gain, free_x, free_y = robot.model.gain, robot.free_x, robot.free_y
+    if pull is not None:
+        pull(at, count)
+    for i in range(padded_count(count)):
+        error_x = at.goal[0, i] - at.x[tip, i]
+        error_y = at.goal[1, i] - at.y[tip, i]
+        going = at.status[i] == GOING
+        x = at.q[0, i] + gain * error_x if free_x else at.q[0, i]
+        y = at.q[1, i] + gain * error_y if free_y else at.q[1, i]
+        if pull is not None:
+            x, y = x + at.pull[0, i], y + at.pull[1, i]
+        moved = (x != at.q[0, i]) | (y != at.q[1, i])
+        at.q[0, i] = x if going else at.q[0, i]
+        at.q[1, i] = y if going else at.q[1, i]
+        for k in range(tip):
+            dx, dy = joint_lever(at.x[:, i], at.y[:, i], k, tip)
+            before = at.q[BASE_DOF + k, i]
+            turned = before + gain * (dx * error_x + dy * error_y)
+            if pull is not None:
+                turned += at.pull[BASE_DOF + k, i]
+            moved |= turned != before
+            at.q[BASE_DOF + k, i] = turned if going else before
+        # Where nothing moves: a stationary point away from the goal, which it will not leave.
+        stuck = going & (not moved)
+        at.status[i] = _STUCK if stuck else at.status[i]
+        ended += 0 if (going & moved) | (i >= count) else 1
+        far += 0 if winding(at.q, i) < trigonometry.LARGEST else 1
+    return ended, far == 0
+
+
+@inlined
+def descend_to_goals(slots: Any, count: int, robot: Any, runs: Any, pull: Any) -> None:
+    """Let **A** descend in the first ``count`` slots until each has ended.
+
+    The ``target`` of each run becomes what its slot ends with; ``converged`` and ``iterations`` of
+    its record are set. ``pull`` is the place of a preferred posture: None, or a kernel that is
+    called with the rows and ``count`` and fills in the rows ``pull``: what an iteration adds to the
+    base and to the joints of the arm at its iterate ``q``, zero for what is locked.
+    """
+    at, iteration = slots.at[0], 0
+    square = largest_square(robot.model.correction_tolerance)
+    near = are_near(at, count)
+    while count > 0:
+        place(at, count, near)
+        find_statuses(at, count, square)
+        ended = count
+        if iteration < robot.model.max_iterations:
+            ended, near = descend(at, count, robot, pull)
+        if ended > 0:
+            for slot in range(count - 1, -1, -1):
+                if at.status[slot] == GOING and iteration < robot.model.max_iterations:
+                    continue
+                run = runs[at.run[slot]]
+                store(at, slot, run.target)
+                run.converged = at.status[slot] == _AT_GOAL
+                run.iterations = iteration + (at.status[slot] == _STUCK)
+                run.evaluations += run.iterations + 1
+                count -= 1
+                compact(slots.corrected, slot, count)
+                ended -= 1
+                if ended == 0:
+                    break
+        iteration += 1
+
+
+@shared
+def correct_slots(slots: Any, count: int, robot: Any, runs: Any) -> None:
+    """The paper's **A** in the first ``count`` slots (:func:`descend_to_goals`)."""
+    descend_to_goals(slots, count, robot, runs, None)
+
+
+@entry
+def correct_kernel(robot: Any, batch: Any) -> None:
+    """Correct the target of the only run."""
+    run = batch.runs[0]
+    load(batch.slots.at[0], 0, 0, run, arm_of(robot[0], run.hand))
+    correct_slots(batch.slots, 1, robot[0], batch.runs)
+
+
+def correct(
+    robot: Robot,
+    q: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    *,
+    locked_base: Collection[str] = (),
+    model: MotionModel = PAPER,
+) -> Correction:
+    """Jacobian-transpose inverse kinematics, the corrective process: find where a hand is at a
+    goal.
+
+    It descends from ``q`` on the distance to the goal. The other arm does not move.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : ndarray, shape (dof,)
+        Where to begin, length unit (base) and rad (joints).
+    hand : {"left", "right"}
+        The hand.
+    goal : tuple of float
+        Centre of the goal, x and y, length unit.
+    locked_base : collection of {"x", "y"}
+        Coordinates of the base that do not move.
+    model : MotionModel
+        The constants; ``gain``, ``correction_tolerance`` and ``max_iterations`` matter.
+
+    Returns
+    -------
+    Correction
+        The configuration, whether it is at the goal, and how many iterations it took. Not to
+        converge within ``model.max_iterations`` is an outcome, not an error.
+
+    Raises
+    ------
+    ValueError
+        A shape is wrong, a figure is not finite, there is no such hand, or another lock is named.
+
+    Notes
+    -----
+    Source: paper, Figure 2 (Whitney 1969; Craig 2004).
+    """
+    if not set(locked_base) <= {"x", "y"}:
+        raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
+    robot.arm(hand)  # refuses what is no hand
+    batch = batch_for(robot, 1)
+    run, figures = batch.runs[0], slice(robot.dof)
+    run["q"][figures] = run["target"][figures] = configuration(robot, q)
+    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal)
+    locked = tuple(locked_base)
+    correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
+    return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))
+
+
+def explain_failure(
+    robot: Robot,
+    q: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    locked_base: Collection[str],
+    model: MotionModel,
+) -> str:
+    """Why the corrective process may have failed from ``q``, as the end of a sentence; empty where
+    neither cause that users can mend is there.
+
+    One is a hand whose joints all lie on the line to the goal: none of them moves it nearer. The
+    other is a long arm. Near a goal, errors shrink by ``1 - gain σ²``, with the singular values σ
+    of the Jacobian J; so the descent is stable while gain × |J|² is below 2, for the largest σ,
+    which is that of the stretched arm.
+    """
+    free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
+    arm = robot.joints(hand)
+    error = np.subtract(goal, robot.forward_kinematics(q, hand))
+    slopes = error @ robot.jacobian(q, hand)[:, [*free, *range(arm.start, arm.stop)]]
+    reaches = np.cumsum(robot.arm(hand).links[::-1])
+    square = float(reaches @ reaches)
+    if np.abs(slopes).max() <= 1e-12 * math.sqrt(square) * math.hypot(*error):
+        return ": the arm is straight and points at the goal; bend it"
+    if (largest := model.gain * (square + bool(free))) < 2.0:
+        return ""
+    factor = math.ceil(10.0 * math.sqrt(model.gain * square / (2.0 - model.gain * bool(free)))) / 10
+    return (
+        f": gain × |J|² of the stretched arm is {largest:.3g}, and above 2 the descent can be "
+        f"unstable; divide all lengths by {factor:g}, those of links, goals and radius"
     )
 
 

@@ -1,32 +1,43 @@
-"""Solutions, and the one function that executes and scores them.
+"""Solutions: movements, and the one function that executes and scores them.
 
-A solution is a list of movements, at least one per goal. :func:`execute` makes them
-from the task's start under the rules of :mod:`coartic.motion.movement`, pays every tick,
-and has the corrective process finish any goal that they miss. Whatever a method
-says of its own solution, its score is what comes out here.
+A solution is a list of movements, at least one per goal. :func:`execute` makes them from the task's
+start by the rule of :mod:`coartic.motion.trial`, pays every tick, and has the corrective process
+finish any goal that they miss. Whatever a method says of its own solution, its score is the reward
+of this execution.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from coartic.errors import SolutionError
-from coartic.internal.limits import brief_value
-from coartic.internal.text import counted, short_repr
+from coartic.errors import NotApplicableError, SolutionError
+from coartic.internal.limits import brief_value, real_array
+from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel
-from coartic.motion.corrective import correct, explain_failure
-from coartic.motion.movement import LARGEST_ENTRY, configuration, follow, move
-from coartic.motion.outside import note_trials
-from coartic.motion.reach import CompiledTask, compiled_task, reach_all
-from coartic.robot import BASE_DOF, HANDS, Array, Hand
-from coartic.tasks.task import Task, TaskLike, as_task, letters_of
+from coartic.motion.batch import width_of
+from coartic.motion.movement import LARGEST_ENTRY, configuration, correct, follow, move
+from coartic.motion.trial import (
+    CompiledTask,
+    account_type,
+    compiled_task,
+    hands_among,
+    make_trials,
+    note_trials,
+    reason_of_failure,
+    search_initial_hands,
+    sequences_with,
+)
+from coartic.robot import BASE_DOF, HANDS, Array, Configs, Hand
+from coartic.tasks.catalogue import TaskLike, as_task
+from coartic.tasks.task import Task, check_hands, hands_of, letters_of
 
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
@@ -200,7 +211,7 @@ def execute_many(
     In their order, each as if it were alone; in place of an execution, the error that
     :func:`execute` raises for such a solution.
     """
-    plans: list[ByGoal | Refused] = []
+    plans: list[Plan | Refused] = []
     for solution in solutions:
         try:
             plans.append(movements_by_goal(compiled.task, solution))
@@ -208,16 +219,141 @@ def execute_many(
             plans.append(error)
     note_trials(len(plans))
     straight = [plan for plan in plans if isinstance(plan, list) and not has_path(plan)]
-    outcomes = iter(make_straight(compiled, straight))
+    made = iter(make_straight(compiled, straight))
     executions: list[Execution | Refused] = []
     for plan in plans:
         if not isinstance(plan, list):
             executions.append(plan)
-        elif has_path(plan):
-            executions.append(execution_of(compiled, plan, make_one_by_one(compiled, plan)))
         else:
-            executions.append(execution_of(compiled, plan, next(outcomes)))
+            outcome = make_one_by_one(compiled, plan) if has_path(plan) else next(made)
+            executions.append(execution_of(compiled, plan, *outcome))
     return executions
+
+
+Plan = list[list[Movement]]
+"""The movements of a solution, goal by goal."""
+Outcome = tuple[list[Movement], NDArray[np.void]]
+"""The movements made, and the accounts of all goals, shape ``(G,)``."""
+
+
+def has_path(plan: Plan) -> bool:
+    """Whether a movement follows a path."""
+    return any(movement.kind == "path" for movements in plan for movement in movements)
+
+
+def with_targets(movements: list[Movement]) -> list[Movement | None]:
+    """Straight movements to a goal as the kernel takes them, up to the first that **A** finds.
+
+    None comes first where no movement is made at once: the hand may be in the goal already.
+    """
+    given = takewhile(lambda movement: movement.target is not None, movements)
+    return [None, *given] if movements[0].kind == "corrective" else [*given]
+
+
+def make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Outcome]:
+    """Make the movements of plans without paths side by side."""
+    if not plans:
+        return []
+    given = [[with_targets(movements) for movements in plan] for plan in plans]
+    most = max(len(each) for of_plan in given for each in of_plan)
+    hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
+    targets = np.empty((*hands.shape, most, compiled.starts.shape[1]))
+    stops = np.empty(targets.shape[:3], dtype=np.bool_)
+    targets[:], stops[:] = np.nan, True
+    for n, of_plan in enumerate(given):
+        for g, of_goal in enumerate(of_plan):
+            for m, movement in enumerate(of_goal):
+                if movement is not None:
+                    targets[n, g, m] = movement.target
+                    stops[n, g, m] = movement.kind != "corrective"
+    accounts = make_trials(compiled, hands, targets, stops).goals
+    kinds = [[[m.kind if m else None for m in of_goal] for of_goal in each] for each in given]
+    return [*zip(movements_in(accounts, compiled.task.robot.dof, kinds), accounts, strict=True)]
+
+
+def movements_in(
+    accounts: NDArray[np.void], dof: int, kinds: Iterable[Iterable[Sequence[Kind | None]]]
+) -> list[list[Movement]]:
+    """The movements of N trials from the accounts of their goals, up to the first goal missed.
+
+    ``kinds`` of the movements to given targets, by trial and goal; None for those that were not
+    made.
+    """
+    names = ("hand", "hit", "ticks", "corrections", "moved")
+    columns = [accounts[name].tolist() for name in names]
+    q, targets, corrected = (accounts[name][..., :dof] for name in ("q", "target", "corrected"))
+    trials = []
+    for n, of_trial in enumerate(kinds):
+        movements: list[Movement] = []
+        of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
+        for g, (of_goal, side, hit, total, corrections, moved) in enumerate(of_goals):
+            goal, hand, before = g + 1, HANDS[side], len(movements)
+            for m, kind in enumerate(of_goal):
+                if kind is not None and moved[m]:
+                    movements.append(Movement(goal, hand, kind, targets[n, g, m], moved[m]))
+            if corrections:
+                ticks = total - sum(moved)
+                movements.append(Movement(goal, hand, "corrective", corrected[n, g], ticks))
+            if not hit:
+                break
+            if len(movements) == before:  # hit on the way: show the hand
+                movements.append(Movement(goal, hand, "corrective", q[n, g], 0))
+        trials.append(movements)
+    return trials
+
+
+def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Outcome:
+    """Make the movements of a plan, of which some follow paths, one after the other."""
+    task, model, q = compiled.task, compiled.model, compiled.starts[0]
+    made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
+    for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
+        hand, before = movements[0].hand, len(made)
+        where, checks = (hand, goal, task.radius), movements[0].kind == "corrective"
+        iterations, evaluations = 0, int(checks)
+        hit = checks and move(task.robot, q, q, *where, model=model).hit
+        for movement in [] if hit else [*movements, Movement(number, hand, "corrective")]:
+            target, stops = movement.target, movement.kind != "corrective"
+            if target is None:
+                locked = task.locked_base
+                found = correct(task.robot, q, hand, goal, locked_base=locked, model=model)
+                target, iterations = found.q, found.iterations
+                evaluations += iterations + 1
+                if not found.converged:
+                    break
+            if movement.waypoints is None:
+                moved = move(task.robot, q, target, *where, stop_on_arrival=stops, model=model)
+            else:
+                moved = follow(task.robot, q, movement.waypoints, *where, model=model)
+            made.append(replace(movement, target=target, ticks=moved.ticks))
+            q, hit, evaluations = moved.q, moved.hit, evaluations + moved.evaluations
+            if hit or movement.target is None:
+                break
+        if hit and len(made) == before:  # on the way: show the hand
+            made.append(Movement(number, hand, "corrective", q.copy(), 0))
+        account = goals[number - 1]
+        account["q"][: len(q)], account["hand"], account["hit"] = q, HANDS.index(hand), hit
+        account["iterations"], account["evaluations"] = iterations, evaluations
+        if not hit:
+            break
+    return made, goals
+
+
+def execution_of(
+    compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
+) -> Execution:
+    """The execution of a plan, with the movements made and the accounts of its goals."""
+    hits = sum(goals["hit"].tolist())
+    # The place of the hand is known before the first movement, and where that leads.
+    checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
+    return Execution(
+        movements=tuple(movements),
+        configurations=goals["q"][:hits, : compiled.task.robot.dof].copy(),
+        ticks=sum([movement.ticks or 0 for movement in movements]),
+        corrections=sum([m.kind == "corrective" and m.ticks != 0 for m in movements]),
+        iterations=sum(goals["iterations"].tolist()),
+        evaluations=sum(goals["evaluations"].tolist() + checked),
+        reason=reason_of_failure(compiled, goals),
+    )
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
@@ -239,163 +375,14 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
     return travel
 
 
-ByGoal = list[list[Movement]]
-"""The movements of a solution, goal by goal."""
-
-
-class Subtask(NamedTuple):
-    """Result of a goal that was attempted."""
-
-    movements: list[Movement]
-    """The movements made."""
-    q: Array
-    hit: bool
-    iterations: int
-    evaluations: int
-    """Without a check before the first movement, which :func:`execution_of` counts."""
-
-
-def has_path(plan: ByGoal) -> bool:
-    """Whether a movement follows a path."""
-    return any(movement.kind == "path" for movements in plan for movement in movements)
-
-
-def slots_for(movements: list[Movement]) -> list[Movement | None]:
-    """Straight movements of a goal as the kernel takes them, up to the first that **A** finds.
-
-    None comes first where no movement is made at once: the hand may be in the goal already.
-    """
-    with_target = takewhile(lambda movement: movement.target is not None, movements)
-    return [None, *with_target] if movements[0].kind == "corrective" else [*with_target]
-
-
-def make_straight(compiled: CompiledTask, plans: list[ByGoal]) -> list[list[Subtask]]:
-    """Make the movements of plans without paths side by side.
-
-    Returns the results of the goals that were attempted, a list for each plan.
-    """
-    if not plans:
-        return []
-    slots = [[slots_for(movements) for movements in plan] for plan in plans]
-    most = max(len(each) for of_plan in slots for each in of_plan)
-    hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
-    targets = np.empty((*hands.shape, most, compiled.starts.shape[1]))
-    stops = np.empty(targets.shape[:3], dtype=np.bool_)
-    targets[:], stops[:] = np.nan, True
-    for n, of_plan in enumerate(slots):
-        for g, of_goal in enumerate(of_plan):
-            for m, movement in enumerate(of_goal):
-                if movement is not None:
-                    targets[n, g, m] = movement.target
-                    stops[n, g, m] = movement.kind != "corrective"
-    reached = reach_all(compiled, hands, targets, stops)
-    names = ("hit", "ticks", "moved", "corrections", "iterations", "evaluations")
-    hit, ticks, moved, corrections, iterations, evaluations = (
-        getattr(reached, name).tolist() for name in names
-    )
-    outcomes = []
-    for n, plan in enumerate(plans):
-        subtasks = []
-        for g, of_goal in enumerate(slots[n]):
-            goal, hand, ticks_each = plan[g][0].goal, plan[g][0].hand, moved[n][g]
-            movements = [
-                Movement(goal, hand, movement.kind, targets[n, g, m], ticks_each[m])
-                for m, movement in enumerate(of_goal)
-                if movement is not None and ticks_each[m]
-            ]
-            if corrections[n][g]:
-                target, spent = reached.corrected[n, g], ticks[n][g] - sum(ticks_each)
-                movements.append(Movement(goal, hand, "corrective", target, spent))
-            evaluated = evaluations[n][g] - (of_goal[0] is None)
-            subtasks.append(
-                Subtask(movements, reached.q[n, g], hit[n][g], iterations[n][g], evaluated)
-            )
-            if not hit[n][g]:
-                break
-        outcomes.append(subtasks)
-    return outcomes
-
-
-def make_one_by_one(compiled: CompiledTask, plan: ByGoal) -> list[Subtask]:
-    """Make the movements of a plan, of which some follow paths, one after the other.
-
-    Returns the results of the goals that were attempted.
-    """
-    task, model = compiled.task, compiled.model
-    subtasks, q = list[Subtask](), compiled.starts[0]
-    for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
-        hand, made = movements[0].hand, list[Movement]()
-        where, iterations, evaluations = (hand, goal, task.radius), 0, 0
-        checks = movements[0].kind == "corrective"
-        hit = checks and move(task.robot, q, q, *where, model=model).hit
-        for movement in [] if hit else [*movements, Movement(number, hand, "corrective")]:
-            target, stops = movement.target, movement.kind != "corrective"
-            if target is None:
-                locked = task.locked_base
-                found = correct(task.robot, q, hand, goal, locked_base=locked, model=model)
-                target, iterations = found.q, found.iterations
-                evaluations += iterations + 1
-                if not found.converged:
-                    break
-            if movement.waypoints is None:
-                moved = move(task.robot, q, target, *where, stop_on_arrival=stops, model=model)
-            else:
-                moved = follow(task.robot, q, movement.waypoints, *where, model=model)
-            made.append(replace(movement, target=target, ticks=moved.ticks))
-            q, hit, evaluations = moved.q, moved.hit, evaluations + moved.evaluations
-            if hit or movement.target is None:
-                break
-        subtasks.append(Subtask(made, q, hit, iterations, evaluations))
-        if not hit:
-            break
-    return subtasks
-
-
-def execution_of(compiled: CompiledTask, plan: ByGoal, subtasks: list[Subtask]) -> Execution:
-    """The execution of a plan, of whose goals these were attempted."""
-    movements: list[Movement] = []
-    hits: list[Array] = []
-    ticks = corrections = iterations = evaluations = 0
-    for of_goal, subtask in zip(plan, subtasks, strict=False):
-        goal, hand = of_goal[0].goal, of_goal[0].hand
-        movements += subtask.movements
-        for movement in subtask.movements:
-            ticks += movement.ticks or 0
-            corrections += movement.kind == "corrective"
-        iterations += subtask.iterations
-        # And a check before the first movement, and one at where that leads.
-        evaluations += subtask.evaluations + 2
-        if subtask.hit:
-            hits.append(subtask.q)
-            if not subtask.movements:  # hit on the way: show the hand
-                movements.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
-    reason = ""
-    if not subtask.hit:
-        task, where = compiled.task, (hand, compiled.task.goals[goal - 1])
-        why = explain_failure(task.robot, subtask.q, *where, task.locked_base, compiled.model)
-        reason = (
-            f"goal {goal}: the corrective process did not converge with the {hand} hand in "
-            f"{counted(subtask.iterations, 'iteration')}{why}"
-        )
-    return Execution(
-        movements=tuple(movements),
-        configurations=np.array(hits).reshape(-1, len(subtask.q)),
-        ticks=ticks,
-        corrections=corrections,
-        iterations=iterations,
-        evaluations=evaluations,
-        reason=reason,
-    )
-
-
-def movements_by_goal(task: Task, solution: Iterable[Movement]) -> ByGoal:
+def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     """The movements grouped by goal, checked against the task."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
             f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
             "movements"
         )
-    plan: ByGoal = []
+    plan: Plan = []
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
@@ -468,3 +455,177 @@ def hold_base(task: Task, points: Array) -> Array:
             )
         points[..., k][moved > 0] = task.q0[k]
     return points
+
+
+def check_targets(task: Task, targets: Any) -> Configs:
+    """A copy of the targets; ValueError where they do not fit the task."""
+    copy = np.array(targets, dtype=np.float64)
+    if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
+        raise ValueError(
+            f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
+        )
+    if np.isinf(copy).any():
+        raise ValueError("targets have infinite entries; needed are finite ones")
+    return hold_base(task, copy)
+
+
+# ---- Solutions from hands and targets, and initial ones ----
+
+
+def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
+    """A solution from hands and target configurations.
+
+    Parameters
+    ----------
+    hands : str
+        The hand for each goal, such as ``"RRLR"``.
+    targets : array_like, shape (G, dof)
+        The configuration to move to for each goal, length unit (base) and rad (joints). Where a row
+        is NaN, the corrective process acts alone.
+
+    Returns
+    -------
+    tuple of Movement
+        A movement for each goal, for :func:`coartic.execute` and :func:`coartic.trajectory`.
+
+    Raises
+    ------
+    ValueError
+        The hands are no text of L and R, or there is not a row for each.
+    """
+    targets = real_array("targets", targets)
+    if targets.ndim != 2 or len(targets) != len(hands):
+        raise ValueError(
+            f"targets have shape {targets.shape}; needed is a row for each of the "
+            f"{len(hands)} hands in {brief_value(hands)}"
+        )
+    return tuple(
+        Movement(number, hand, "corrective")
+        if np.isnan(target).all()
+        else Movement(number, hand, "learned", target)
+        for number, (hand, target) in enumerate(zip(hands_of(hands), targets, strict=True), 1)
+    )
+
+
+def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) -> Execution:
+    """Make one trial by the corrective process alone.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    hands : str
+        The hand for each goal: ``"LRRR"`` is left, right, right, right.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    Execution
+        What happened: movements, configurations at the hits, control ticks and reward. Where the
+        corrective process does not converge, ``completed`` is False and ``reason`` says so.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    ValueError
+        The hands do not fit the task, or no movement can be made with the model.
+
+    Notes
+    -----
+    Source: paper, section *The Corrective Process*.
+    """
+    task = as_task(task)
+    hands = check_hands(task, hands)
+    return execute(task, corrective_movements(hands), model=model)
+
+
+def corrective_movements(hands: str) -> list[Movement]:
+    """A corrective movement for each goal, with the given hands."""
+    return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]
+
+
+def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[str]:
+    """All hand sequences of a task.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    hands : iterable of {"left", "right"}, optional
+        The hands that may be used; all that the robot has by default.
+
+    Returns
+    -------
+    list of str
+        The sequences in alphabetical order, such as ``"LLLR"``: one letter for each of G goals,
+        2^G sequences for two hands.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    NotApplicableError
+        There are more than 4096 sequences.
+    ValueError
+        The robot has not all of these hands.
+    """
+    task = as_task(task)
+    return sequences_with(hands_among(task, hands), len(task.goals), task.name)
+
+
+def initial_hands(
+    task: TaskLike, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
+) -> str:
+    """The hand sequence of a first trial of a task.
+
+    A sequence that the task names stands as it is. Of a policy it is the sequence with which the
+    corrective process alone gets the highest reward: among sequences of one hand
+    (``"best-single-hand"``), or among all (``"best-of-all"``).
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    hands : tuple of {"left", "right"}, optional
+        The hands among which a policy chooses; all that the robot has by default.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    str
+        The hand for each goal, such as ``"RRRR"``.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    NotApplicableError
+        No candidate completes the task, or there are more than 4096.
+    ValueError
+        The robot has not all of these hands, or no movement can be made with the model.
+
+    Notes
+    -----
+    Source: paper, section *Experiments*.
+    """
+    task = as_task(task)
+    return search_initial_hands(task, hands_among(task, hands), model=model)[0]
+
+
+def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
+    """Reward of the corrective process alone with a task's initial hands; None where it fails with
+    them, or there are none with which it completes the task."""
+    try:
+        hands = initial_hands(task, model=model)
+    except NotApplicableError:
+        return None
+    return corrective_trial(task, hands, model=model).reward

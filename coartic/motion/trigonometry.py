@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from coartic.motion.compiled import chain_by, inner, scalar
+from coartic.motion.compile import chain_by, inner, scalar
 
 LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 

@@ -17,7 +17,7 @@ const PAPER = {
   step: 0.01, arrival_tolerance: 0.01, gain: 0.05, correction_tolerance: 0.01, max_iterations: 20000,
 };
 
-/* coartic/motion/robot_parameters.py; `task` is one of the package as plain data. */
+/* coartic/motion/batch.py; `task` is one of the package as plain data. */
 function problem_of(task, model = PAPER) {
   const { robot, goals, radius, start: { base, left, right } } = task;
   const arm = (first, links, [shoulder_x, shoulder_y]) => ({ first, links, shoulder_x, shoulder_y });
@@ -166,7 +166,7 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
 }
 
-/* coartic/motion/corrective.py: change `q` itself; whether **A** converges. */
+/* coartic/motion/movement.py: change `q` itself; whether **A** converges. */
 function correct(problem, q, number, hand) {
   const { model } = problem;
   const [free_x, free_y] = problem.free;
@@ -217,7 +217,7 @@ class Trial {
     return signed > 0;
   }
 
-  /* coartic/motion/reach.py: **A** finishes what was missed; whether it hits. */
+  /* coartic/motion/trial.py: **A** finishes what was missed; whether it hits. */
   corrects(goal, hand) {
     const target = this.q.slice();
     this.going = correct(this.problem, target, goal, hand);
@@ -238,7 +238,7 @@ class Trial {
     this.hands.push(hand);
   }
 
-  /* coartic/motion/reach.py: reach for a goal, with a target or by **A** alone. */
+  /* coartic/motion/trial.py: reach for a goal, with a target or by **A** alone. */
   reaches(goal, hand, target) {
     const hit = target ? this.moves(goal, hand, "learned", target) : this.looks(goal, hand);
     this.going = hit || this.corrects(goal, hand);
@@ -250,7 +250,7 @@ class Trial {
   }
 }
 
-/* coartic/motion/trials.py, one trial: a joint whose target is NaN keeps its value; a goal without
+/* coartic/motion/trial.py, one trial: a joint whose target is NaN keeps its value; a goal without
    any target (null) is left to **A**. */
 function make_trial(problem, hands, targets) {
   const trial = new Trial(problem);
@@ -262,7 +262,7 @@ function make_trial(problem, hands, targets) {
   return trial;
 }
 
-/* coartic/motion/initial.py */
+/* coartic/motion/solution.py */
 function corrective_trial(problem, hands) {
   return make_trial(problem, hands, hands.map(() => null));
 }
@@ -306,7 +306,7 @@ function trajectory(problem, trial) {
   return { rows: rows.length ? rows : [problem.start], hits };
 }
 
-/* coartic/motion/initial.py: all hand sequences. */
+/* coartic/motion/solution.py: all hand sequences. */
 function hand_sequences(problem) {
   return problem.goals.reduce(
     (sequences) => sequences.flatMap((sequence) => problem.hands.map((hand) => [...sequence, hand])),
@@ -316,7 +316,7 @@ function hand_sequences(problem) {
 
 const letters_of = (hands) => hands.map((hand) => "LR"[hand]).join("");
 
-/* coartic/motion/initial.py: the hands that the task names, or those that its rule finds. */
+/* coartic/motion/solution.py: the hands that the task names, or those that its rule finds. */
 function initial_hands(problem, named = problem.task.initial_hands) {
   if (/^[LR]+$/.test(named)) return [...named].map((letter) => "LR".indexOf(letter));
   const single = problem.hands.map((hand) => problem.goals.map(() => hand));

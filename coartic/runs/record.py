@@ -20,8 +20,8 @@ from coartic.errors import SolutionError
 from coartic.learner.run import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import PAPER
-from coartic.motion.reach import compiled_task
 from coartic.motion.solution import Execution, Movement, execute_many
+from coartic.motion.trial import compiled_task
 from coartic.runs.plan import Cell, Job
 from coartic.tasks.task import Task
 

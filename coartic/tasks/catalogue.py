@@ -10,6 +10,9 @@ from coartic.internal.text import unknown
 from coartic.tasks.families import instance
 from coartic.tasks.task import Task, read_task, shipped_tasks
 
+TaskLike = Task | str | Path
+"""What stands for a task: the task itself, its name, or the path of its file."""
+
 
 def builtin_tasks() -> tuple[str, ...]:
     """The tasks that come with the package.
@@ -66,3 +69,18 @@ def load_task(name_or_path: str | Path) -> Task:
         f"{unknown('task', name_or_path, builtin_tasks())} "
         "A task file's name ends in .toml; an instance is written FAMILY/v1/i017."
     )
+
+
+def as_task(task: TaskLike) -> Task:
+    """The task itself, or that of a name or of a file.
+
+    Raises TaskError where there is no such task, and TypeError for anything else.
+    """
+    if isinstance(task, Task):
+        return task
+    if not isinstance(task, str | Path):
+        raise TypeError(
+            f"task is {brief_value(task)}; it must be a Task, the name of one, such as "
+            "'ascending', or the path of a task file"
+        )
+    return load_task(task)

@@ -33,7 +33,8 @@ from coartic.internal.limits import MOST_CELLS, check_limits
 from coartic.internal.text import Line, counted, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, error_saying, explain_file
-from coartic.model import PAPER
+from coartic.motion.movement import move
+from coartic.motion.trial import ranked_sequences, search_initial_hands
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
 from coartic.tasks.task import (
@@ -244,9 +245,6 @@ def broken_rule(family: Family, task: Task) -> str | None:
     arm is straight at the start, or nearly. ``start-hit``: a hand is in a goal at the start, or
     close by. ``corrective``: the corrective process cannot do the task, under some restriction.
     """
-    from coartic.motion.initial import corrective_trial, initial_hands
-    from coartic.motion.movement import move
-
     goals = [(in_thousandths(x), in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
     if not all(left <= x <= right and low <= y <= high for x, y in goals):
@@ -272,13 +270,12 @@ def broken_rule(family: Family, task: Task) -> str | None:
         if move(task.robot, task.q0, task.q0, hand, centre, near).hit:
             return "start-hit"
     try:
-        hands = initial_hands(task, model=PAPER)
+        hands, _ = search_initial_hands(task)
     except NotApplicableError:
         return "corrective"
     others = (task.model_copy(update={"locked_base": locked}) for locked in restricted)
-    if all(corrective_trial(other, hands, model=PAPER).completed for other in others):
-        return None
-    return "corrective"
+    rewards = (reward for other in others for _, reward, *_ in ranked_sequences(other, [hands]))
+    return "corrective" if None in rewards else None
 
 
 def first_good(
@@ -307,8 +304,6 @@ def instance_of(family: Family, address: Address) -> Task:
 
     Raises TaskError where no draw is good.
     """
-    from coartic.motion.initial import initial_hands
-
     task, _ = first_good(family, address)
     name = str(address)
     short = name.rpartition("/")[2]
@@ -322,7 +317,7 @@ def instance_of(family: Family, address: Address) -> Task:
         "title": f"{family.title} {short}",
         "description": f"{counted(len(task.goals), 'goal')}, {links} links an arm, {base}: drawn "
         f"from family {family.name}.",
-        "initial_hands": initial_hands(task, model=PAPER),
+        "initial_hands": search_initial_hands(task)[0],
         "provenance": {key: {"status": "chosen", "source": source} for key in chosen},
     }
     return parse_task(content, name)

@@ -299,29 +299,6 @@ class Task(FileData):
         )
 
 
-TaskLike = Task | str | Path
-"""What stands for a task: the task itself, the name of one, or the path of a task file."""
-
-
-def as_task(task: TaskLike) -> Task:
-    """The task that is meant by a task, the name of one or the path of a file.
-
-    Raises TaskError where there is no such task, and TypeError for anything else.
-    """
-    if isinstance(task, Task):
-        return task
-    if not isinstance(task, str | Path):
-        raise TypeError(
-            f"task is {brief_value(task)}; it must be a Task, the name of one, such as "
-            "'ascending', or the path of a task file"
-        )
-    # Through the package: the catalogue has families, which are searched by moving the robot,
-    # and what moves the robot calls this.
-    from coartic import load_task
-
-    return load_task(task)
-
-
 def check_hands(task: Task, hands: str) -> str:
     """The hand sequence itself; ValueError where it does not fit the task."""
     allowed = letters_of(sorted(task.hands))

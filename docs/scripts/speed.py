@@ -31,9 +31,16 @@ from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Method, Session
 from coartic.model import PAPER
-from coartic.motion.reach import ALL_STOP, Requests, batch_for, blank, compiled_task, reach_goals
-from coartic.motion.slots import SLOTS
-from coartic.motion.trials import hand_codes, movements_of
+from coartic.motion.batch import SLOTS, batch_for
+from coartic.motion.solution import movements_of
+from coartic.motion.trial import (
+    ALL_STOP,
+    Requests,
+    compiled_task,
+    empty_accounts,
+    hand_codes,
+    reach_kernel,
+)
 from coartic.robot import Array
 
 
@@ -82,9 +89,10 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     compiled, codes = compiled_task(task, PAPER), hand_codes(task, hands, 1000)
 
     def arguments(targets: Array) -> tuple[Any, ...]:
-        asked = targets[:, :, None].copy()
-        arms = Requests(compiled.starts, codes[: len(targets)], asked, ALL_STOP, compiled.goals)
-        return arms, compiled.robot_parameters, blank(arms), batch_for(task.robot)
+        some = codes[: len(targets)]
+        arms = Requests(compiled.starts, some, targets[:, :, None], ALL_STOP, compiled.goals)
+        accounts = empty_accounts(task.robot, len(targets), len(task.goals))
+        return arms, compiled.parameters, *accounts, batch_for(task.robot)
 
     none, together, *alone = map(arguments, (targets[:0], targets, *targets[:100, None]))
     env, many = TaskEnv(task), TaskVectorEnv(1000, task)
@@ -98,13 +106,13 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
             env.step(action)
 
     return {
-        "the empty call": (100, lambda: [reach_goals(*none) for _ in range(100)]),
-        "kernel, one by one": (100, lambda: [reach_goals(*each) for each in alone]),
+        "the empty call": (100, lambda: [reach_kernel(*none) for _ in range(100)]),
+        "kernel, one by one": (100, lambda: [reach_kernel(*each) for each in alone]),
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
         "Session.trial, one by one": (100, lambda: [session.trial(each) for each in solutions]),
         "execute, one by one": (100, lambda: [execute(task, each) for each in solutions]),
         "environment, a step": (len(best), episode),
-        "kernel, 1000 at once": (1000, lambda: reach_goals(*together)),
+        "kernel, 1000 at once": (1000, lambda: reach_kernel(*together)),
         "Session.trials, 10,000 at once": (
             10_000,
             lambda: session.trials(hands, np.tile(targets, (10, 1, 1))),

@@ -36,7 +36,7 @@ from pydantic import Field
 
 from coartic import MethodError, Robot, movements_of
 from coartic.method import Information, Method, Parameters, Result
-from coartic.motion.reach import Reached, reach_unchecked
+from coartic.motion.trial import Reached, reach_goals
 from coartic.tasks.families import read_family
 
 FAMILY = Path(__file__).with_name("eight.v1.toml")
@@ -168,7 +168,7 @@ def reach(q, goal, radius, model, target=None):
     shift = np.pad(goal, ((0, 0), (0, q.shape[1] - BASE)))
     hands, there, checks = np.full(len(q), RIGHT), np.zeros((len(q), 2)), target is not None
     targets = None if target is None else target - shift
-    reached = reach_unchecked(
+    reached = reach_goals(
         ROBOT, q - shift, hands, there, radius, targets, checks=checks, model=model
     )
     return reached._replace(q=reached.q + shift, corrected=reached.corrected + shift)

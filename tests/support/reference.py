@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 from coartic.analysis import verify
 from coartic.learner.conditions import ExplorationCondition
 from coartic.model import PAPER, MotionModel
-from coartic.motion.corrective import Correction
-from coartic.motion.initial import initial_hands
-from coartic.motion.movement import MoveResult
-from coartic.motion.solution import Movement
+from coartic.motion.movement import Correction, MoveResult
+from coartic.motion.solution import Movement, initial_hands
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task, hands_of
 
@@ -136,7 +134,7 @@ def correct(
     locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
 ) -> Correction:
-    """:func:`coartic.motion.corrective.correct`, with the Jacobian as a matrix."""
+    """:func:`coartic.motion.movement.correct`, with the Jacobian as a matrix."""
     free = np.ones(robot.dof)
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
     q = np.array(q)

@@ -1,0 +1,208 @@
+"""A step of the environments (:mod:`coartic.gym`): N robots side by side, each at a goal of its own
+trial; from actions to rewards and observations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.motion.batch import SLOTS, Batch, Slots, batch_for, robot_parameters
+from coartic.motion.compile import entry, fill_row, inlined, inner
+from coartic.motion.trial import (
+    MOVE,
+    account,
+    begin,
+    correct,
+    empty_accounts,
+    find_corrections,
+    move,
+    set_off,
+)
+from coartic.robot import Array, Configs, Hands, Points, Robot
+
+Flags = NDArray[np.bool_]
+Numbers = NDArray[np.int64]
+
+
+class VectorState(NamedTuple):
+    """State of N environments, each on one of T tasks with G goals at most, and work space."""
+
+    task: Numbers
+    """Number of the task, shape ``(N,)``."""
+    goal: Numbers
+    """Index of the next goal, shape ``(N,)``."""
+    q: Configs
+    """Configurations, shape ``(N, dof)``."""
+    going: Flags
+    """Whether the trial goes on, shape ``(N,)``."""
+    actions: Array
+    """Shape ``(N, A)``: an entry for the hand, if there are two, and one for each joint."""
+    rewards: Array
+    """Of the step, ticks, shape ``(N,)``."""
+    seen: NDArray[np.float32]
+    """Observations, shape ``(N, O)`` (:func:`observe`)."""
+    parameters: NDArray[np.void]
+    """Robot parameters of each kind of robot, locks and radius."""
+    kinds: Numbers
+    """Which of them a task has, shape ``(T,)``; -1 for a task that is not loaded."""
+    goals: Points
+    """Centres of goals, shape ``(T, G, 2)``, of which a task has as many as ``counts`` says."""
+    counts: Numbers
+    """Goals of each task, shape ``(T,)``."""
+    movable: Flags
+    """Whether the robot of a task can move a joint, shape ``(T, E)``."""
+    joints: Numbers
+    """Indices in a configuration of the joints that are seen and moved, shape ``(E,)``."""
+    sides: Hands
+    """The hands of all robots, shape ``(H,)``."""
+    ahead: int
+    """Goals that are seen beyond the next one."""
+    reach: float
+    """How far from the middle a target can be, length unit or rad."""
+    failed: float
+    """Reward of a step in which the corrective process fails."""
+    runs: NDArray[np.void]
+    """Of some robots with each hand, shape ``(H, SLOTS)``."""
+    slots: Slots
+    accounts: NDArray[np.void]
+    """Of the goals of these robots, shape ``(SLOTS,)``."""
+    indices: Numbers
+    """Numbers of these robots, shape ``(SLOTS,)``."""
+
+    @classmethod
+    def empty(
+        cls,
+        robot: Robot,
+        shape: tuple[int, int, int],
+        joints: Numbers,
+        sides: Hands,
+        entries: int,
+        **constants: float,
+    ) -> VectorState:
+        """State in which no task is loaded: of N environments on T tasks with G goals at most, the
+        ``shape``, whose observations have so many entries."""
+        count, tasks, goals = shape
+        batch = batch_for(robot)
+        return cls(
+            task=np.zeros(count, np.int64),
+            goal=np.zeros(count, np.int64),
+            q=np.zeros((count, robot.dof)),
+            going=np.zeros(count, np.bool_),
+            actions=np.zeros((count, len(sides) - 1 + len(joints))),
+            rewards=np.zeros(count),
+            seen=np.zeros((count, entries), np.float32),
+            parameters=robot_parameters(robot)[:0],
+            kinds=np.full(tasks, -1),
+            goals=np.zeros((tasks, goals, 2)),
+            counts=np.zeros(tasks, np.int64),
+            movable=np.zeros((tasks, len(joints)), np.bool_),
+            joints=joints,
+            sides=sides,
+            runs=np.stack([batch.runs] * len(sides)),
+            slots=batch.slots,
+            accounts=empty_accounts(robot, SLOTS, 1).goals[:, 0],
+            indices=np.zeros(SLOTS, np.int64),
+            **constants,  # type: ignore[arg-type]
+        )
+
+
+@inner
+def squared_distance(run: Any) -> float:
+    """Squared joint distance to the solution of the corrective process; infinite without one."""
+    square = 0.0 if run.converged else math.inf
+    for j in range(len(run.q)):
+        square += (run.target[j] - run.q[j]) ** 2
+    return square
+
+
+@inlined
+def aim(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
+    """Phase 2, *aim*: the hand that the corrective process brings to the goal by the shorter path,
+    or, if the action says so, the other one, and the solution of the process, or the present
+    posture where there is none, plus the action."""
+    if len(state.sides) > 1:
+        is_nearer = squared_distance(other) < squared_distance(run)
+        if is_nearer != (action[0] > 0.5):
+            run.hand, run.converged = other.hand, other.converged
+            fill_row(run.target, other.target)
+    if not run.converged:
+        fill_row(run.target, run.q)
+    for k in range(len(state.joints)):
+        if movable[k]:
+            share = min(max(action[len(state.sides) - 1 + k], -1.0), 1.0)
+            run.target[state.joints[k]] += state.reach * share
+    run.action = MOVE
+
+
+@inlined
+def step_lot(count: int, robot: Any, state: Any) -> None:
+    """A step of as many robots as there is room for."""
+    for h in range(len(state.sides)):
+        for i in range(count):
+            n, run = state.indices[i], state.runs[h, i]
+            set_off(run, state.q[n])
+            begin(run, state.goals[state.task[n], state.goal[n]])
+            run.hand = state.sides[h]
+        find_corrections(count, robot, Batch(state.runs[h], state.slots))
+    batch, others = Batch(state.runs[0], state.slots), state.runs[len(state.sides) - 1]
+    for i in range(count):
+        n = state.indices[i]
+        aim(batch.runs[i], others[i], state.movable[state.task[n]], state.actions[n], state)
+    move(count, robot, batch)
+    for i in range(count):
+        state.accounts[i].moved[0] = batch.runs[i].ticks
+    correct(count, robot, batch)
+    for i in range(count):
+        n, goal = state.indices[i], state.accounts[i]
+        account(batch.runs[i], goal)
+        fill_row(state.q[n], goal.q)
+        state.goal[n] += goal.hit
+        state.rewards[n] = -goal.ticks if goal.hit else state.failed
+        state.going[n] = goal.hit and state.goal[n] < state.counts[state.task[n]]
+
+
+@entry
+def observe(state: Any) -> None:
+    """Fill in what each robot sees: whether there is a goal, places of goals from the base, joints,
+    and, where there is room for it, whether the robot can move them."""
+    goals, joints = state.ahead + 1, len(state.joints)
+    for n in range(len(state.task)):
+        seen, task = state.seen[n], state.task[n]
+        for k in range(goals):
+            goal = state.goal[n] + k
+            there = goal < state.counts[task]
+            seen[k] = there
+            for axis in range(2):
+                place = state.goals[task, goal, axis] - state.q[n, axis] if there else 0.0
+                seen[goals + 2 * k + axis] = place
+        for k in range(joints):
+            seen[3 * goals + k] = state.q[n, state.joints[k]]
+            if len(seen) > 3 * goals + joints:
+                seen[3 * goals + joints + k] = state.movable[task, k]
+
+
+@entry
+def step_robots(state: Any) -> int:
+    """Let all robots whose trial goes on reach for their next goal.
+
+    Returns -1; or, and then nothing is done, the number of a robot whose action has NaN.
+    """
+    last = len(state.task) - 1
+    for n in range(last + 1):
+        for figure in state.actions[n]:
+            if math.isnan(figure):
+                return n
+    for kind in range(len(state.parameters)):  # robots of a kind are moved together
+        count = 0
+        for n in range(last + 1):
+            if state.going[n] and state.kinds[state.task[n]] == kind:
+                state.indices[count] = n
+                count += 1
+            if count == SLOTS or (n == last and count > 0):
+                step_lot(count, state.parameters[kind], state)
+                count = 0
+    observe(state)
+    return -1

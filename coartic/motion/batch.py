@@ -1,0 +1,287 @@
+"""Many arms side by side: the arrays on which the compiled kernels work.
+
+A *run* is a robot that makes a trial, a record of the batch. A *slot* holds the arm of a run while
+it moves or is corrected. Each quantity of the slots is a row, and the innermost loop of a kernel
+runs over slots, so that the compiler makes vector instructions of it; the number of links belongs
+to the type of the rows, so that the loops over links are unrolled before. No operation mixes slots
+and none is reordered or fused: the result of a slot does not depend on its neighbours, on their
+number or on the width of the vectors.
+
+Robot parameters are a record, too: Numba looks at every field of a tuple and of a NumPy scalar each
+time a kernel is called, and an array of one record is one argument, whatever the record holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.model import PAPER, MotionModel
+from coartic.motion.compile import chain_by, inlined, inner, record_type
+from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
+from coartic.robot import BASE_DOF, HANDS, Arm, Robot
+
+SLOTS = 72
+"""Most slots at once: they and their rows stay in the innermost cache."""
+_VECTOR = 8  # slots that vectors hold; SLOTS is a multiple of it
+GOING = 0.0
+"""Status of a slot that has not ended."""
+
+
+def links_for(robot: Robot) -> int:
+    """Links for which kernels are compiled: four, eight, or those of an arm that has more, so that
+    all robots of a family share their machine code."""
+    return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
+
+
+def width_of(robot: Robot) -> int:
+    """Figures of a configuration in records: of the robot's, and then zeros, as many as with two
+    arms of :func:`links_for`, so that kernels are compiled once for a number of links."""
+    return BASE_DOF + 2 * links_for(robot)
+
+
+# ---- Robot parameters ----
+
+
+@cache
+def parameters_type(links: int) -> np.dtype[np.void]:
+    """Type of the record for robots with so many links (:func:`links_for`)."""
+    arm = {"first": np.int64, "count": np.int64, "links": (np.float64, links)}
+    shoulder = dict.fromkeys(("shoulder_x", "shoulder_y"), np.float64)
+    model = dict.fromkeys(MotionModel._fields, np.float64) | {"max_iterations": np.int64}
+    fields = {
+        "arms": (record_type(arm | shoulder), len(HANDS)),
+        "model": record_type(model),
+        "radius": np.float64,  # of the goals, length unit
+        "free_x": np.bool_,  # whether the corrective process moves the base in x
+        "free_y": np.bool_,
+        "checks": np.bool_,  # whether an arm without a target may be in its goal already
+    }
+    return record_type(fields)
+
+
+@lru_cache(maxsize=1024)
+def robot_parameters(
+    robot: Robot,
+    radius: float = 0.0,
+    *,
+    locked_base: tuple[str, ...] = (),
+    model: MotionModel = PAPER,
+    checks: bool = True,
+) -> NDArray[np.void]:
+    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``."""
+    parameters = np.zeros(1, parameters_type(links_for(robot)))
+    for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
+        first, links, *shoulder = robot.arm(hand)
+        arm["first"], arm["count"], arm["links"][: len(links)] = first, len(links), links
+        arm["shoulder_x"], arm["shoulder_y"] = shoulder
+    parameters["model"], parameters["radius"], parameters["checks"] = model, radius, checks
+    for axis in "xy":
+        parameters[f"free_{axis}"] = axis not in locked_base
+    return parameters
+
+
+@inlined
+def arm_of(robot: Any, hand: int) -> Any:
+    """The arm of a hand: 0 left, 1 right."""
+    arm = robot.arms[hand]
+    return Arm(arm.first, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
+
+
+# ---- Runs and slots ----
+
+
+class Slots(NamedTuple):
+    """Slots and the arms in them."""
+
+    at: Any
+    """The rows, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
+    corrected: Any
+    """The rows of an arm that is corrected: the same memory, shape ``(rows, SLOTS)``. Only to be
+    copied: some are integers."""
+    moved: Any
+    """The rows of an arm that moves."""
+
+
+class Batch(NamedTuple):
+    """Runs side by side, and the slots in which their arms are moved and corrected."""
+
+    runs: Any
+    """A record each, shape ``(N,)``."""
+    slots: Slots
+
+
+def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
+    """A batch of so many runs, as many as there are slots at most."""
+    width = width_of(robot)
+    fields = {
+        "q": (np.float64, width),  # where the robot is, length unit and rad
+        "target": (np.float64, width),  # where it is to go, or where the correction has ended
+        "goal": (np.float64, 2),  # x and y, length unit
+        "hand": np.int64,  # that is to hit the goal: 0 left, 1 right
+        "action": np.int64,  # next: see coartic.motion.trial
+        "corrects": np.bool_,  # whether the corrective process finishes what it misses
+        "going": np.bool_,  # whether it has missed no goal so far
+        "acting": np.bool_,  # whether the run is among those that are moved or corrected next
+        "hit": np.bool_,  # whether the hand is within the goal's radius
+        "converged": np.bool_,  # whether the corrective process did
+        "ticks": np.int64,  # of the movement
+        "iterations": np.int64,  # of the corrective process
+        "evaluations": np.int64,  # of forward kinematics, since the last account
+    }
+    record, corrected, moved = layout(links_for(robot))
+    at = np.zeros(1, record)
+    rows = at.view(np.float64).reshape(-1, SLOTS)
+    return Batch(np.zeros(count, record_type(fields)), Slots(at, rows[corrected], rows[moved]))
+
+
+@cache
+def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
+    """The rows of arms of so many links; which of them a correction needs, and a movement.
+
+    Shorter arms end in links of length 0.
+    """
+    joints = (BASE_DOF + links,)
+    corrected = {"q": joints}  # base x and y, then the joints of the arm
+    common = {
+        "run": (),  # index of the run in the slot
+        "first": (),  # index in a configuration of the first joint of its arm
+        "links": (),  # of its arm
+        "length": (links,),
+        "shoulder": (2,),
+        "goal": (2,),
+        "start": joints,
+    }
+    moved = {
+        "target": joints,
+        "rate": (links,),  # of the absolute link angles, rad a step
+        "base_rate": (2,),
+        "end": (2,),  # of the hand, where the target would put it
+        "distance": (),  # from start to target; its square, before the arm sets off
+        **dict.fromkeys(("step", "last", "slowness", "bend", "clearance"), ()),
+    }
+    # Positions of shoulder, joints and hand; what an iteration of a correction adds to q.
+    passing = {"x": (links + 1,), "y": (links + 1,), "status": (), "pull": joints}
+    shapes = corrected | common | moved | passing
+    kinds = dict.fromkeys(("run", "first", "links"), np.int64)
+    record = np.dtype(
+        [(name, kinds.get(name, np.float64), (*shape, SLOTS)) for name, shape in shapes.items()]
+    )
+    first, last = height(corrected), height(corrected | common)
+    return record, slice(last), slice(first, last + height(moved))
+
+
+def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
+    """Number of rows of quantities of these shapes."""
+    return sum(math.prod(shape) for shape in shapes.values())
+
+
+@inlined
+def copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
+    """Copy the base and an arm's joints of a configuration into a slot."""
+    row[0, slot] = q[0]
+    row[1, slot] = q[1]
+    for k in range(len(row) - BASE_DOF):
+        row[BASE_DOF + k, slot] = q[arm.first + k] if k < len(arm.links) else 0.0
+
+
+@inlined
+def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
+    """Load the arm of a run, which has this number, into a slot."""
+    at.run[slot], at.first[slot], at.links[slot] = number, arm.first, len(arm.links)
+    at.shoulder[0, slot] = arm.shoulder_x
+    at.shoulder[1, slot] = arm.shoulder_y
+    at.goal[0, slot], at.goal[1, slot] = run.goal[0], run.goal[1]
+    for k in range(len(at.length)):
+        at.length[k, slot] = arm.links[k] if k < len(arm.links) else 0.0
+    copy_arm(at.q, slot, run.q, arm)
+
+
+@inlined
+def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
+    """Load the arm of a run into a slot to start its movement to the run's target."""
+    load(at, slot, number, run, arm)
+    copy_arm(at.start, slot, run.q, arm)
+    copy_arm(at.target, slot, run.target, arm)
+    square = 0.0
+    for j in range(len(run.q)):
+        delta = run.target[j] - run.q[j]
+        square += delta * delta
+    at.distance[slot] = square
+
+
+@inlined
+def store(at: Any, slot: int, q: Any) -> None:
+    """Store the arm of a slot in ``q``."""
+    q[0] = at.q[0, slot]
+    q[1] = at.q[1, slot]
+    for k in range(at.links[slot]):
+        q[at.first[slot] + k] = at.q[BASE_DOF + k, slot]
+
+
+@inlined
+def compact(rows: Any, slot: int, last: int) -> None:
+    """Compact: move rows of the last slot into a slot that has ended."""
+    if slot != last:
+        for row in range(len(rows)):
+            rows[row, slot] = rows[row, last]
+
+
+@inner
+def padded_count(count: int) -> int:
+    """Slots in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
+
+    A loop over whole vectors leaves no slots over that would be worked on one by one.
+    """
+    return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
+
+
+# ---- Forward kinematics ----
+
+
+@inlined
+def winding(q: Any, slot: int) -> float:
+    """Bound on the angle of every link of an arm, rad: the sum of all its joints' angles."""
+    total = 0.0
+    for k in range(len(q) - BASE_DOF):
+        total += abs(q[BASE_DOF + k, slot])
+    return total
+
+
+@inner
+def are_near(at: Any, count: int) -> bool:
+    """Return whether bounds show that all angles are in the range of the fast cosine."""
+    far = 0
+    for i in range(padded_count(count)):
+        far += 0 if winding(at.q, i) < LARGEST else 1
+    return far == 0
+
+
+def chains_by(cos: Any, sin: Any) -> Any:
+    """Forward kinematics of every slot, by these functions."""
+
+    @inner
+    def chains(at: Any, count: int) -> None:
+        for i in range(count):
+            arm = Arm(BASE_DOF, at.length[:, i], at.shoulder[0, i], at.shoulder[1, i])
+            chain_by(at.q[:, i], arm, at.x[:, i], at.y[:, i], cos, sin)
+
+    return chains
+
+
+_near_chains = chains_by(near_cosine, near_sine)
+_far_chains = chains_by(cosine, sine)
+
+
+@inner
+def place(at: Any, count: int, near: bool) -> None:
+    """Forward kinematics of every slot: fill ``x`` and ``y``. ``near``: see :func:`are_near`."""
+    if near:
+        _near_chains(at, padded_count(count))
+    else:
+        _far_chains(at, padded_count(count))

@@ -1,0 +1,352 @@
+"""Kernels: functions that Numba compiles when they are first called, and what kernels share.
+
+Numba is imported with the first call: a command that lists names needs no compiler. Machine code is
+kept on disk. Numba keys it by the file of the cached function alone, so that a change in a function
+from another file would go unnoticed. Here the folder of the machine code is named after a hash of
+the package's sources: changed sources, fresh code.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import hashlib
+import logging
+import os
+import shutil
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, cached_property, partial, update_wrapper
+from pathlib import Path
+from threading import Lock
+from typing import IO, Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.errors import CoarticError
+from coartic.robot import chain, lever
+
+PACKAGE = Path(__file__).parent.parent
+_KEPT_S = 30 * 24 * 3600.0  # how long machine code of other sources stays
+_LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
+_IMPORTING = Lock()  # LLVM takes an option once
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def hash_of_sources() -> str:
+    """Hash of the files of this package that results come from: the version of the model's code."""
+    single = (PACKAGE / name for name in ("robot.py", "model.py", "method.py", "tasks/task.py"))
+    folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner"))
+    files = sorted([*single, *(path for folder in folders for path in folder)])
+    texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
+    return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
+
+
+FINGERPRINT = hash_of_sources()
+"""The version of the model's code when the package was imported."""
+
+
+class Kernel:
+    """A function that is compiled when it is first called (:func:`compile_kernel`)."""
+
+    def __init__(self, kind: str, function: Callable[..., Any]) -> None:
+        self.kind, self.function = kind, function
+        update_wrapper(self, function)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """The compiled function, as Numba calls it."""
+        return compile_kernel(self.function, self.kind)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the compiled function, and return its result."""
+        return self.dispatcher(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the compiled function, for which Numba takes a kernel that another
+        kernel calls."""
+        if name in ("_numba_type_", "py_func", "targetoptions"):
+            return getattr(self.dispatcher, name)
+        raise AttributeError(f"a kernel has no attribute {name!r}")
+
+
+def decorator(kind: str) -> Callable[[F], F]:
+    """The decorator that makes a kernel of this kind."""
+    return cast(Callable[[F], F], partial(Kernel, kind))
+
+
+entry = decorator("entry")
+"""A kernel that Python calls; its machine code is kept on disk."""
+inner = decorator("inner")
+"""A kernel that only other kernels call; a division by 0 gives infinity or NaN."""
+shared = decorator("shared")
+"""An inner kernel that several entries call: its machine code is kept on disk, too."""
+inlined = decorator("inlined")
+"""An inner kernel that becomes a part of its callers, with their error model: passing whole tables
+would cost, and loops over a shape are unrolled where it is known."""
+scalar = decorator("scalar")
+"""A kernel of numbers, which compiled functions of others may call, too."""
+intrinsic: Callable[[Any], Any] = decorator("intrinsic")
+"""A function that gives the type of a call in a kernel and builds its machine code."""
+
+
+# ---- What kernels share ----
+
+
+def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
+    """Type of a record for kernels, with these fields; they lie together in memory."""
+    return np.dtype(list(fields.items()), align=True)
+
+
+@inlined
+def fill_row(row: Any, values: Any) -> None:
+    """row[:] = values, or as many of them as both have, without the slices' checks, which cost
+    seconds to compile."""
+    for j in range(min(len(row), len(values))):
+        row[j] = values[j]
+
+
+chain_by = inner(chain)
+joint_lever = inner(lever)
+_DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy hands it to C
+
+
+def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
+    """NumPy generators as kernels take them, a row each; they must outlive the call."""
+
+    def draws_of(generator: np.random.Generator) -> list[int | None]:
+        c = generator.bit_generator.ctypes
+        return [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
+
+    return np.array([draws_of(generator) for generator in generators], dtype=np.uintp)
+
+
+@intrinsic
+def generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
+    """The generator that draws by the functions at these addresses."""
+    from numba.core import cgutils, types
+
+    kind = types.NumPyRandomGeneratorType("generator")
+    kind_of_bits = types.NumPyRandomBitGeneratorType("bit_generator")
+
+    def build(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        bits = cgutils.create_struct_proxy(kind_of_bits)(context, builder)
+        bits.state, bits.fnptr_next_uint64, bits.fnptr_next_double = arguments
+        generator = cgutils.create_struct_proxy(kind)(context, builder)
+        generator.bit_generator = bits._getvalue()
+        return generator._getvalue()
+
+    return kind(state, next_uint64, next_double), build
+
+
+@inner
+def generator_at(addresses: Any, run: int) -> Any:
+    """The generator in a row of :func:`addresses`."""
+    return generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
+
+
+# ---- Numba ----
+
+
+def import_numba() -> Any:
+    """Numba, with the settings that kernels need."""
+    with _IMPORTING:
+        return set_up_numba()
+
+
+@cache
+def set_up_numba() -> Any:
+    """Import Numba, and set it up.
+
+    LLVM gets its options before Numba first asks it for machine code. Only how fast the kernels are
+    depends on them. A program that has compiled something else with Numba before it calls a kernel
+    keeps the vectors that LLVM prefers.
+    """
+    modules: dict[str, Any] = sys.modules
+    kept = {name: modules[name] for name in ("yaml",) if name in modules}
+    modules["yaml"] = None  # no settings are read from a file in the folder where one stands
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "A Numba config file is found")
+            from numba.core import config
+    finally:
+        del modules["yaml"]
+        modules.update(kept)
+    config._config_fname = ""  # nor before it compiles
+
+    from llvmlite import binding  # which Numba brings, in the one version that it takes
+
+    # Loops over the links of an arm are unrolled, or the loop over slots around them could not be
+    # made of vector instructions: LLVM's own bound ends that at four links.
+    binding.set_option("coartic", "-unroll-threshold=1000")
+    # No loop peeling: it would take the first slot out of a loop over whole vectors and leave seven
+    binding.set_option("coartic", "-unroll-peel-max-count=0")
+    import numba.extending
+    from numba.core.codegen import get_host_cpu_features
+
+    # Vectors have 512 bits where there are any: on Intel's processors LLVM would prefer 256, with
+    # which kinematics take 1.5 times as long.
+    features = get_host_cpu_features()
+    if config.CPU_FEATURES is None and "+avx512f" in features.split(","):
+        config.CPU_FEATURES = f"{features},-prefer-256-bit"
+
+    def mangling_args(record: Any) -> tuple[str, tuple[int, ...]]:
+        return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
+
+    # Machine code on disk calls functions by names that say their types. Numba names a record by
+    # its number in the process that compiles, so a process that loads code of two such processes
+    # may call one's function with the other's record. The name of its fields holds everywhere.
+    numba.types.Record.mangling_args = property(mangling_args)
+    return numba
+
+
+def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
+    """Compile a function as the decorator of this name says.
+
+    Raises CoarticError where Numba is set to compile nothing.
+    """
+    numba = import_numba()
+    if numba.config.DISABLE_JIT:
+        raise CoarticError("NUMBA_DISABLE_JIT is set: unset it, as coartic's kernels are compiled")
+    # Kernels allocate nothing and work on arrays that their caller holds, so that they need not
+    # count references to them (NRT, Numba's run time): counting takes a quarter of the time.
+    options: dict[str, Any] = {"nogil": True, "_nrt": False, "no_cfunc_wrapper": True}
+    if kind in ("inner", "shared", "inlined"):
+        options["no_cpython_wrapper"] = True  # which would take as long to compile
+    match kind:
+        case "entry":
+            return keep_on_disk(numba.njit(**options)(function), function)
+        case "inner" | "shared":
+            compiled = numba.njit(**options, error_model="numpy")(function)
+            # Not compiled again for literal integers such as count = 0.
+            template, unliteral = compiled.get_call_template, numba.types.unliteral
+            compiled.get_call_template = lambda given, names: template(
+                tuple(map(unliteral, given)), names
+            )
+            return keep_on_disk(compiled, function) if kind == "shared" else compiled
+        case "inlined":
+            return numba.njit(**options, inline="always")(function)
+        case "scalar":
+            return numba.njit(nogil=True)(function)
+    made, context = numba.extending.intrinsic(function), numba.core.registry.cpu_target
+    context.typing_context.refresh()  # which then knows it
+    made._numba_type_ = context.typing_context.resolve_value_type(made)
+    return made
+
+
+def keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
+    """The compiled function itself, whose machine code is kept where there is a folder for it."""
+    folder, config = cache_folder(), import_numba().config
+    if folder is not None:
+        before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+        try:
+            compiled._cache = MachineCode(function)
+        finally:
+            config.CACHE_DIR = before
+    return compiled
+
+
+def cache_folder() -> Path | None:
+    """A writable folder for compiled code, or None where there is none."""
+    roots, chosen = [PACKAGE / "__pycache__"], import_numba().config.CACHE_DIR
+    if Path(chosen).is_absolute():  # or it would change with where one stands
+        roots.insert(0, Path(chosen) / "coartic")
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    if Path(given).is_absolute():
+        roots.append(Path(given) / "coartic")
+    else:
+        with contextlib.suppress(RuntimeError):  # a user without a home
+            roots.append(Path.home() / ".cache" / "coartic")
+    for root in roots:
+        folder = root / f"kernel-{FINGERPRINT}"
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK):
+                remove_old(root, folder)
+                return folder
+    return None
+
+
+def remove_old(root: Path, current: Path) -> None:
+    """Remove machine code of older sources that nobody has begun with for a month."""
+    with contextlib.suppress(OSError):
+        os.utime(current)
+    for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
+        with contextlib.suppress(OSError):
+            if folder.stat().st_mtime < time.time() - _KEPT_S:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+@cache
+def log_compilation() -> None:
+    """Log, once a process, that it compiles; a program that logs what coartic says shows this."""
+    logging.getLogger("coartic").info("Compiling (once): this takes up to a minute.")
+
+
+class MachineCode:
+    """Machine code of a function on disk, as Numba's dispatchers ask for it.
+
+    Of processes that lack the same code one compiles it and the others wait for it. A file that
+    cannot be read, such as one that a full disk has cut short, is dropped, and what cannot be kept
+    is compiled again in the next process.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        from numba.core.caching import FunctionCache
+
+        self.files = FunctionCache(function)
+        self.cache_path: str = self.files.cache_path
+        self.name = function.__name__
+        self.lock: IO[bytes] | None = None  # held while this process compiles
+
+    def load_overload(self, *wanted: Any) -> Any:
+        """The code of a signature; None where there is none, and this process is to compile it."""
+        self.unlock()
+        code = self.load(*wanted)
+        if code is None and self.wait_for_lock():
+            code = self.load(*wanted)  # somebody may have compiled it meanwhile
+            if code is not None:
+                self.unlock()
+        if code is None:
+            log_compilation()
+        return code
+
+    def load(self, *wanted: Any) -> Any:
+        """The code of a signature, or None."""
+        try:
+            # Not load_overload, which first lists all that Numba could compile.
+            return self.files._load_overload(*wanted)
+        except Exception:  # an unpickler may say anything
+            with contextlib.suppress(OSError):
+                self.files.flush()
+            return None
+
+    def save_overload(self, *compiled: Any) -> None:
+        """Keep compiled code on disk where possible."""
+        with contextlib.suppress(Exception):
+            self.files.save_overload(*compiled)
+        self.unlock()
+
+    def wait_for_lock(self) -> bool:
+        """Lock this function's code; False where the system has no locks, or nobody lets go."""
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl
+
+            file = open(f"{self.cache_path}/{self.name}.lock", "wb")  # noqa: SIM115
+            for _ in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
+                with contextlib.suppress(BlockingIOError):
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    self.lock = file
+                    return True
+                time.sleep(_RETRY_S)
+            file.close()
+        return False
+
+    def unlock(self) -> None:
+        """Let other processes compile this function."""
+        if self.lock is not None:
+            self.lock.close()
+            self.lock = None

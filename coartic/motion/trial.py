@@ -1,0 +1,692 @@
+"""The trial: the rule that every execution, learner and environment follows, goal by goal.
+
+A goal has five phases. A run, one of many side by side,
+
+1. *begins*: its next goal is set;
+2. *aims*: a hand and, perhaps, a target are chosen, which is what callers differ in;
+3. *moves* to the target, or, where there is none, finds that its hand is in the goal already;
+4. *corrects*: where the goal is missed, the corrective process **A** looks for a configuration that
+   hits it, and the arm moves there;
+5. *accounts*: what happened is noted, and the trial goes on where the goal is hit
+
+(paper, sections *Generating Movement for Each Goal* and *The Corrective Process*). Three loops are
+made of these phases: :func:`reach_kernel` moves to given targets, :mod:`coartic.learner.kernel`
+explores around learned targets, and :mod:`coartic.gym_kernel` does what actions say. The result of
+a run depends neither on the others nor on their number.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.errors import NotApplicableError
+from coartic.internal.limits import brief_value
+from coartic.internal.text import counted
+from coartic.internal.threads import in_parts
+from coartic.model import PAPER, MotionModel, check_model
+from coartic.motion.batch import (
+    SLOTS,
+    Batch,
+    arm_of,
+    batch_for,
+    load,
+    robot_parameters,
+    start,
+    width_of,
+)
+from coartic.motion.compile import entry, fill_row, inlined, record_type, shared
+from coartic.motion.movement import (
+    LARGEST_ENTRY,
+    check_goal,
+    configuration,
+    correct_slots,
+    explain_failure,
+    move_slots,
+)
+from coartic.robot import HANDS, Array, Configs, Hand, Hands, Points, Robot
+from coartic.tasks.task import WITHOUT_REACH, Task, check_hands, hands_of, letters_of
+
+IDLE, CHECK, MOVE, REPEAT = range(4)
+"""Next action of a run: none; it checks whether its hand is in the goal; it moves to its target and
+ends on arrival, too; it repeats a corrective movement, which ends on a hit or at the target."""
+COUNTED = (
+    "movement_ticks",
+    "forward_kinematics",
+    "corrective_iterations",
+    "corrections",
+    "failed_trials",
+)
+"""Counters of :class:`~coartic.method.Meter` that the kernels keep: columns of counts."""
+TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
+
+
+@cache
+def account_type(width: int, moves: int = 1) -> np.dtype[np.void]:
+    """Type of the account of one goal: configurations of so many figures, and so many movements."""
+    fields = {
+        "q": (np.float64, width),  # where the robot is in the end, length unit and rad
+        "target": (np.float64, (moves, width)),  # of each movement; as given where it is not made
+        "corrected": (np.float64, width),  # target of the corrective movement, where one is made
+        "moved": (np.int64, moves),  # ticks of each movement to a target, 0 where it is not made
+        "hand": np.int64,
+        "hit": np.bool_,
+        "ticks": np.int64,  # of all movements
+        "corrections": np.int64,  # 1 where a corrective movement is made
+        "iterations": np.int64,  # of the corrective process
+        "evaluations": np.int64,  # of forward kinematics
+        "failed": np.bool_,  # whether the trial ends here, as the goal is missed
+    }
+    return record_type(fields)
+
+
+# ---- The five phases ----
+
+
+@inlined
+def set_off(run: Any, q: Any) -> None:
+    """Put a run at the start of a trial."""
+    fill_row(run.q, q)
+    run.going, run.evaluations = True, 0
+
+
+@inlined
+def begin(run: Any, goal: Any) -> None:
+    """Phase 1, *begin*: set the goal of a run. If it aims at nothing, its hand is checked."""
+    fill_row(run.goal, goal)
+    fill_row(run.target, run.q)
+    run.action = CHECK if run.going else IDLE
+    run.hit, run.corrects = False, True
+
+
+@inlined
+def aim(run: Any, target: Any) -> None:
+    """Phase 2, *aim*, at a given target: a joint without one (NaN) stays where it is."""
+    for j in range(len(target)):
+        if not math.isnan(target[j]):
+            run.target[j] = target[j]
+            run.action = MOVE
+
+
+@inlined
+def move(count: int, robot: Any, batch: Any) -> None:
+    """Phase 3, *move*: let each run act; a run that does not move takes no ticks."""
+    for stops in (True, False):
+        for i in range(count):
+            run, action = batch.runs[i], batch.runs[i].action
+            # A movement to where an arm is tells whether it hits; it needs no other end.
+            run.acting = action == MOVE if stops else action in (CHECK, REPEAT)
+        move_acting(count, stops, robot, batch)
+    for i in range(count):
+        if batch.runs[i].action < MOVE:
+            batch.runs[i].ticks = 0
+
+
+@inlined
+def correct(count: int, robot: Any, batch: Any) -> None:
+    """Phase 4, *correct*: have **A** finish missed goals. ``target`` and ``ticks`` become what its
+    movements have."""
+    find_corrections(count, robot, batch)
+    for i in range(count):
+        batch.runs[i].acting = batch.runs[i].converged
+    move_acting(count, False, robot, batch)
+
+
+@inlined
+def account(run: Any, goal: Any) -> None:
+    """Phase 5, *account*: note what happened at a goal, of whose movements to targets ``target``
+    and ``moved`` are noted already."""
+    fill_row(goal.q, run.q)
+    goal.hand, goal.hit = run.hand, run.hit
+    goal.ticks = run.ticks
+    for m in range(len(goal.moved)):
+        goal.ticks += goal.moved[m]
+    goal.corrections, goal.iterations = run.converged, run.iterations
+    goal.evaluations = run.evaluations
+    if run.converged:
+        fill_row(goal.corrected, run.target)
+    goal.failed = run.going and not run.hit
+    run.going, run.evaluations = run.hit, 0
+
+
+@inlined
+def count_goal(goal: Any, counts: Any) -> None:
+    """Add what a goal took to the counts of a trial."""
+    counts[TICKS] += goal.ticks
+    counts[EVALUATIONS] += goal.evaluations
+    counts[ITERATIONS] += goal.iterations
+    counts[CORRECTIONS] += goal.corrections
+    counts[FAILURES] += goal.failed
+
+
+@shared
+def move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
+    """Move the acting runs to their targets."""
+    at, slot = batch.slots.at[0], 0
+    for i in range(count):
+        if batch.runs[i].acting:
+            start(at, slot, i, batch.runs[i], arm_of(robot, batch.runs[i].hand))
+            slot += 1
+    if slot > 0:
+        move_slots(batch.slots, slot, stops, robot, batch.runs)
+
+
+@shared
+def find_corrections(count: int, robot: Any, batch: Any) -> None:
+    """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
+    at, slot = batch.slots.at[0], 0
+    for i in range(count):
+        run = batch.runs[i]
+        run.acting, run.converged = run.corrects and run.going and not run.hit, False
+        run.ticks, run.iterations = 0, 0
+        if run.acting:
+            fill_row(run.target, run.q)
+            load(at, slot, i, run, arm_of(robot, run.hand))
+            slot += 1
+    correct_slots(batch.slots, slot, robot, batch.runs)
+
+
+# ---- Trials with given targets ----
+
+
+class Requests(NamedTuple):
+    """Requests to the kernel: N arms, each to G goals in turn by M movements each."""
+
+    starts: Configs
+    """Shape ``(N, dof)``, or ``(1, dof)`` for one start of all."""
+    hands: Hands
+    """Shape ``(N, G)``."""
+    targets: Configs
+    """Shape ``(N, G, M, dof)``; NaN for joints that stay. The first movement for a goal is made,
+    further ones where it is still missed."""
+    stops: NDArray[np.bool_]
+    """Whether the movement to a target ends on arrival, shape ``(N, G, M)``; empty where all do."""
+    goals: Points
+    """Shape ``(N, G, 2)``, or ``(1, G, 2)`` for the same goals of all."""
+
+
+ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
+"""Movements that all end on arrival, too; see :class:`Requests`."""
+
+
+NO_REWARD = -(2**63 - 1)
+"""Reward of a trial that failed, where rewards are integers."""
+
+
+class Accounts(NamedTuple):
+    """Accounts of N trials with G goals."""
+
+    goals: NDArray[np.void]
+    """Of each goal, shape ``(N, G)``: records (:func:`account_type`)."""
+    counts: NDArray[np.int64]
+    """Of each trial, shape ``(N, 5)``: what it took, by :data:`COUNTED`."""
+    rewards: NDArray[np.int64]
+    """Total rewards, shape ``(N,)``; :data:`NO_REWARD` where a trial failed."""
+
+
+@inlined
+def row_of(rows: Any, n: int) -> Any:
+    """Row ``n``, or row 0 if all arms share it."""
+    return rows[n if len(rows) > 1 else 0]
+
+
+@inlined
+def are_within(targets: Any) -> bool:
+    """Return whether no target ``(G, M, dof)`` of a trial is beyond :data:`LARGEST_ENTRY`."""
+    far = 0
+    for g in range(targets.shape[0]):
+        for m in range(targets.shape[1]):
+            for j in range(targets.shape[2]):
+                far += abs(targets[g, m, j]) > LARGEST_ENTRY
+    return far == 0
+
+
+@inlined
+def reach_lot(
+    first: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
+) -> None:
+    """Let some of the arms reach for their goals, as many as there is room for."""
+    for i in range(count):
+        n, run = first + i, batch.runs[i]
+        set_off(run, row_of(arms.starts, n))
+        run.going = are_within(arms.targets[n])
+        counts[n, FAILURES] = not run.going
+    for g in range(arms.targets.shape[1]):
+        for i in range(count):
+            n, run = first + i, batch.runs[i]
+            begin(run, row_of(arms.goals, n)[g])
+            run.hand = arms.hands[n, g]
+            if not robot.checks:
+                run.action = IDLE
+        for m in range(arms.targets.shape[2]):
+            for i in range(count):
+                n, run = first + i, batch.runs[i]
+                target, noted = arms.targets[n, g, m], goals[n, g].target[m]
+                if m > 0:
+                    fill_row(run.target, run.q)
+                    run.action = IDLE
+                if run.going and not run.hit:
+                    aim(run, target)
+                if run.action == MOVE:
+                    fill_row(noted, run.target)
+                    if len(arms.stops) > 0 and not arms.stops[n, g, m]:
+                        run.action = REPEAT
+                else:
+                    fill_row(noted, target)
+            move(count, robot, batch)
+            for i in range(count):
+                goals[first + i, g].moved[m] = batch.runs[i].ticks
+        correct(count, robot, batch)
+        for i in range(count):
+            n = first + i
+            account(batch.runs[i], goals[n, g])
+            count_goal(goals[n, g], counts[n])
+
+
+@entry
+def reach_kernel(arms: Any, robot: Any, goals: Any, counts: Any, rewards: Any, batch: Any) -> None:
+    """Let every arm reach for its goals, in lots."""
+    count, room = len(arms.targets), len(batch.runs)
+    for first in range(0, count, room):
+        reach_lot(first, min(room, count - first), arms, robot[0], goals, counts, batch)
+    for n in range(count):
+        rewards[n] = -counts[n, TICKS] if counts[n, FAILURES] == 0 else NO_REWARD
+
+
+SHARE = 14 * SLOTS
+"""Arms for a thread, at least: to begin one takes as long as a hundred trials."""
+_IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
+"""Batches that no thread uses, by :attr:`Robot.most_links`."""
+
+
+def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
+    """Accounts of so many trials to be filled in; their counts are 0."""
+    return Accounts(
+        np.empty((count, goals), account_type(width_of(robot), moves)),
+        np.zeros((count, len(COUNTED)), dtype=np.int64),
+        np.empty(count, dtype=np.int64),
+    )
+
+
+def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
+    """Let N arms reach for G goals each, in turn, until they miss one.
+
+    A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
+    checked. Many arms are shared among threads.
+    """
+    count, goals, moves, _ = arms.targets.shape
+    accounts, idle = empty_accounts(robot, count, goals, moves), _IDLE[robot.most_links]
+
+    def work(part: slice) -> None:
+        some, results = arms, accounts
+        if part.stop - part.start < count:
+            some = Requests._make(each[part] if len(each) == count else each for each in arms)
+            results = Accounts._make(each[part] for each in accounts)
+        try:
+            batch = idle.pop()  # no other thread gets it
+        except IndexError:
+            batch = batch_for(robot)
+        reach_kernel(some, parameters, *results, batch)
+        idle.append(batch)
+
+    if count >= 2 * SHARE:
+        in_parts(work, count, SHARE)
+    else:
+        work(slice(0, count))
+    return accounts
+
+
+class Reached(NamedTuple):
+    """Results of N arms that reached for a goal each (:func:`reach_goals`)."""
+
+    q: Configs
+    """Configuration in which each arm ended, or stayed, shape ``(N, dof)``, length unit and rad."""
+    hit: NDArray[np.bool_]
+    """Whether its hand is in the goal, shape ``(N,)``."""
+    ticks: NDArray[np.int64]
+    """Control ticks of its movements, shape ``(N,)``."""
+    corrected: Configs
+    """Target of its corrective movement, shape ``(N, dof)``; NaN where none was made."""
+    corrections: NDArray[np.int64]
+    """Corrective movements made, 0 or 1: 0 also where **A** did not converge."""
+    iterations: NDArray[np.int64]
+    """Iterations of the corrective process, one Jacobian each."""
+    evaluations: NDArray[np.int64]
+    """Number of forward-kinematics evaluations."""
+
+
+def reach_goals(
+    robot: Robot,
+    q: Configs,
+    hands: Hands,
+    goals: Points,
+    radius: float,
+    targets: Configs | None = None,
+    *,
+    checks: bool = True,
+    locked_base: tuple[str, ...] = (),
+    model: MotionModel = PAPER,
+) -> Reached:
+    """Let N arms reach for a goal each, side by side, from where they are.
+
+    Arguments are not checked.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot of all arms.
+    q : ndarray, shape (N, dof)
+        Where they are, length unit (base) and rad (joints).
+    hands : ndarray of int, shape (N,)
+        Their hands: 0 left, 1 right.
+    goals : ndarray, shape (N, 2)
+        Centres of their goals, x and y, length unit.
+    radius : float
+        Radius of all goals, length unit.
+    targets : ndarray, shape (N, dof), optional
+        Where to move first. A joint whose target is NaN keeps its value, and an arm whose row is
+        NaN has no target, as all arms by default: the corrective process acts alone.
+    checks : bool
+        Whether the hand of an arm without a target may be in its goal already; else the corrective
+        process begins at once.
+    locked_base : tuple of {"x", "y"}
+        Coordinates of the base that the corrective process leaves as they are.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    Reached
+        Where the arms ended, and what that took.
+
+    Notes
+    -----
+    Source: paper, sections *Generating Movement for Each Goal* and *The Corrective Process*.
+    """
+    given = np.full(q.shape, np.nan) if targets is None else np.array(targets, order="C")
+    arms = Requests(
+        starts=np.array(q, order="C"),
+        hands=np.array(hands)[:, None],
+        targets=given[:, None, None],
+        stops=ALL_STOP,
+        goals=np.array(goals, order="C")[:, None],
+    )
+    parameters = robot_parameters(
+        robot, radius, locked_base=locked_base, model=model, checks=checks
+    )
+    ended = reach(robot, arms, parameters).goals[:, 0]
+    ended["corrected"][ended["corrections"] == 0] = np.nan
+    figures = [ended[name][..., : robot.dof] if name in ("q", "corrected") else ended[name]
+               for name in Reached._fields]  # fmt: skip
+    return Reached._make(map(np.ascontiguousarray, figures))
+
+
+class CompiledTask(NamedTuple):
+    """A task as the kernels read it (:func:`compiled_task`)."""
+
+    task: Task
+    starts: Configs
+    """Where trials start, shape ``(1, dof)``."""
+    goals: Points
+    """Centres of the goals, shape ``(1, G, 2)``."""
+    parameters: NDArray[np.void]
+    """Of the robot (:func:`coartic.motion.batch.robot_parameters`)."""
+    model: MotionModel
+
+
+def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
+    """A task for the kernels. Raises ValueError for a task or a model that no trial can be made
+    with: a copy of a task with changed fields is unchecked."""
+    check_model(model, radius=task.radius)
+    goals = [check_goal(goal, task.radius) for goal in task.goals]
+    return CompiledTask(
+        task=task,
+        starts=configuration(task.robot, task.q0)[None],
+        goals=np.array([goals], dtype=np.float64),
+        parameters=robot_parameters(
+            task.robot, task.radius, locked_base=task.locked_base, model=model
+        ),
+        model=model,
+    )
+
+
+def make_trials(
+    compiled: CompiledTask,
+    hands: Hands,
+    targets: Configs,
+    stops: NDArray[np.bool_] = ALL_STOP,
+) -> Accounts:
+    """Make N trials of a task: ``hands`` of shape ``(N, G)``; ``targets`` and ``stops`` as in
+    :class:`Requests`."""
+    arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
+    return reach(compiled.task.robot, arms, compiled.parameters)
+
+
+def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
+    """The reason why a trial, with these accounts of its goals, was not completed; empty if it
+    was."""
+    if goals["hit"][-1]:
+        return ""
+    number = int(goals["hit"].argmin())
+    goal, task = goals[number], compiled.task
+    hand, q = HANDS[goal["hand"]], goal["q"][: task.robot.dof]
+    why = explain_failure(task.robot, q, hand, task.goals[number], task.locked_base, compiled.model)
+    return (
+        f"goal {number + 1}: the corrective process did not converge with the {hand} hand in "
+        f"{counted(int(goal['iterations']), 'iteration')}{why}"
+    )
+
+
+class Trials(NamedTuple):
+    """Results of N trials."""
+
+    ticks: NDArray[np.int64]
+    """Control ticks of each, shape ``(N,)``."""
+    completed: NDArray[np.bool_]
+    """Whether every goal was hit, shape ``(N,)``."""
+    corrections: NDArray[np.int64]
+    """Corrective movements made, shape ``(N,)``."""
+    iterations: NDArray[np.int64]
+    """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
+    evaluations: NDArray[np.int64]
+    """Forward-kinematics evaluations the kernel made, shape ``(N,)``."""
+    targets: Configs
+    """Targets as moved to, shape ``(N, G, dof)``, length unit (base) and rad (joints); a row of NaN
+    where **A** alone acted, and in the goals after a failure what was given."""
+    reached: Configs
+    """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN after a failure."""
+
+    @property
+    def rewards(self) -> Array:
+        """Total rewards, shape ``(N,)``; -inf where a trial failed."""
+        return np.where(self.completed, -self.ticks, -np.inf)
+
+
+def trials_of(accounts: Accounts, dof: int) -> Trials:
+    """Results of trials from their accounts."""
+    goals, counts, _ = accounts
+    reached = goals["q"][..., :dof]
+    if counts[:, FAILURES].any():
+        reached[~goals["hit"]] = np.nan
+    return Trials(
+        ticks=counts[:, TICKS],
+        completed=counts[:, FAILURES] == 0,
+        corrections=counts[:, CORRECTIONS],
+        iterations=counts[:, ITERATIONS],
+        evaluations=counts[:, EVALUATIONS],
+        targets=goals["target"][:, :, 0, :dof],
+        reached=reached,
+    )
+
+
+HandSequences = str | Sequence[str]
+"""Hand sequences of N trials: one for all (``"RRLR"``), or one each."""
+
+
+def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
+    """The hand of every trial and goal, shape ``(count, G)``.
+
+    Raises ValueError where they do not fit the task.
+    """
+    several = isinstance(hands, Iterable) and not isinstance(hands, str)
+    each: list[Any] = list(hands) if several else [hands]
+    for sequence in each:
+        if not isinstance(sequence, str):
+            check_hands(task, sequence)
+    codes = {
+        sequence: [HANDS.index(hand) for hand in hands_of(check_hands(task, sequence))]
+        for sequence in dict.fromkeys(each)
+    }
+    if several and len(each) != count:
+        raise ValueError(f"{len(each)} hand sequences for {count} trials")
+    rows = np.empty((count, len(task.goals)), dtype=np.int64)
+    rows[:] = np.reshape([codes[sequence] for sequence in each], (-1, len(task.goals)))
+    return rows
+
+
+# ---- Trials outside the session of a run, of which honest methods make none ----
+
+_trials = 0
+_inside = 0
+
+
+def note_trials(count: int) -> None:
+    """Count trials, unless the session of a run makes them."""
+    global _trials
+    _trials += 0 if _inside else count
+
+
+@contextmanager
+def inside(of_run: bool) -> Iterator[None]:
+    """Count no trials in this block if they belong to the session of a run."""
+    global _inside
+    _inside += of_run
+    try:
+        yield
+    finally:
+        _inside -= of_run
+
+
+def trials_outside() -> int:
+    """Trials made outside so far, in this process."""
+    return _trials
+
+
+# ---- Initial hands: those of trial 0 ----
+
+MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
+
+
+def ranked_sequences(
+    task: Task, sequences: Collection[str], *, model: MotionModel = PAPER
+) -> list[tuple[str, int | None, str, dict[str, int]]]:
+    """Make a trial by the corrective process alone with each hand sequence; best first, failed ones
+    last.
+
+    Returns hands, reward (None where it fails), reason of the failure, and counts of the trial. Of
+    equal rewards the sequence with the fewest changes of hand comes first, then the one that was
+    given first.
+    """
+    compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
+    note_trials(len(codes))
+    targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
+    accounts = make_trials(compiled, codes, targets)
+    trials = []
+    for hands, goals, counts in zip(sequences, *accounts[:2], strict=True):
+        spent = dict(zip(COUNTED, counts.tolist(), strict=True))
+        # The place of the hand after each movement is known, as coartic.execute counts it.
+        spent["forward_kinematics"] += int(goals["hit"].sum()) + spent["failed_trials"]
+        reward = None if spent["failed_trials"] else -spent["movement_ticks"]
+        trials.append((hands, reward, reason_of_failure(compiled, goals), spent))
+    return sorted(
+        trials,
+        key=lambda trial: (
+            math.inf if trial[1] is None else -trial[1],
+            changes_of_hand(trial[0]),
+        ),
+    )
+
+
+def changes_of_hand(sequence: str) -> int:
+    """How often successive goals are hit by different hands."""
+    return sum(a != b for a, b in itertools.pairwise(sequence))
+
+
+def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
+    """All sequences of some hands for so many goals, in alphabetical order.
+
+    Raises NotApplicableError, which names the task, where there are too many.
+    """
+    ordered = [hand for hand in HANDS if hand in hands]
+    if reason := too_many_sequences(task, goals, len(ordered)):
+        raise NotApplicableError(reason)
+    return [letters_of(sequence) for sequence in itertools.product(ordered, repeat=goals)]
+
+
+def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
+    """Why the sequences of so many hands cannot all be tried on a task, or None where they can."""
+    count = hands**goals
+    if count <= MOST_SEQUENCES:
+        return None
+    return f"task {task!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
+
+
+def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
+    """Some of the hands of a task's robot, or all; ValueError where it does not have them."""
+    if hands is None:
+        return task.hands
+    chosen = tuple(hands)
+    if not chosen or any(hand not in task.hands for hand in chosen):
+        raise ValueError(
+            f"hands is {brief_value(hands if isinstance(hands, str) else chosen)}; it must be a "
+            f"list of hands of task {task.name!r}: {' and '.join(map(repr, task.hands))}"
+        )
+    return chosen
+
+
+def search_initial_hands(
+    task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
+) -> tuple[str, Mapping[str, int]]:
+    """The hand sequence of trial 0, and what its search spent, by the names of a meter: nothing for
+    a sequence that the task names.
+
+    Of a policy it is the sequence with which the corrective process alone gets the highest reward:
+    among sequences of one hand, or among all. Raises NotApplicableError where the process completes
+    the task with none of them, or there are too many.
+    """
+    allowed = hands_among(task, hands)
+    if not task.initial_is_policy:
+        return task.initial_hands, {}
+    ordered = tuple(hand for hand in HANDS if hand in allowed)
+    return search_by_policy(task.model_dump_json(), ordered, model)
+
+
+@lru_cache(maxsize=64)
+def search_by_policy(
+    task_json: str, hands: tuple[Hand, ...], model: MotionModel
+) -> tuple[str, Mapping[str, int]]:
+    """The search of a task, given as JSON, with these hands: the same is made once."""
+    task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
+    goals = len(task.goals)
+    if task.initial_hands == "best-single-hand":
+        candidates = [letters_of([hand] * goals) for hand in hands]
+    else:
+        candidates = sequences_with(hands, goals, task.name)
+    ranked = ranked_sequences(task, candidates, model=model)
+    best, reward, reason, _ = ranked[0]
+    if reward is None:
+        raise NotApplicableError(
+            f"task {task.name!r}: the corrective process completes it with no hand sequence that "
+            f"initial_hands = {task.initial_hands!r} allows; with {best}, {reason}"
+        )
+    spent = {name: sum(counts[name] for *_, counts in ranked) for name in COUNTED[:FAILURES]}
+    spent["jacobians"] = spent["corrective_iterations"]
+    return best, {"initial_trials": len(ranked), **spent}
