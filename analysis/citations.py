@@ -1,6 +1,6 @@
-"""Citations: the software, the paper, and the works behind methods, solvers and analysis.
+"""Citations of the software, the paper, and the works behind methods, solvers and analysis.
 
-The works are the entries of ``references.bib``, which are printed as they stand there.
+The works are entries of ``references.bib``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STATISTICS = "efron1993", "davison1997", "holm1979", "chung2013", "schuirmann198
 
 @cache
 def references() -> Mapping[str, str]:
-    """The entries of ``references.bib`` by key, in BibTeX."""
+    """Return the entries of ``references.bib`` by key, in BibTeX."""
     text = (resources.files("coartic.analysis") / "references.bib").read_text(encoding="utf-8")
     entries = re.finditer(r"^@\w+\{([^,]+),\n(?: .+\n)+\}", text, re.MULTILINE)
     return {entry[1]: entry[0] for entry in entries}
@@ -35,11 +35,17 @@ def bibliography(
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,
 ) -> str:
-    """BibTeX for the software, the paper and the methods, each work once.
+    """Return BibTeX for the software, the paper and the methods, each work once.
 
-    A comment before an entry names the methods that rest on it. Methods of others are cited as they
-    declare. With ``analysis`` the works behind statistics and signatures follow. ``environment``
-    is a results folder's, whose version and commit are named; without it this version is.
+    Parameters
+    ----------
+    methods : mapping of str to MethodInfo
+        Methods by id. A comment before an entry names the methods that use the work; a method from
+        a file is cited as its author declares.
+    analysis : bool
+        Add the works behind statistics and signatures.
+    environment : mapping, optional
+        Environment of a results folder, for its version and commit; without it, this version.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
@@ -78,11 +84,11 @@ def bibliography(
 
 
 def misc(key: str, **fields: str) -> str:
-    """A ``@misc`` in BibTeX, one field a line."""
+    """Return a ``@misc`` entry of BibTeX, a line for each field."""
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@misc{{{key},", *lines, "}"])
 
 
 def comment(text: str) -> str:
-    """A line that BibTeX skips: between entries it skips everything but an @."""
+    """Return a line that BibTeX skips: between entries BibTeX reads nothing but an @."""
     return f"% {one_line(text)}".replace("@", "(at)")

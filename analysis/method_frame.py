@@ -1,4 +1,4 @@
-"""A row for each method of a study, with what it is."""
+"""The frame of methods: a row for each method of a study, with what the method is."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) ->
     cells : iterable of CellRuns
         Runs of the methods, in the order of the suite.
     declared : mapping of str to MethodInfo
-        What each method declares, by its id without a setting.
+        Declaration of each method, by its id without a setting.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) ->
 def row_of(
     cells: Sequence[CellRuns], declared: Mapping[str, MethodInfo], labels: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the row of a method by its cells; ``labels``: of all methods of the study."""
+    """Return the row of a method from its cells; ``labels`` has all methods of the study."""
     base, setting, label = cells[0].method, cells[0].setting, cells[0].label
     info = declared[base]
     known = KNOWN_METHODS.get(base) if info.is_ours else None
@@ -88,9 +88,9 @@ def row_of(
 
 
 def group_of(cells: Iterable[CellRuns]) -> str:
-    """Return which of :data:`GROUPS` a method belongs to.
+    """Return the group of a method, one of :data:`GROUPS`, from its cells.
 
-    A method that makes a single trial on every task makes no use of the reward of a trial.
+    A method that makes a single trial on every task does not use the reward of trials.
     """
     parts = [cell.runs for cell in cells]
     information = {each for runs in parts for text in runs.information.unique()
@@ -105,8 +105,8 @@ def group_of(cells: Iterable[CellRuns]) -> str:
 def joined_conditions(
     cells: Mapping[str, Sequence[CellRuns]], rows: Mapping[str, dict[str, Any]]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield rows of the learner over one-armed and two-armed tasks, which it explores under
-    different conditions: EC1, and on tasks where it ran a condition that draws hands at random."""
+    """Yield label and row of the learner over one-armed and two-armed tasks together: under EC1,
+    and on tasks for two arms under a condition that draws hands at random."""
     one_armed = {cell.task for cell in cells.get(EC1, ())}
     for label in LEARNERS:
         two_armed = {cell.task for cell in cells.get(label, ())}

@@ -20,9 +20,9 @@ LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
 """Ids of the learner under the paper's conditions: the first with one arm, the others with two,
 more exploration later."""
 RANDOM_SEARCH = "random-search"
-"""The best of random targets around the corrective process, which cannot coarticulate."""
+"""Id of random search: the best of random targets around those of the corrective process."""
 INITIAL = "corrective-alone/given"
-"""The corrective process with a task's initial hands: the initial solution."""
+"""Id of the corrective process alone with a task's initial hands: the initial solution."""
 
 
 class KnownMethod(NamedTuple):
@@ -53,7 +53,7 @@ _WORDS = {
     "half_width": "± ",
     "stop": "stop ",
 }
-"""Parameters as they stand before their value."""
+"""Words for parameters, before their values."""
 
 
 def most_exploring(task: Task) -> str:
@@ -72,7 +72,7 @@ def title_of(method: str, setting: str = "") -> str:
 
 
 def setting_in_words(setting: str) -> str:
-    """Return parameters with their values, ``noise_sd=0.1``, as people read them: ``σ 0.1``."""
+    """Write a setting, ``noise_sd=0.1``, for people: ``σ 0.1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = [
         _WORDS[key] + value if key in _WORDS else key + is_ + value for key, is_, value in pairs

@@ -1,4 +1,4 @@
-"""The best known reward of each task, which gaps are to, and the proven bound."""
+"""Best known rewards of tasks, to which gaps are taken, and proven bounds."""
 
 from __future__ import annotations
 
@@ -19,28 +19,27 @@ from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
 
 SHIPPED = "shipped"
-"""Source of a reward that no run of the folder exceeds."""
+"""Source of a shipped reward that no run of the folder exceeds."""
 
 
 @dataclass(frozen=True)
 class BestKnown(KnownOptimum):
-    """The best reward known of a task, and where it comes from."""
+    """The best known reward of a task, and its source."""
 
     source: str = SHIPPED
     """:data:`SHIPPED`, or the label of the method with the best run."""
     run_id: str = ""
-    """The best run; empty where the reward is shipped."""
+    """Id of the best run; empty if the reward is shipped."""
     only_here: bool = False
-    """Whether nothing is shipped of the task and no search for the optimum has a solution."""
+    """True if no reward is shipped and no search for the optimum has a solution."""
 
 
 def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown]:
-    """Return the best known reward by task: of what is shipped and of all runs of a folder.
+    """Return the best known reward of each task, from shipped rewards and all runs of a folder.
 
-    Every run on the task as it is counts, also those of searches and those copied from other
-    folders; a run with another base solves another task. A task has none where its best reward is
-    0, which leaves no gap, and where only runs of one method tell it, which would be compared with
-    themselves.
+    All runs count, including searches and runs copied from other folders, but not runs with another
+    base, which solve another task. A task has no best known reward if its best reward is 0, which
+    leaves no gap, or if only runs of one method have it, which would be compared with themselves.
 
     Parameters
     ----------
@@ -82,7 +81,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 
 
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Lock of the base and other arm of each run, by its parameters."""
+    """Return the parameters ``base`` and ``other_arm`` of each run, which restrict movements."""
     default = {"base": BASE, "other_arm": "free"}
     asked = {text: default | json.loads(text) for text in runs.parameters.unique()}
     return pd.DataFrame(
@@ -91,17 +90,17 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
-    """(optimum − reward) / |optimum|: 0 at the optimum; 0.01 is 1 % more ticks than it."""
+    """Return (optimum − reward) / \|optimum\|: 0 at the optimum, 0.01 for 1 % more ticks."""
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))
 
 
 def initial_reward(task: Task) -> float:
-    """Reward of the initial solution; NaN where there is none."""
+    """Return the reward of the initial solution of a task; NaN without an initial solution."""
     solution = initial_solution(task)
     return math.nan if solution is None else float(-solution.ticks)
 
 
 def from_runs(runs: pd.DataFrame) -> KnownOptimum:
-    """The best of these solved runs, with the lowest bound that they prove."""
+    """Return the best reward of solved runs, with the lowest bound that they prove."""
     bounds = runs.proven_bound.dropna()
     return KnownOptimum(int(runs.reward.max()), int(bounds.min()) if len(bounds) else None)

@@ -1,4 +1,4 @@
-"""Pages of Markdown whose numbers come from tables, and what a study writes."""
+"""Markdown pages with numbers from tables, and the files of a study."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ def fill_page(template: Path, **values: Any) -> str:
     Parameters
     ----------
     template : pathlib.Path
-        A template of Jinja. It has what is returned, ``interval(row, column, digits, scale)``,
-        which writes ``7.8 [7.3, 8.1]``, ``expect(holds, what)``, the filters ``number``,
-        ``p_value`` and ``listed``, and the templates beside it.
+        A Jinja template. It can call ``interval(row, column, digits, scale)``, which writes ``7.8
+        [7.3, 8.1]``, and ``expect(holds, what)``, use the filters ``number``, ``p_value`` and
+        ``listed``, and include templates of the same folder.
     **values
-        What the template calls by these names: tables, numbers, functions.
+        Tables, numbers and functions, by the names that the template uses.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def fill_page(template: Path, **values: Any) -> str:
     ValueError
         A sentence that the template expects of the results does not hold.
     jinja2.UndefinedError
-        The template names something that is not there.
+        The template uses an unknown name.
     """
     import jinja2
 
@@ -87,7 +87,7 @@ def fill_page(template: Path, **values: Any) -> str:
 
 
 def expect(holds: bool, what: str) -> str:
-    """Nothing, where a sentence holds. Raises ValueError where the results no longer bear it."""
+    """Return an empty text. Raises ValueError if a sentence of the page no longer holds."""
     if not holds:
         raise ValueError(f"this no longer holds: {what}")
     return ""

@@ -16,38 +16,40 @@ ENTRIES: dict[str, dict[str, Any]] = {
     ).items()
     for name, entry in entries.items()
 }
-"""Every entry by id, in the paper's order of tasks, with its task."""
+"""Entries of ``published.toml`` by id, with their task, in the paper's order of tasks."""
 for _entry in ENTRIES.values():
     if "difference_of" in _entry:
         _first, _second = (ENTRIES[name]["value"] for name in _entry["difference_of"])
         _entry["value"] = _first - _second
 RUNS: int = ENTRIES["general.runs"]["value"]
-"""Runs of every experiment."""
+"""Number of runs of every experiment of the paper."""
 
 
 class Summary(NamedTuple):
-    """A published reward, or the mean of several, with what is published about its spread."""
+    """A published reward, or the mean of several published rewards, with its spread."""
 
     mean: float
     sd: float | None = None
     runs: int = RUNS
-    """Number of runs that is published, or the paper's general 20."""
+    """Number of runs: published with the reward, or the paper's general 20."""
     published_runs: int | None = None
-    """Runs with the hand sequence, where their number stands beside the mean."""
+    """Number of runs with the hand sequence, if the paper has it with the mean."""
     derived: bool = False
-    """Computed from other published numbers rather than published itself."""
+    """True if the reward is computed from other published numbers."""
     derived_runs: bool = False
-    """Whether the number of runs is computed from another."""
+    """True if the number of runs is computed from another published number."""
 
     @property
     def in_words(self) -> str:
-        """The mean, which says whether it was derived."""
+        """The mean, followed by "(derived)" if it is computed from other numbers."""
         return f"{number(self.mean)}{' (derived)' * self.derived}"
 
 
 def published_alone(task: str, kind: str) -> Summary | None:
-    """Reward of the corrective process alone with the ``initial hands`` of a task or the ``best of
-    all sequences``; None where the paper publishes none."""
+    """Return the published reward of the corrective process alone on a task, None without it.
+
+    ``kind``: ``initial hands`` or ``best of all sequences``.
+    """
     of_task = [entry for entry in ENTRIES.values() if entry["task"] == task]
     hands = next((entry["hands"] for entry in of_task if entry["kind"] == kind), None)
     for entry in of_task:
@@ -57,8 +59,10 @@ def published_alone(task: str, kind: str) -> Summary | None:
 
 
 def published_cell(task: str, condition: str) -> dict[str, Summary] | None:
-    """Published rewards of a cell by hand sequence, where the paper tells them apart, and of all
-    runs under ``""``; None for a cell that the paper does not have."""
+    """Return the published rewards of a cell by hand sequence, and of all runs under ``""``.
+
+    The paper has rewards by hand sequence for some cells. None for a cell without an entry.
+    """
     entries: dict[tuple[str, str], dict[str, Any]] = {
         (entry["kind"], entry.get("hands", "")): entry
         for entry in ENTRIES.values()
@@ -83,7 +87,7 @@ def published_cell(task: str, condition: str) -> dict[str, Summary] | None:
 
 
 def pooled(parts: list[Summary]) -> Summary | None:
-    """Mean and SD over all runs of several groups, from each group's own."""
+    """Return mean and SD over all runs of several groups, from mean and SD of each group."""
     if len(parts) < 2:
         return parts[0] if parts else None
     runs = sum(part.runs for part in parts)

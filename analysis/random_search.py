@@ -1,8 +1,8 @@
-"""Tests against random search, which selects the best of many random targets.
+"""Comparisons with random search, which selects the best of many random targets.
 
-A method that selects its solution from trials by their rewards shows signatures that selection
-alone shows, and has to exceed that of random search. A folder may have random search of several
-widths, and with every hand sequence: the one that shows most counts.
+Selection by reward alone produces signatures of coarticulation, so the signatures of a method that
+selects its solution from trials have to exceed the signatures of random search. A folder may have
+several settings of random search; the setting with the largest signature counts.
 """
 
 from __future__ import annotations
@@ -19,15 +19,18 @@ from coartic.robot import Array
 
 
 def random_search_on(study: Study, task: str) -> list[str]:
-    """Labels of the settings of random search that solved a task."""
+    """Return the labels of the settings of random search that solved a task."""
     labels = study.methods.index[study.methods.algorithm == "random search"]
     cells = {label: study.cells.get((task, label)) for label in labels}
     return [label for label, cell in cells.items() if cell is not None and len(cell.good)]
 
 
 def most_of_random_search(study: Study, signature: str, task: str) -> Array:
-    """A signature of the random search that shows most of it in the mean on a task, or over the
-    instances of its family, shape ``(n,)``; empty where it has none on the task."""
+    """Return a signature of random search on a task, shape ``(n,)``; empty without it.
+
+    Of the setting with the largest mean of this signature, on the task or, for an instance of a
+    family, over the instances.
+    """
     family, shown = study.tasks[task].family, dict[str, dict[str, Array]]()
     for each, other in study.tasks.items():
         if each == task or (family is not None and other.family == family):
@@ -39,14 +42,14 @@ def most_of_random_search(study: Study, signature: str, task: str) -> Array:
 
 
 def selects(study: Study, label: str) -> bool:
-    """Whether a method's solution may be one of many trials, selected by its reward."""
+    """Return whether a method may select its solution from many trials by their rewards."""
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
 def random_search_for(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """The random search with the largest posture difference between the same two contexts; None
-    without any."""
+    """Return the setting of random search with the largest posture difference between the same two
+    contexts; None without random search."""
     return max(
         every_random_search_for(study, contexts),
         key=lambda pair: pair.posture_difference,
@@ -55,8 +58,8 @@ def random_search_for(study: Study, contexts: TwoContexts) -> TwoContexts | None
 
 
 def every_random_search_for(study: Study, contexts: TwoContexts) -> list[TwoContexts]:
-    """Return random search, by setting, in the same two contexts with as many trials as the
-    method."""
+    """Return each setting of random search in the same two contexts that made as many trials as
+    the method."""
     names, pairs = [task.name for task in contexts.tasks], []
     for label in (
         each
@@ -74,9 +77,10 @@ def every_random_search_for(study: Study, contexts: TwoContexts) -> list[TwoCont
 
 
 def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
-    """P of the test that a method's posture difference exceeds that of random search.
+    """Return the p-value of the test that a method's posture difference exceeds the posture
+    difference of random search.
 
-    NaN for a method that selects nothing, and without random search that made as many trials.
+    NaN for a method that selects nothing, and if no random search made as many trials.
     """
     if not selects(study, contexts.method):
         return math.nan

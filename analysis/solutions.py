@@ -20,13 +20,13 @@ class Solutions:
 
     task: Task
     label: str
-    """The method with its setting."""
+    """Label: the method with its setting."""
     runs: tuple[Execution, ...]
     run_ids: tuple[str, ...] = ()
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
-        """Hand chosen for each goal, its place in HANDS, shape ``(n, G)``."""
+        """Hands chosen for the goals, as places in HANDS, shape ``(n, G)``."""
         hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
         return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
 
@@ -38,17 +38,16 @@ class Solutions:
 
     @cached_property
     def starts(self) -> Array:
-        """Configuration from which each subtask starts: the hit before it, or the start."""
+        """Configurations at the start of each subtask, shape ``(n, G, dof)``: the hit of the goal
+        before, or the start of the task."""
         starts = np.empty_like(self.configurations)
         starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
         return starts
 
     @cached_property
     def against_same_hands(self) -> Array:
-        """Ticks of subtasks less the corrective process's with each run's own hands.
-
-        Shape ``(n, G)``; NaN for runs with whose hands it does not complete the task.
-        """
+        """Ticks of subtasks less the ticks of the corrective process alone with the hands of the
+        run, shape ``(n, G)``; NaN if the corrective process does not complete the task."""
         every = {run.hands for run in self.runs}
         references = {hands: corrective_trial(self.task, hands) for hands in every}
         changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
@@ -59,7 +58,10 @@ class Solutions:
 
 
 def initial_solution(task: Task) -> Execution | None:
-    """The corrective process alone with the task's hands; None where it completes it with none."""
+    """Return the execution of the corrective process alone with the initial hands of a task.
+
+    None if the corrective process completes the task with no hands.
+    """
     try:
         execution = corrective_trial(task, initial_hands(task))
     except NotApplicableError:

@@ -1,7 +1,7 @@
-"""Which methods are compared, on which tasks, and how far they stay behind the best known reward.
+"""Standings of methods: compared methods, compared tasks, and gaps to the best known reward.
 
-Methods are compared by the gap of their mean reward to the best known reward of a task. Searches
-for the optimum are references and not compared; neither are runs that lock the base, which solve
+A gap is the distance of a method's mean reward to the best known reward of a task. Searches for the
+optimum are references and are not compared; neither are runs that lock the base, which solve
 another problem.
 """
 
@@ -26,8 +26,9 @@ from coartic.learner.conditions import CONDITIONS
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return what gaps on these tasks are to: ``optimum`` where all are proven, ``best of this
-    folder`` where nothing else is known of any, or else ``best known reward``."""
+    """Return the name of the reward to which gaps on these tasks are taken: ``optimum`` if all are
+    proven, ``best of this folder`` if no other reward is known on any, or else ``best known
+    reward``."""
     best = [study.optima[task] for task in tasks]
     if all(each.proven for each in best):
         return "optimum"
@@ -48,8 +49,11 @@ def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
 
 
 def cells_on(study: Study, method: str, tasks: Iterable[str]) -> list[CellRuns]:
-    """Return the cells of a compared method on some tasks; none where it lacks one of them, or
-    where one condition of several together ran on all."""
+    """Return the cells of a compared method on some tasks.
+
+    Empty if the method lacks one of the tasks, or if these tasks have only one of the conditions
+    of a row that joins several.
+    """
     of_method, tasks = compared(study)[method], [*tasks]
     cells = [of_method[task] for task in tasks if task in of_method]
     whole = len(cells) == len(tasks)
@@ -57,11 +61,11 @@ def cells_on(study: Study, method: str, tasks: Iterable[str]) -> list[CellRuns]:
 
 
 def widest_tasks(ran_on: Iterable[tuple[str, Iterable[str]]], least: int = 1) -> set[str]:
-    """Return the tasks that a mean is over, which are all tasks unless too few things ran on all.
+    """Return the tasks for means: all tasks, unless too few methods ran on all of them.
 
-    ``ran_on``: names, and the tasks on which each ran. Of these sets of tasks, the set with the
-    most pairs of a task and a name that ran on the whole set, of ``least`` names at least if it
-    can be.
+    ``ran_on`` has names and the tasks on which each ran. Of these sets of tasks, the set with the
+    most pairs of a task and a name that ran on all tasks of the set, preferably with ``least``
+    names or more.
     """
     sets = [(name, {*tasks}) for name, tasks in ran_on]
 
@@ -87,22 +91,22 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
 
 
 def coverage(study: Study, method: str) -> str:
-    """Return on how many of the compared tasks a method solved every run, as ``10 of 50 tasks``;
-    empty where it did on all."""
+    """Return the number of compared tasks on which a method solved every run, as ``10 of 50
+    tasks``; empty if these are all tasks."""
     every = {task for cells in compared(study).values() for task in cells}
     solved = len(solved_tasks(study, method))
     return f"{solved} of {counted(len(every), 'task')}" if solved < len(every) else ""
 
 
 def best_of_instances(study: Study) -> dict[str, BestKnown]:
-    """Return the best known reward of each instance of a family that has one."""
+    """Return the best known rewards of the instances of families."""
     optima = study.optima.items()
     return {name: best for name, best in optima if study.tasks[name].family is not None}
 
 
 def shown_name(study: Study, method: str) -> str:
-    """Return the name of a method; of a method from a file that did not solve all of
-    :func:`common_tasks` with the number of its tasks."""
+    """Return the name of a method, with the number of its tasks for a method from a file that did
+    not solve all of :func:`common_tasks`."""
     row = study.methods.loc[method]
     if row.built_in or {*common_tasks(study)} <= {*solved_tasks(study, method)}:
         return str(row.title)
@@ -114,8 +118,8 @@ def gaps_on(study: Study, tasks: tuple[str, ...]) -> pd.DataFrame:
     """Return the mean gap over some tasks of each method that solved every run on all of them,
     nearest first.
 
-    Columns ``method``, ``gap`` with its interval for other runs on the same tasks, ``tasks`` (their
-    number) and ``runs``, and those of :attr:`.Study.methods`.
+    Columns ``method``, ``gap`` with its interval for other runs on the same tasks, numbers of
+    ``tasks`` and ``runs``, and the columns of :attr:`.Study.methods`.
     """
     rows = []
     for method in compared(study):
@@ -135,10 +139,11 @@ def main_gaps(study: Study) -> pd.DataFrame:
 
 
 def leaders(rows: pd.DataFrame, group: str) -> pd.DataFrame:
-    """Return the best form of each algorithm of a group, of rows of :func:`gaps_on`, nearest first.
+    """Return the best row of each algorithm of a group, from rows of :func:`gaps_on`, nearest
+    first.
 
-    The learner is there by the form that explores most. A setting counts where its method's
-    defaults did not run.
+    The learner is represented by the condition that explores most. A setting counts if its method
+    did not run with the defaults.
     """
     rows = rows[(rows.information == group) & (rows.under == "")]
     is_learner, conditions = rows.kind == "learner", [*CONDITIONS]
@@ -159,11 +164,11 @@ def called(row: Mapping[Any, Any] | pd.Series) -> str:
 
 
 def paired_difference(study: Study, first: str, second: str, tasks: Iterable[str]) -> Estimate:
-    """Two-tailed test of the difference of mean gaps of two methods over some tasks.
+    """Test the difference of the mean gaps of two methods over some tasks, two-tailed.
 
-    A sign-flip test of runs paired by seed within their task; a method that is run once is compared
-    with every run of the other. All tasks count the same; NaN without pairs on one of them. Runs
-    that only one of them has do not count, unlike in the table ``against-learner``.
+    A sign-flip test of runs paired by seed within their task; the single run of a deterministic
+    method is paired with every run of the other method. All tasks count the same. NaN if a task has
+    no pair. Runs without a partner do not count, unlike in table ``against-learner``.
     """
     differences = []
     tasks = [*tasks]
@@ -179,9 +184,9 @@ def paired_difference(study: Study, first: str, second: str, tasks: Iterable[str
 
 
 def failed_runs(study: Study, cells: Iterable[CellRuns], consequence: str) -> str:
-    """Return a sentence with a leading space; empty where none of the cells' runs failed.
+    """Return a sentence on failed runs, with a leading space; empty if no run failed.
 
-    It counts all runs of the methods of which some failed, and ends with the ``consequence``:
+    The sentence counts all runs of the methods with failed runs, and ends with the ``consequence``:
     `` 3 of 40 runs of hill climbing failed and are not counted.``
     """
     runs, failed = Counter[str](), Counter[str]()

@@ -19,23 +19,23 @@ SHORT_ID = 8
 
 
 class Column(NamedTuple):
-    """A column of a table, with its heading and format."""
+    """A column of a table, with heading and format."""
 
     name: str
-    """Name in the CSV file, or its beginning if ``ending`` is ``*``."""
+    """Name in the CSV file; the beginning of names if ``ending`` is ``*``."""
     ending: str = ""
-    """``[]``: an interval belongs to it (``gap_low``, ``gap_high``); ``±``: a standard deviation
-    (``ours_sd``); ``*``: it stands for all columns that begin with the name."""
+    """``[]``: the column has an interval (``gap_low``, ``gap_high``); ``±``: the column has a
+    standard deviation (``ours_sd``); ``*``: all columns that begin with the name."""
     header: str = ""
-    """Heading; ``{}`` is what follows the beginning of a name, such as a task. A heading with
-    ``(%)`` has shares in per cent. Empty: only the CSV file has the column."""
+    """Heading; ``{}`` is the rest of a name after its beginning, such as a task. Shares are in per
+    cent if the heading has ``(%)``. Empty: only the CSV file has the column."""
     digits: str = ""
-    """Decimals; ``p`` for a p-value; without, integers are whole and others have three figures."""
+    """Decimals; ``p`` for a p-value; empty: integers are whole, others have three figures."""
 
 
 def column_of(text: str) -> Column:
-    """Return a column by its text: ``gap[]: gap (%) .1``, ``task``, or ``least_p: -`` for a column
-    that only the CSV file has."""
+    """Return a column from its text: ``gap[]: gap (%) .1``, ``task``, or ``least_p: -`` for a
+    column without a heading, which only the CSV file has."""
     name, dot, digits = text.rpartition(" .")
     name, _, header = (name if dot else text).partition(": ")
     ending = next((each for each in ("[]", "±", "*") if name.endswith(each)), "")
@@ -54,7 +54,7 @@ class Table:
     rows: Callable[[Study], Rows]
 
     def __call__(self, study: Study) -> pd.DataFrame:
-        """Return the table of a study; its ``attrs`` are as :func:`shown_names` returns them."""
+        """Return the table of a study, with :func:`shown_names` as its ``attrs``."""
         return rows_of(study, self)
 
     def column(self, name: str) -> Column:
@@ -66,10 +66,10 @@ class Table:
 
 
 def table(columns: str) -> Callable[[Callable[[Study], Rows]], Table]:
-    """A decorator: what yields named rows for a study becomes a table of the report, whose id is
-    the name of the function.
+    """Return a decorator that turns a function of a study that yields rows into a table.
 
-    ``columns``: the texts of its columns (:func:`column_of`), with semicolons between them.
+    The id of the table is the name of the function. ``columns`` has the texts of the columns
+    (:func:`column_of`), separated by semicolons.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
@@ -97,9 +97,12 @@ def rows_of(study: Study, table: Table) -> pd.DataFrame:
 
 
 def shown_names(study: Study) -> dict[Hashable | None, Any]:
-    """Return what is needed to show a table: ``titles`` of tasks, families and methods by id,
-    ``under`` of settings and ablations by label, labels of ``own`` methods (from files), and
-    whether the optimum of any task is ``known``."""
+    """Return names for showing a table.
+
+    ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
+    and ablation, by label; ``own``: labels of methods from files; ``known``: True if a best known
+    reward does not come from this folder alone.
+    """
     methods, tasks = study.methods, study.tasks
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
     marks = {name: marked(task) for name, task in tasks.items()}

@@ -1,4 +1,4 @@
-"""Numbers and names in words, alike wherever they are shown."""
+"""Numbers and names in words, the same on the page, in tables and on the terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from coartic.estimates import Estimate
 
 NONE = "–"
-"""Shown where there is no value."""
+"""Text of a missing value."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 RECONSTRUCTED = "† The paper does not publish the goals of this task; ours are a reconstruction."
 _LATEX = str.maketrans(
@@ -31,15 +31,15 @@ _LATEX = str.maketrans(
 
 
 def id_of(function: Callable[..., Any]) -> str:
-    """Id of a table or figure by its function: ``family-gaps`` of ``list_family_gaps``, ``ranking``
-    of ``draw_ranking``."""
+    """Return the id of a table or figure from its function: ``family-gaps`` for
+    ``list_family_gaps``, ``ranking`` for ``draw_ranking``."""
     return function.__name__.partition("_")[2].replace("_", "-")
 
 
 def number(value: float, digits: int | None = None) -> str:
-    """A number with a true minus and its thousands apart; a dash for NaN.
+    """Write a number, with a true minus and spaces between thousands; a dash for NaN.
 
-    ``digits``: decimals; without them integers are whole and others have three figures.
+    ``digits``: decimals; by default integers are whole and others have three figures.
     """
     if math.isnan(value):
         return NONE
@@ -57,22 +57,22 @@ def number(value: float, digits: int | None = None) -> str:
 
 
 def spelled(count: int) -> str:
-    """A small number in letters, others in figures."""
+    """Write a small number in letters, a larger number in figures."""
     names = "no", "one", "two", "three", "four", "five", "six"
     return names[count] if count < len(names) else number(count)
 
 
 def p_value(p: float) -> str:
-    """``p < 0.001`` or ``p = 0.012``, which no line breaks; empty for NaN."""
+    """Write a p-value, ``p < 0.001`` or ``p = 0.012``, without a line break; empty for NaN."""
     if math.isnan(p):
         return ""
     return ("p < 0.001" if p < 0.001 else f"p = {p:.2g}").replace(" ", NO_BREAK)
 
 
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
-    """An interval ``[1.3, 2.9]``; empty where there is none.
+    """Write an interval, ``[1.3, 2.9]``; empty for NaN.
 
-    An interval that is a point shows no spread, and would look like certainty: it is left out.
+    Also empty for an interval of no length, which would look like certainty.
     """
     if math.isnan(low) or math.isnan(high) or low == high:
         return ""
@@ -80,12 +80,12 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in per cent with one decimal."""
+    """Write a share in per cent with one decimal."""
     return f"{number(100 * share, 1)} %"
 
 
 def estimate(value: Estimate, digits: int | None = None) -> str:
-    """``2.1 % [1.3, 2.9]`` with its unit; without the brackets where there is no interval."""
+    """Write an estimate with its interval, ``2.1 [1.3, 2.9]``."""
     return f"{number(value.value, digits)} {in_brackets(value.low, value.high, digits)}".strip()
 
 
@@ -97,7 +97,7 @@ def interval(
     Parameters
     ----------
     row : mapping
-        Has ``column``, ``column_low`` and ``column_high``, as a row of what ``means`` returns.
+        Row with ``column``, ``column_low`` and ``column_high``, such as a row of ``means``.
     column : str
         Name of the number.
     digits : int
@@ -105,12 +105,12 @@ def interval(
     scale : float
         Factor, such as 100 for a share in per cent.
     unit : str
-        What stands behind the number, such as ``" %"``.
+        Unit after the number, such as ``" %"``.
 
     Returns
     -------
     str
-        Such as ``7.8 [7.3, 8.1]``; the number alone where the ends are missing.
+        Such as ``7.8 [7.3, 8.1]``; the number alone if the ends are missing.
 
     Examples
     --------
@@ -124,8 +124,8 @@ def interval(
 def titled_apart(tasks: Iterable[Task]) -> list[Task]:
     """Return tasks with titles that differ.
 
-    A changed task, ``ascending.radius-0.2``, has what is changed behind the title of its task; of
-    other tasks that share a title each has its name behind it.
+    The title of a changed task, ``ascending.radius-0.2``, is the title of its task and the change.
+    Other tasks with the same title have their names in the title.
     """
     tasks, titles = [*tasks], []
     for task in tasks:
@@ -144,29 +144,29 @@ def titled_apart(tasks: Iterable[Task]) -> list[Task]:
 
 
 def marked(task: Task) -> str:
-    """Title of a task, with † where it is reconstructed (:data:`RECONSTRUCTED`)."""
+    """Return the title of a task, with † if it is reconstructed (:data:`RECONSTRUCTED`)."""
     return f"{task.label} †" if task.reconstructed else task.label
 
 
 def tally(counts: Mapping[Any, int]) -> str:
-    """``LRLR 17, RRLR 3``, the commonest first; a dash for none."""
+    """Write counts, ``LRLR 17, RRLR 3``, the commonest first; a dash without counts."""
     ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{name} {count}" for name, count in ordered) or NONE
 
 
 def listed(words: Iterable[str]) -> str:
-    """``a, b and c``."""
+    """Write a list: ``a, b and c``."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
 
 
 def capital(text: str) -> str:
-    """A text with a capital first letter."""
+    """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def slugs(names: Iterable[str]) -> dict[str, str]:
-    """A slug for every name (small letters, digits, dashes), no two the same."""
+    """Return a slug for every name (small letters, digits, dashes), no two equal."""
     taken: dict[str, str] = {}
     for name in names:
         base = (
@@ -181,5 +181,5 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 
 
 def latex(text: object) -> str:
-    """Text with everything escaped that LaTeX and BibTeX would read as their own."""
+    """Return text with the characters escaped that are special in LaTeX and BibTeX."""
     return one_line(str(text)).translate(_LATEX)

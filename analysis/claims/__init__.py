@@ -1,1 +1,1 @@
-"""The paper's claims: what it says, how each sentence is judged, and what came out."""
+"""Claims of the paper: their words, their tests, and the verdicts on them."""

@@ -1,4 +1,4 @@
-"""A claim, and comparisons of means of runs, from which most claims are made."""
+"""Claims, and the comparisons of means of runs on which most claims rest."""
 
 from __future__ import annotations
 
@@ -15,50 +15,51 @@ from coartic.estimates import Estimate, difference_of_means
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of the paper, and how it is judged.
+    """A statement of the paper, and how it is judged.
 
-    Runs of the learner are judged with 10,000 trials, and at least three of them. The whole paper,
-    sentence by sentence, is accounted for in ``docs/sentences.toml``.
+    Judging takes at least three runs of the learner with 10,000 trials each. The file
+    ``docs/sentences.toml`` says for each sentence of the paper which claim covers it.
     """
 
     id: str
     text: str
     place: str
-    """Section of the paper that says it, and the figure that shows it, where one does."""
+    """Section of the paper with the statement, and the figure that shows it, if any."""
     quote: str
-    """A few words of the paper by which the place can be found."""
+    """A few words of the paper, by which a reader finds the place."""
     test: str
     """The test, in words."""
     judge: Callable[[Reader], Finding]
     group: Literal["paper", "beside", "families", "exact"] = "beside"
-    """With which claims it is corrected: with those on the paper's seven cells; those that take
-    runs beside them, so that they change no verdict on those cells; those on families of random
-    tasks; with none, as it is counted exactly."""
+    """Group of claims over which p-values are corrected. ``paper``: claims on the paper's seven
+    cells; ``beside``: claims that compare these cells with other runs, apart, so that they change
+    no verdict on the seven cells; ``families``: claims on families of random tasks; ``exact``: no
+    correction, as the claim is counted without a test."""
     fitted: bool = False
-    """Whether it rests on goals that the paper does not publish."""
+    """True if the claim rests on goals that the paper does not publish."""
     sets: str = ""
-    """Of such a claim: how many of the sets of goals that the paper's text admits support it
-    (docs/reconstruction.md); not of one that chose them, or that takes other runs."""
+    """Number of the sets of goals consistent with the paper's text that support a fitted claim
+    (docs/reconstruction.md); empty if the claim was used to choose the goals, or compares with
+    other runs."""
     depends: bool = False
-    """Whether at most half of them do, on some task."""
+    """True if at most half of these sets support the claim, on some task."""
     short: str = ""
-    """In a few words; the three claims that carry the paper's point have it."""
+    """A few words for sentences; empty but for the three central claims."""
 
 
 class Higher(NamedTuple):
-    """The mean of the first is claimed to be higher, than 0 or than that of a second."""
+    """A claimed order of means: the first mean exceeds the second mean, or 0, by a margin."""
 
     first: Measurement
     second: Measurement | None = None
     by: float = 0.0
-    """It is to be higher by more than this."""
+    """Margin, in the unit of the measurements."""
 
 
 def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ()) -> Finding:
-    """Whether every mean is as claimed, by one-tailed bootstrap tests.
+    """Test that all claimed orders of means hold, by one-tailed bootstrap tests.
 
-    ``shown``: values that the evidence has as well. What the paper publishes of both stands there
-    too.
+    The evidence also has the values of ``shown``, and the rewards that the paper publishes.
     """
     tests, parts = [], []
     before: Measurement | None = None
@@ -81,7 +82,10 @@ def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ())
 
 
 def all_positive(tests: Sequence[Estimate], parts: Iterable[tuple[str, str]]) -> Finding:
-    """Whether every test points as claimed; the evidence has its parts by what is measured."""
+    """Return the finding that all tests point as claimed.
+
+    ``parts`` of the evidence are pairs of a measured quantity and words, grouped by quantity.
+    """
     by_quantity: dict[str, list[str]] = {}
     for quantity, part in parts:
         by_quantity.setdefault(f"{capital(quantity)}: " if quantity else "", []).append(part)
@@ -90,7 +94,7 @@ def all_positive(tests: Sequence[Estimate], parts: Iterable[tuple[str, str]]) ->
 
 
 def no_trial_fails(read: Reader, cells: Iterable[tuple[str, str]]) -> Finding:
-    """Whether all trials of the learner hit every goal."""
+    """Count the trials of the learner that miss a goal; the claim is that there are none."""
     trials = failed = 0
     for task, label in cells:
         runs = read.runs(task, label)

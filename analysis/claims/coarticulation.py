@@ -1,4 +1,4 @@
-"""The paper's claims on its own tasks that it is coarticulation which is learned."""
+"""The paper's claims, on its own tasks, that the learner learns coarticulation."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from coartic.tasks.task import hands_of
 ONE_ARMED = "ascending", "descending"
 TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
 EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
-"""The learner that is rewarded for each subtask by itself."""
+"""The learner with a reward for each subtask by itself."""
 TEST_OF_MEANS = "one-tailed bootstrap test of the mean reward for each comparison"
 
 
 def first_movement_sacrificed(read: Reader) -> Finding:
-    """The first movement is slower, the whole task faster."""
+    """Test that the first movement is slower and the whole task faster."""
     comparisons = []
     for task in ONE_ARMED:
         first = read.signature("first", task, EC1)
@@ -47,7 +47,7 @@ def first_movement_sacrificed(read: Reader) -> Finding:
 
 
 def posture_depends_on_context(read: Reader) -> Finding:
-    """Postures at goal 1 depend on the goal that follows, more than in random search."""
+    """Test that the posture at goal 1 depends on the next goal, more than in random search."""
     contexts, replayed = contexts_of(read, EC1), contexts_of(read, EC1, replay=True)
     (equivalent, other), titles = contexts.parts, read.study.methods.title
     parts = [
@@ -81,7 +81,10 @@ def posture_depends_on_context(read: Reader) -> Finding:
 
 
 def contexts_of(read: Reader, label: str, *, replay: bool = False) -> TwoContexts:
-    """Runs of a method that hit goal 1 of both one-armed tasks; MissingError without them."""
+    """Return the runs of a method that hit goal 1 of both one-armed tasks.
+
+    Raises MissingError if one of the tasks has no such run.
+    """
     first, second = (read.cell(task, label, replay=replay) for task in ONE_ARMED)
     contexts = TwoContexts(first, second, 1, "right")
     if not contexts.in_both:
@@ -90,8 +93,7 @@ def contexts_of(read: Reader, label: str, *, replay: bool = False) -> TwoContext
 
 
 def overall_reward(read: Reader) -> Finding:
-    """Without a reward for the whole task, the first movement is not sacrificed and less is
-    earned."""
+    """Test that the learner rewarded by subtask earns less and has a faster first movement."""
     comparisons = []
     for task in ONE_ARMED:
         first = read.signature("first", task, EC1, replay=True)
@@ -103,7 +105,7 @@ def overall_reward(read: Reader) -> Finding:
 
 
 def arm_coarticulation(read: Reader) -> Finding:
-    """Postures of base and chosen arm leave the next goal nearer."""
+    """Test that postures of base and chosen arm shorten the way to the next goal."""
     comparisons, replayed = [], []
     for task in TWO_ARMED:
         for label in (EC3, EC4):
@@ -119,7 +121,7 @@ def arm_coarticulation(read: Reader) -> Finding:
 
 
 def other_arm_coarticulation(read: Reader) -> Finding:
-    """The idle arm brings its hand nearer to its next goal."""
+    """Test that the idle arm brings its hand nearer to the next goal of this hand."""
     arm = read.signature("other arm", TASK_1, EC4)
     others = [
         read.signature_of_random_search("other arm", TASK_1),
@@ -133,7 +135,7 @@ def other_arm_coarticulation(read: Reader) -> Finding:
 
 
 def slower_hands_are_chosen(read: Reader) -> Finding:
-    """Whether more runs than of random search choose a hand that is slower for its goal alone."""
+    """Test that more runs than in random search choose a hand that is slower for its goal alone."""
     task, labels = TASK_1, (EC2, EC3)
     initial = read.initial_execution(task).hands
     chosen = {label: chosen_slower(read.cell(task, label), initial) for label in labels}
@@ -175,9 +177,10 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
 
 
 def chosen_slower(cell: Solutions, initial: str) -> Array:
-    """Ticks of the hands that are slower for their goal alone, in each run, shape ``(runs,)``.
+    """Return the ticks by which chosen hands are slower for their goals alone, shape ``(runs,)``.
 
-    Of goals that others follow, hit with another hand than that of the initial solution.
+    The sum over the goals, without the last, that are hit with another hand than in the initial
+    solution.
     """
     first = [HANDS.index(hand) for hand in hands_of(initial)]
     slower = np.where(cell.hands != first, ticks_slower(cell), 0.0)

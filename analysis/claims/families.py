@@ -31,15 +31,15 @@ OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
 JERK = "trajectory-optimisation/jerk"
 Comparing = tuple[str, Callable[[Reader, str], Higher]]
-"""Words behind the name of a family, and a comparison on a task."""
+"""Words that follow the name of a family, and a function that compares on a task."""
 
 
 def in_every_family(
     families: Sequence[str], comparisons: Iterable[Comparing], read: Reader
 ) -> Finding:
-    """Whether comparisons are as claimed in the mean over the instances of each family.
+    """Test comparisons in the mean over the instances of each family.
 
-    Rewards are in per cent of the best known.
+    Differences of rewards are in per cent of the best known reward.
     """
     findings, parts = [], []
     for name, compare in comparisons:
@@ -62,7 +62,7 @@ def in_every_family(
 
 
 def reported_instances(read: Reader, family: str) -> dict[str, BestKnown]:
-    """The best known of a family's instances but for those of development, for tuning."""
+    """Return the best known rewards of a family's instances, without development instances."""
     reported = {
         name: best
         for name, best in best_of_instances(read.study).items()
@@ -74,7 +74,7 @@ def reported_instances(read: Reader, family: str) -> dict[str, BestKnown]:
 
 
 def earns_more(families: Sequence[str], *pairs: tuple[str, str]) -> Callable[[Reader], Finding]:
-    """Judges whether the first of each pair of methods earns more."""
+    """Return a function that tests that the first method of each pair earns more."""
 
     def comparing(first: str, second: str) -> Comparing:
         words = " > ".join(CONDITION_OF.get(label, label) for label in (first, second))
@@ -86,8 +86,8 @@ def earns_more(families: Sequence[str], *pairs: tuple[str, str]) -> Callable[[Re
 
 
 def shows(signature: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
-    """A signature of the learner that explores most, alone or beside the signature of another
-    condition or of random search."""
+    """Return the comparison of a signature of the learner that explores most with 0, another
+    condition or random search."""
 
     def compare(read: Reader, task: str) -> Higher:
         first = read.signature(signature, task, most_exploring(read.task(task)))
@@ -99,12 +99,12 @@ def shows(signature: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
 
 
 def improvement(read: Reader, task: str) -> Higher:
-    """What was learned beside the initial solution."""
+    """Compare the reward of the replay with the reward of the initial solution."""
     return Higher(read.replay(task, most_exploring(read.task(task))), read.initial(task))
 
 
 def every_trial_completes(read: Reader) -> Finding:
-    """No trial fails."""
+    """Count the failed trials of the learner in all families."""
     names = [name for family in EVERY_FAMILY for name in reported_instances(read, family)]
     cells = [(name, label) for name in names for label in LEARNERS]
     return no_trial_fails(read, [cell for cell in cells if cell in read.study.cells])

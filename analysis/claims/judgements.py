@@ -1,18 +1,19 @@
-"""The paper's claims judged on a results folder: tests corrected together, one verdict each.
+"""Verdicts on the paper's claims for a results folder, with tests corrected together.
 
-- *Supported*: what the claim says is seen, and the largest p-value of its tests, which must all
-  hold (intersection-union test), is below 5 % after Holm's correction; tests over random tasks
-  also without the task that speaks most for the claim.
-- *Not supported*: it is not seen, and the opposite of one of its tests is significant (smallest
-  p-value of the opposites times their number, below 5 % after Holm's correction).
-- *Depends on the goals*: it would be supported at our goals, but at most half of the sets of goals
-  that the paper's text admits support it.
+- *Supported*: the runs show the claim, and the largest p-value of its tests, which must all hold
+  (intersection-union test), is below 5 % after Holm's correction; tests over random tasks also
+  without the task that favours the claim most.
+- *Not supported*: the runs do not show the claim, and the opposite of one of its tests is
+  significant (smallest p-value of the opposites times their number, below 5 % after Holm's
+  correction).
+- *Depends on the goals*: our goals support the claim, but at most half of the sets of goals
+  consistent with the paper's text do.
 - *Undecided*: none of these, or the folder lacks the runs.
 
-What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
-groups of claims: those on the paper's own seven cells, those that take other runs beside them,
-and those on families of random tasks. A claim that a folder cannot test
-counts in its group all the same, so that what is decided stays decided whatever else is run.
+Exact counts, and values without spread over runs, need no test. Corrections are over fixed groups
+of claims: claims on the paper's seven cells, claims that compare these with other runs, and claims
+on families of random tasks. A claim that a folder cannot test counts in its group all the same, so
+that verdicts do not change with the other runs of a folder.
 """
 
 from __future__ import annotations
@@ -36,17 +37,18 @@ CLAIMS = {claim.id: claim for claim in (*CLAIMS_OF_THE_PAPER, *CLAIMS_ON_FAMILIE
 
 @cached
 def judgements(study: Study) -> pd.DataFrame:
-    """The claims on the folder's tasks, the paper's or random ones, as :func:`judge_claims`."""
+    """Judge the claims on the folder's tasks, the paper's and random tasks (:func:`judge_claims`)."""
     drawn = {task.family is not None for task in study.tasks.values()}
     paper = CLAIMS_OF_THE_PAPER if drawn != {True} else []
     return judge_claims(study, [*paper, *(CLAIMS_ON_FAMILIES if True in drawn else [])])
 
 
 def judge_claims(study: Study, claims: Iterable[Claim]) -> pd.DataFrame:
-    """The claims judged, each corrected over those of its group among ``claims``.
+    """Judge claims, each corrected over the claims of its group among ``claims``.
 
-    A row a claim, as :func:`~coartic.analysis.judge` has it, and ``run_ids``, of the runs that were
-    read, and ``failed``, the cells that it lacks as some of their runs failed.
+    Returns a row for each claim, as :func:`~coartic.analysis.judge` does, with more columns:
+    ``run_ids`` of the runs that the claim read; ``failed``, the cells that the claim could not use
+    because some of their runs failed; ``lacks_runs``, True if the claim was not tested.
     """
     groups: dict[str, dict[str, tuple[str, str, Finding]]] = {}
     rows = []

@@ -1,9 +1,9 @@
-"""Claims judged: what was seen of each, and one verdict each by tests corrected together.
+"""Findings and verdicts: evidence and tests of each claim, corrected over all claims of a study.
 
-A claim is tested by one or more means, one value a task, of which each must lie beyond a bound
-(:func:`mean_beyond`, joined by :func:`all_of`). :func:`judge` corrects the claims of a study over
-each other (Holm). No single task may carry a claim: without the one that speaks most for it the
-tests must come out alike, or it is undecided.
+A claim needs one mean over tasks, or several, beyond a bound (:func:`mean_beyond`, joined by
+:func:`all_of`). :func:`judge` corrects the claims of a study over each other (Holm). No single task
+may carry a claim: a claim is undecided if its tests come out otherwise without the task that
+favours it most.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ class Finding:
     """Evidence and tests of one claim, before any correction."""
 
     holds: bool | None
-    """Whether what the claim says is seen; None where that cannot be said."""
+    """True if the runs show the claim; None if the runs are too few."""
     evidence: str
     tests: tuple[Estimate, ...] = ()
-    """Tests that it rests on, turned so that a positive estimate is as claimed."""
+    """Tests of the claim, signed so that a positive estimate is as claimed."""
     against: tuple[Estimate, ...] | None = None
-    """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
+    """Tests of the opposite, any of them enough to refute; None: the other tails of ``tests``."""
     without: tuple[Estimate, ...] = ()
-    """Tests over tasks again, each without the task that speaks most for the claim."""
+    """Tests over tasks, each without the task that favours the claim most."""
 
     @property
     def opposite_p(self) -> float:
-        """Smallest p-value of the opposites times their number (Bonferroni); NaN without any.
+        """Smallest p-value of the opposites times their number (Bonferroni); NaN without a test.
 
-        The other tail of a test by resampling counts the observed sample as well. Exact tests
-        come with their opposites (``against``).
+        The other tail of a test by resampling counts the observed sample, too. Exact tests have
+        their opposites in ``against``.
         """
         if self.against is not None:
             every = [test.p for test in self.against]
@@ -58,7 +58,7 @@ class Finding:
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
 
     def verdict(self, p: float, opposite_p: float) -> Verdict:
-        """The verdict of the tests alone, by p-values that may be corrected."""
+        """Return the verdict for p-values of the claim and its opposite, corrected or not."""
         untested = any(math.isnan(test.p) and min(test.n) < 2 for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -72,12 +72,12 @@ class Finding:
 
 
 def largest_p(tests: Iterable[Estimate]) -> float:
-    """Largest p-value of tests that must all hold; NaN where none has one."""
+    """Return the largest p-value of tests that must all hold; NaN without a p-value."""
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
 def tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
-    """Tests that a mean over tasks is above a bound: of all, and without the largest value."""
+    """Test that a mean over tasks exceeds a bound, with all values and without the largest."""
     every = np.asarray(values, dtype=np.float64)
     return (
         bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
@@ -96,9 +96,9 @@ def mean_beyond(
     Parameters
     ----------
     sentence : str
-        What was seen, with ``{}`` where the mean and its interval are put in.
+        Sentence of the evidence, with ``{}`` in the place of the mean and its interval.
     values : array_like, shape (tasks,)
-        One value a task; NaN for a task that has none, which does not count.
+        A value for each task; NaN, which does not count, for a task without a value.
     bound : float
         In the unit of the values.
     side : {"greater", "less"}
@@ -107,8 +107,9 @@ def mean_beyond(
     Returns
     -------
     Finding
-        Whether the mean lies there, the sentence, and the test, also without the task that speaks
-        most for the claim, and for its opposite; ``holds`` is None with fewer than three tasks.
+        ``holds``: the mean lies on this side; None with fewer than three tasks. ``evidence``: the
+        sentence. Tests of the claim, of the claim without the task that favours it most, and of
+        its opposite.
 
     Raises
     ------
@@ -135,23 +136,23 @@ def mean_beyond(
 
 
 def all_of(*findings: Finding) -> Finding:
-    """Several findings that a claim needs together.
+    """Join findings that a claim needs together.
 
     Parameters
     ----------
     *findings : Finding
-        As :func:`mean_beyond` returns them.
+        Findings of :func:`mean_beyond`.
 
     Returns
     -------
     Finding
-        It holds where all of them hold, and rests on all their tests and on those of their
-        opposites where all have some; where one cannot be said, it is that one.
+        Holds if all findings hold, with the tests of all, and with their opposites if all findings
+        have opposites. If the runs are too few for one of the findings, this finding.
 
     Raises
     ------
     CoarticError
-        Without findings: a claim that rests on nothing has no verdict.
+        Without findings.
 
     Examples
     --------
@@ -175,21 +176,22 @@ def all_of(*findings: Finding) -> Finding:
 
 
 def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
-    """Judge the claims of a study: their tests are corrected over each other (Holm).
+    """Judge the claims of a study, with their tests corrected over each other (Holm).
 
     Parameters
     ----------
     claims : mapping of str to (str, str, Finding)
-        By the claim's id what is claimed, how it is tested, and what was seen. A claim that cannot
-        be tested counts in the correction all the same.
+        Statement, test in words and finding of each claim, by its id. A claim that cannot be
+        tested counts in the correction all the same.
 
     Returns
     -------
     DataFrame
-        A row a claim, by its id: ``statement``, ``verdict`` (``supported``, ``not supported`` or
-        ``undecided``), ``evidence``, ``test``, ``p_holm``, ``p_without`` and ``opposite_p_holm``:
-        without the task that speaks most for each claim, which is supported only if both are
-        below 5 %, and of the test that the opposite is true.
+        A row for each claim, by its id: ``statement``, ``verdict`` (``supported``, ``not
+        supported`` or ``undecided``), ``evidence``, ``test`` and corrected p-values: ``p_holm`` of
+        the claim, ``p_without`` of the claim without the task that favours it most, and
+        ``opposite_p_holm`` of its opposite. A claim is supported if both ``p_holm`` and
+        ``p_without`` are below 5 %.
 
     Examples
     --------

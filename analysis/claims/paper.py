@@ -1,4 +1,4 @@
-"""The paper's claims on its own tasks, each with its words and how it is judged."""
+"""The paper's claims on its own tasks, with their words and tests."""
 
 from __future__ import annotations
 
@@ -44,20 +44,20 @@ CELLS_OF_TWO_ARMS = (
 )
 """The paper's conditions on its tasks."""
 LEAST_DISPLACEMENT = "trajectory-optimisation/squared-displacement"
-"""The plan of Jordan's smoothness cost."""
+"""The plan with the least squared joint displacement, a smoothness cost of Jordan's."""
 SMOOTH_PLANS = (
     LEAST_DISPLACEMENT,
     "trajectory-optimisation/acceleration",
     "trajectory-optimisation/jerk",
 )
 Cells = Sequence[tuple[str, str]]
-"""Tasks, each with the label of a method."""
+"""Pairs of a task and the label of a method."""
 
-# One-armed tasks, and what is judged on both kinds alike.
+# Claims on one-armed tasks, and claims on one-armed and two-armed tasks.
 
 
 def corrective_ensures(read: Reader, cells: Cells) -> Finding:
-    """Whether the corrective process completes every trial, and every hand sequence by itself."""
+    """Count trials that fail, and hand sequences that the corrective process cannot complete."""
     trials = no_trial_fails(read, cells)
     rewards = np.concatenate([read.alone(task) for task in dict(cells)])
     missed = int(np.isnan(rewards).sum())
@@ -69,7 +69,7 @@ def corrective_ensures(read: Reader, cells: Cells) -> Finding:
 
 
 def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
-    """Whether each subtask of initial solutions is nearly the shortest path by itself."""
+    """Compare each subtask of the initial solutions with its shortest path in joint space."""
     parts, most = [], 0.0
     for name in tasks:
         task, initial = read.task(name), read.initial_execution(name)
@@ -88,14 +88,13 @@ def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
     )
 
 
-def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array) -> float:
-    """Least joint-space distance from ``q`` to a configuration that hits a goal.
+def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, near: Array) -> float:
+    """Return the least joint-space distance from ``q`` to a configuration that hits a goal.
 
-    ``goal`` counts from 1; ``guess`` is a configuration near one that hits it, shape
-    ``(dof,)``. Sequential quadratic programming (Kraft 1988, scipy's SLSQP) on the joints
-    that can move the hand, from ``guess`` and eight random starts about it: the best local minimum,
-    so at least as long as the global one. Infinite where none is found. Length unit and rad
-    mixed.
+    ``goal`` counts from 1; ``near``, shape ``(dof,)``, is a configuration close to a hit.
+    Sequential quadratic programming (Kraft 1988, scipy's SLSQP) on the joints that can move the
+    hand, from ``near`` and eight random starts about it. The distance, length unit and rad mixed,
+    is the best local minimum, at least as long as the global minimum; infinite without a minimum.
     """
     joints, centre = movable(task, hand), np.array(task.goals[goal - 1])
 
@@ -115,7 +114,7 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array) ->
         jacobian = task.robot.jacobian(moved(change), hand)[:, joints]
         return np.asarray(-2 * miss(change) @ jacobian)
 
-    first = (guess - q)[joints]
+    first = (near - q)[joints]
     rng = np.random.default_rng(SEED)
     best = math.inf
     for start in (first, *(first + rng.normal(0, 0.3, (8, len(joints))))):
@@ -133,9 +132,9 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array) ->
 
 
 def corrected_less_later(read: Reader, cells: Cells) -> Finding:
-    """Whether the runs of each cell make fewer corrective movements in the end.
+    """Test that runs make fewer corrective movements in the last trials than in the first.
 
-    Trial 0 does not count: it has no other movements by construction.
+    Trial 0 does not count: all its movements are corrective by construction.
     """
     words = "share of movements that are corrected, in the"
     tests, parts, learned = [], [], []
@@ -157,13 +156,13 @@ def corrected_less_later(read: Reader, cells: Cells) -> Finding:
 
 
 def resemblance(read: Reader, task: str) -> Measurement:
-    """Share of the initial solution's distance to the plan that each run has covered."""
+    """Return the share of the initial solution's distance to the plan that each run covers."""
     learned = read.cell(task, EC1).runs
     (plan,) = read.cell(task, LEAST_DISPLACEMENT).runs
     planned = plan.configurations
 
     def distance(execution: Execution) -> float:
-        """Mean distance of postures at the goals, length unit and rad mixed."""
+        """Return the mean distance of postures at the goals, length unit and rad mixed."""
         return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
 
     before = distance(read.initial_execution(task))
@@ -176,7 +175,7 @@ def resemblance(read: Reader, task: str) -> Measurement:
 
 
 def beats_smooth_plans(read: Reader, tasks: Iterable[str], label: str) -> Finding:
-    """Whether a plan for smoothness is worse than what is learned, on some task."""
+    """Test that the learner earns more than some plan for smoothness on some task."""
     comparisons = []
     for task in tasks:
         learned = read.reward(task, label)
@@ -185,7 +184,8 @@ def beats_smooth_plans(read: Reader, tasks: Iterable[str], label: str) -> Findin
 
 
 def some_of(every: Finding) -> Finding:
-    """Whether one test or more is as claimed: smallest p times their number."""
+    """Return the finding that one test at least is as claimed, with the smallest p times their
+    number."""
     best = min(every.tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)
     holds = any(test.value > 0 for test in every.tests)
     if holds:
@@ -193,11 +193,11 @@ def some_of(every: Finding) -> Finding:
     return Finding(holds, every.evidence, (best,))
 
 
-# Two-armed tasks.
+# Claims on two-armed tasks.
 
 
 def most_do(words: str, does: Sequence[bool], *, claimed: bool = True) -> Finding:
-    """Whether more than three quarters of the runs do something; or fewer, if not ``claimed``."""
+    """Test that more than three quarters of the runs do something; or fewer, if not ``claimed``."""
     count, total = sum(does), len(does)
     more = share_test(count, total, margins.MOST, "greater")
     fewer = share_test(count, total, margins.MOST, "less")
@@ -212,14 +212,14 @@ def most_do(words: str, does: Sequence[bool], *, claimed: bool = True) -> Findin
 
 
 def runs_that(task: str, label: str, what: str, does: Sequence[bool], hands: list[str]) -> str:
-    """How many runs do something, in words, with the hands of all."""
+    """Say how many runs do something, with the hand sequences of all runs."""
     each = tally(Counter(hands))
     return f"{task} {who_is(label)} {what}: {sum(does)} of {len(does)} runs ({each})"
 
 
 def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
-    """Whether neither few nor most runs learned a sequence; the published count speaks against
-    it."""
+    """Test that neither few nor most runs learn a hand sequence; the opposite is that their share
+    differs from the published share."""
     learned = read.hands(task, label)
     does = [each == hands for each in learned]
     count, total = sum(does), len(does)
@@ -248,7 +248,7 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
 
 
 def no_reversal(read: Reader) -> Finding:
-    """With RRLR the base only moves right."""
+    """Test that the base only moves right in most runs that learn RRLR."""
     learned, q0 = read.hands(TASK_1, EC2), read.task(TASK_1).q0
     runs = [run for run in read.cell(TASK_1, EC2).runs if run.hands == "RRLR"]
     if not runs:
@@ -260,14 +260,15 @@ def no_reversal(read: Reader) -> Finding:
 
 
 def ec4_mixed(read: Reader) -> Finding:
-    """Runs learn different hands."""
+    """Count the runs without the commonest hand sequence; the claim is that there are some."""
     learned = read.hands(TASK_2, EC4)
     others = [hands != mode(learned) for hands in learned]
     return Finding(any(others), runs_that(TASK_2, EC4, "not commonest", others, learned))
 
 
 def proficiency_rises(read: Reader) -> Finding:
-    """Each condition is better than the one before, the first than the initial solution."""
+    """Test that each condition beats the condition before it, and the first the initial
+    solution."""
     comparisons: list[Higher] = []
     for task, label in CELLS_OF_TWO_ARMS:
         first = not comparisons or comparisons[-1].first.task != task
@@ -277,7 +278,7 @@ def proficiency_rises(read: Reader) -> Finding:
 
 
 def rail(read: Reader) -> Finding:
-    """Most runs have the commonest hands with the base on its rail, and not most without."""
+    """Test that most runs have the commonest hands if the base is on its rail, and only then."""
     findings = []
     for task, consistent in ((TASK_1, True), (FREE_BASE, False)):
         learned = read.hands(task, EC3)
@@ -288,7 +289,7 @@ def rail(read: Reader) -> Finding:
 
 
 def on_either_kind(which: str, cells: Cells, best: str) -> list[Claim]:
-    """The claims that are judged alike on tasks for one arm and on tasks for two.
+    """Return the claims that have the same test on tasks for one arm and on tasks for two.
 
     ``best`` is the condition that explores most.
     """

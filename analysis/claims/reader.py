@@ -1,4 +1,4 @@
-"""Access of claims to a results folder, with a record of the runs that each claim read."""
+"""Access of claims to a results folder, with a record of the runs that each claim reads."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ from coartic.robot import Array
 
 
 class MissingError(Exception):
-    """The folder lacks what a claim needs."""
+    """Error that a folder lacks runs, tasks or values that a claim needs."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """A value of each run, or one number, with the words by which evidence names them."""
+    """Values of runs, or a single number, with the words by which evidence names them."""
 
     task: str
     who: str
     """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random-search``."""
     numbers: Array
-    """Shape ``(runs,)``; ``()`` of one number, which is exact."""
+    """Values, shape ``(runs,)``; shape ``()`` of a single number, which is exact."""
     quantity: str = ""
-    """The measured quantity, in words; empty for rewards."""
+    """Measured quantity in words; empty for rewards."""
     published: str = ""
-    """The reward that the paper publishes, in words; empty where it publishes none."""
+    """Reward that the paper publishes, in words; empty if the paper publishes no such reward."""
 
     @property
     def name(self) -> str:
-        """Task and method."""
+        """Title of the task, and method."""
         return f"{self.task}, {self.who}"
 
     @property
     def in_ticks(self) -> bool:
-        """Whether it is counted in ticks."""
+        """True for rewards and numbers of ticks."""
         return not self.quantity or "ticks by which" in self.quantity
 
     def __str__(self) -> str:
-        """One number, or the mean with its BCa interval."""
+        """Write the number, or the mean with its BCa interval."""
         if not self.numbers.ndim:
             return number(float(self.numbers))
         return estimate(mean(self.numbers), 1 if self.in_ticks else 3)
@@ -59,25 +59,26 @@ class Measurement:
 
 @dataclass
 class Reader:
-    """A results folder as one claim reads it. Methods raise MissingError for what it lacks.
+    """A results folder as one claim reads it.
 
-    A method of the folder is named by its label.
+    A ``label`` is a method with its setting. Methods raise MissingError for missing tasks, runs and
+    values.
     """
 
     study: Study
     run_ids: list[str] = field(default_factory=list)
-    """Runs read so far, some of them more than once."""
+    """Ids of the runs read so far, some of them more than once."""
     failed: list[CellKey] = field(default_factory=list)
-    """Cells that were asked for so far and not read, as some of their runs failed."""
+    """Cells that the claim asked for and could not use because some of their runs failed."""
 
     def task(self, name: str) -> Task:
-        """A task of the folder."""
+        """Return a task of the folder."""
         if name not in self.study.tasks:
             raise MissingError(f"this folder has no task {name}")
         return self.study.tasks[name]
 
     def runs(self, task: str, label: str) -> pd.DataFrame:
-        """Solved runs of a method."""
+        """Return the runs of a method on a task, if all of them have a solution."""
         cell = self.study.cells.get((task, label))
         if cell is None or not len(cell.runs):
             raise MissingError(f"this folder has no runs of {label} on {task}")
@@ -102,25 +103,26 @@ class Reader:
         return runs
 
     def cell(self, task: str, label: str, *, replay: bool = False) -> Solutions:
-        """Executed solutions of a method, or its noiseless replays after learning."""
+        """Return the executed solutions of a method, or its noiseless replays after learning."""
         self.runs(task, label)
         return self.study.executed(task, label, replay=replay)
 
     def hands(self, task: str, label: str) -> list[str]:
-        """Hand sequence that each run of the learner learned."""
+        """Return the hand sequence of each run of the learner."""
         return list(map(str, self.runs(task, label).hands))
 
     def reward(self, task: str, label: str) -> Measurement:
-        """Rewards of the best trials; of a method that draws nothing its one reward."""
+        """Return the rewards of the best trials; a single reward for a deterministic method."""
         rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
         if not self.study.methods.stochastic[label]:
             rewards = np.array(rewards.mean())
         return Measurement(task, who_is(label), rewards, published=published_reward(task, label))
 
     def replay(self, task: str, label: str) -> Measurement:
-        """Rewards of noiseless replays after learning.
+        """Return the rewards of noiseless replays after learning.
 
-        The learned reward is that of the best trial, which is never below trial 0's.
+        A replay makes the movements that were learned. The reward of the best trial is a maximum,
+        never below the reward of trial 0.
         """
         runs = self.runs(task, label)
         rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -130,14 +132,14 @@ class Reader:
         return Measurement(task, f"replay of {who_is(label)}", rewards, published=published)
 
     def initial(self, task: str) -> Measurement:
-        """Reward of a task's initial solution."""
+        """Return the reward of a task's initial solution."""
         reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
         return Measurement(
             task, "initial", reward, published=in_words(published_alone(task, "initial hands"))
         )
 
     def best(self, task: str) -> Measurement:
-        """Highest reward of the corrective process alone over all hand sequences."""
+        """Return the highest reward of the corrective process alone over all hand sequences."""
         rewards = self.alone(task)
         if np.isnan(rewards).all():
             raise MissingError(
@@ -147,14 +149,14 @@ class Reader:
         return Measurement(task, "best", np.array(np.nanmax(rewards)), published=published)
 
     def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
-        """A signature of coarticulation, of the runs that have one."""
+        """Return a signature of coarticulation of the runs that have this signature."""
         self.runs(task, label)
         values = self.study.signature_of(name, task, label, replay=replay)
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
     def signature_of_random_search(self, name: str, task: str) -> Measurement:
-        """A signature of the random search, of all widths and hands, that shows most of it on the
-        task, or in the family."""
+        """Return a signature of the setting of random search that shows most of this signature on
+        the task, or in its family."""
         for label in self.random_search(task):
             self.runs(task, label)
         values = most_of_random_search(self.study, name, task)
@@ -163,24 +165,26 @@ class Reader:
     def shown(
         self, name: str, task: str, label: str, values: Array, words: str = ""
     ) -> Measurement:
-        """A signature with its words. Raises MissingError where no run has it."""
+        """Return a signature with its words. Raises MissingError if no run has this signature."""
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         return Measurement(task, who_is(label), values, words + SIGNATURES[name].words)
 
     def random_search(self, task: str) -> list[str]:
-        """Labels of the settings of random search that solved a task."""
+        """Return the labels of the settings of random search that solved a task."""
         return random_search_on(self.study, task) or [RANDOM_SEARCH]
 
     def initial_execution(self, task: str) -> Execution:
-        """A task's initial solution: the corrective process alone with the task's hands."""
+        """Return the initial solution of a task: the corrective process alone with its initial
+        hands."""
         execution = initial_solution(self.task(task))
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {task}")
         return execution
 
     def alone(self, task: str) -> Array:
-        """Reward of the corrective process alone with each hand sequence; NaN where it fails."""
+        """Return the rewards of the corrective process alone with each hand sequence, NaN for
+        sequences that it does not complete."""
         rewards = self.study.sequences(self.task(task).name).reward
         if not len(rewards):
             raise MissingError(
@@ -190,23 +194,23 @@ class Reader:
 
 
 def who_is(label: str) -> str:
-    """A method as evidence names it: the learner by its condition."""
+    """Return the name of a method in evidence, for the learner its condition."""
     return CONDITION_OF.get(label) or title_of(label)
 
 
 def in_words(published: Summary | None) -> str:
-    """A reward that the paper publishes; empty where it publishes none."""
+    """Write a published reward; empty without it."""
     return published.in_words if published else ""
 
 
 def published_reward(task: str, label: str) -> str:
-    """Mean reward of runs as the paper has it, in words; empty where it does not publish it."""
+    """Write the mean reward of runs in the paper; empty if the paper does not publish it."""
     cell = published_cell(task, CONDITION_OF.get(label, ""))
     return in_words((cell or {}).get(""))
 
 
 def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:
-    """Return the values that the folder has."""
+    """Yield the measurements for which the folder has runs."""
     for read in reads:
         with suppress(MissingError):
             yield read()

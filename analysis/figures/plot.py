@@ -1,4 +1,4 @@
-"""A figure with what belongs to it, and its files."""
+"""Figures with their words and numbers, and their files."""
 
 from __future__ import annotations
 
@@ -33,27 +33,28 @@ class Plot:
     title: str
     caption: str
     alt: str
-    """Alternative text: describes the figure for people who cannot see it."""
+    """Alternative text, a description for people who cannot see the figure."""
     figure: Figure
     data: pd.DataFrame
-    """The drawn numbers as a tidy frame, enough to draw them again."""
+    """Drawn numbers as a tidy frame, enough to draw the figure again."""
 
     def _repr_png_(self) -> bytes:
-        """The picture that a notebook shows."""
+        """Return the picture that a notebook shows."""
         return picture(self.figure, ".png")
 
 
 Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
-"""A figure, the table that it shows, its alternative text, and the tasks that it is about."""
+"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and its tasks."""
 
 
 def figure(
     title: str, caption: str
 ) -> Callable[[Callable[[Study], Parts | None]], Callable[[Study], Plot | None]]:
-    """A decorator: what draws a study becomes a figure with this title and caption.
+    """Return a decorator that turns a drawing function of a study into a figure of the report.
 
-    It is drawn in the style of all figures, and has its id of the function's name. The caption says
-    what a dagger means where one of the tasks is reconstructed. None where the runs allow none.
+    The figure is in the style of all figures; its id is the name of the function. The caption
+    explains the dagger if a task is reconstructed. The function returns None if the folder has no
+    runs for the figure.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> Callable[[Study], Plot | None]:
@@ -83,9 +84,9 @@ def spoken(rows: pd.DataFrame, template: str) -> str:
 
 
 def picture(drawing: Figure, ending: str) -> bytes:
-    """A figure as a file with this ending, one of :data:`FORMATS`.
+    """Return a figure as the bytes of a file with this ending, one of :data:`FORMATS`.
 
-    The same figure gives the same bytes on machines with the same fonts: ids are salted, no date is
+    Equal figures give equal bytes on machines with equal fonts: ids are salted, and no date is
     written. Raises CoarticError for another ending.
     """
     if ending not in FORMATS:

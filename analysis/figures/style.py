@@ -1,7 +1,7 @@
-"""One style for all figures: sizes, colours and marks.
+"""Style of all figures: sizes, colours and marks.
 
-Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on
-white. All are legible on white and on #111; dashes tell what colours tell.
+Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on white.
+All colours are legible on white and on #111. Dashes distinguish the same lines as colours.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ INCH = 25.4  # mm
 ONE = 89 / INCH
 """Width of one journal column, inches."""
 TWO = 183 / INCH
-"""Width of two."""
+"""Width of two journal columns, inches."""
 TALLEST = 225 / INCH
-"""Height of a page that leaves room for a caption."""
+"""Height of a page that leaves room for a caption, inches."""
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Matplotlib's settings of all figures."""
@@ -62,11 +62,11 @@ OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": DOTTED}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": DASH_DOTTED}
 """Lines at the rewards of the optimum and of the initial solution."""
 styled = style.context(["default", RC])
-"""A decorator: draw with this style and matplotlib's defaults, whatever the user has set."""
+"""Decorator that draws in this style on Matplotlib's defaults, without the user's settings."""
 
 
 Look = dict[str, Any]
-"""Looks of a method's lines: ``color`` and ``linestyle``."""
+"""Look of a method's lines: ``color`` and ``linestyle``."""
 
 
 def look_of(color: str, dash: str) -> Look:
@@ -75,7 +75,7 @@ def look_of(color: str, dash: str) -> Look:
 
 
 def grid(panels: int) -> tuple[int, int]:
-    """Rows and columns of so many panels; at most three columns."""
+    """Return the numbers of rows and columns for some panels, with three columns at most."""
     columns = min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
 
@@ -93,9 +93,9 @@ def panels(
         Width and height, inches: ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
-        The first so many panels are used, the others left empty; all without it.
+        Number of panels used, the first ones; the others stay empty. By default all.
     **subplots
-        As Matplotlib's ``Figure.subplots`` takes them, such as ``sharey=True``.
+        Arguments of Matplotlib's ``Figure.subplots``, such as ``sharey=True``.
 
     Returns
     -------
@@ -110,14 +110,14 @@ def panels(
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
-    """Names at the left of rows that stand at 0, -1, -2 and so on."""
+    """Write names to the left of rows that stand at 0, -1, -2 and so on."""
     axes.set_yticks([-place for place in range(len(names))], names)
     axes.set_ylim(-len(names) + 0.4, 0.6)
     axes.tick_params(axis="y", length=0)
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """A legend below all panels."""
+    """Draw a legend below all panels."""
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
 
 
@@ -138,27 +138,27 @@ def means(
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where they are drawn.
+        Axes to draw on.
     frame : DataFrame
-        A row for each mean, as :func:`coartic.analysis.means` returns them: columns ``x``, ``y``,
-        and for intervals those of ``y`` with ``_low`` and ``_high``.
+        A row for each mean, as :func:`coartic.analysis.means` returns it: columns ``x`` and ``y``,
+        and for intervals the columns of ``y`` with ``_low`` and ``_high``.
     x, y : str
         Columns of the places and of the means.
     by : str
-        Column whose values have a line, a colour and a label each; one line without it.
+        Column of groups, each with a line, a colour and a label; empty for a single line.
     scale : float
         Factor of means and intervals: 100 for per cent.
     shift : float
-        By how much each line is moved to the right of the one before, in units of ``x``.
+        Distance by which each line is moved to the right of the line before, in units of ``x``.
     bars : float, optional
         Width of the intervals, points.
     **line
-        Looks of the line and its marks, as Matplotlib's ``plot`` takes them.
+        Look of the line and its marks: arguments of Matplotlib's ``plot``.
 
     Raises
     ------
     CoarticError
-        For a frame without rows or one of the columns, and for text in the place of numbers.
+        The frame has no rows, lacks a column, or has text in place of numbers.
     """
     checked(frame, numbers=[x, y], others=[by] * bool(by))
     groups = frame.groupby(by, sort=False) if by else [("", frame)]
@@ -185,7 +185,7 @@ def legend_line(label: str, **line: Any) -> Line2D:
 
 
 def log_axis(axes: Axes) -> None:
-    """A logarithmic x axis with numbers at whole decades: 1, 100, 1k, 1M; 100m for 0.1."""
+    """Make the x axis logarithmic, with numbers at whole decades: 1, 100, 1k, 1M; 100m for 0.1."""
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(EngFormatter(sep=""))
     axes.xaxis.set_minor_formatter(NullFormatter())
