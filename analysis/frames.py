@@ -1,9 +1,9 @@
-"""Gaps, rankings and running times of a plain frame of results, also of one that you made.
+"""Gaps, rankings and running times of plain frames of results, including frames of your own.
 
-The frame has a row for each run, with the columns ``method``, ``task``, ``reward`` (ticks, NaN for
-a run that failed) and ``best_known``, the best reward known of the task. ``load(folder).runs`` is
-such a frame. Rewards are negative ticks; costs, as an ``Objective`` has them, are their negatives.
-A frame that cannot be meant so is refused in a sentence.
+A frame has a row for each run, with columns ``method``, ``task``, ``reward`` (ticks, NaN for a
+failed run) and ``best_known``, the best known reward of the task; ``load(folder).runs`` is such a
+frame. Rewards are negative ticks; the costs of an ``Objective`` are their negatives. Frames with
+other contents raise CoarticError.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ def checked(
     names: Sequence[str] = (),
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Return columns of a frame that a user made, the ``numbers`` as float64 with NaN for missing.
+    """Return columns of a user's frame, with ``numbers`` as float64 and NaN for missing numbers.
 
-    Raises CoarticError for what is no frame, a missing column, no rows, a missing name, and for
-    ``numbers`` that are text or infinite.
+    Raises CoarticError for an object that is no frame, a missing column, no rows, a missing name,
+    and for ``numbers`` that are text or infinite.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
@@ -63,7 +63,7 @@ def checked(
 
 
 def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
-    """Raise CoarticError for the first row that is wrong, with its value and what is needed."""
+    """Raise CoarticError for the first wrong row, with its value and the value needed."""
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
         raise CoarticError(
@@ -74,7 +74,8 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
 def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """Return checked columns with the ``gap`` of each row.
 
-    Raises CoarticError for rewards above 0 or above the best known, which is to be below 0.
+    Raises CoarticError for rewards above 0 or above the best known reward, and for a best known
+    reward of 0.
     """
     for name in ("reward", "best_known"):
         sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
@@ -90,9 +91,9 @@ def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
 def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Return a user's frame of methods on tasks, checked, with the ``gap`` of each row.
 
-    ``method`` has the setting besides where a method of the frame has several; ``task`` is
-    numbered. Raises CoarticError as :func:`checked` and :func:`with_gaps` do, and for several best
-    known rewards of one task. ``more``: other columns of numbers.
+    ``method`` includes the setting if a method of the frame has several settings; ``task`` is a
+    number. ``more``: other columns of numbers. Raises CoarticError as :func:`checked` and
+    :func:`with_gaps` do, and for a task with several best known rewards.
     """
     columns = checked(frame, names=("method", "task"), numbers=(*SCORES, *more))
     columns = with_gaps(columns)
@@ -110,25 +111,25 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 
 def gaps(frame: pd.DataFrame) -> pd.Series:
-    """Gap of each run to the best known reward of its task.
+    """Return the gap of each run to the best known reward of its task.
 
     Parameters
     ----------
     frame : DataFrame
-        With columns ``reward`` and ``best_known``, negative ticks; NaN for a run that failed, and
-        where no reward is known.
+        With columns ``reward`` and ``best_known``, negative ticks; NaN for a failed run, and for a
+        task without a best known reward.
 
     Returns
     -------
     Series
         (best known - reward) / \\|best known\\| of each row: 0.01 is 1 % more ticks than the best
-        known. NaN where one of them is NaN.
+        known reward; NaN if one of them is NaN.
 
     Raises
     ------
     CoarticError
-        For a frame without rows or one of these columns, for text, and for rewards above 0 (costs
-        are positive, rewards negative) or above the best known.
+        The frame has no rows, lacks a column, or has text, rewards above 0 (costs are positive,
+        rewards negative) or rewards above the best known reward.
 
     Examples
     --------
@@ -140,29 +141,28 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
 
 
 def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
-    """Means of groups of rows with their 95 % intervals.
+    """Return the means of groups of rows, with their 95 % intervals.
 
     Parameters
     ----------
     frame : DataFrame
-        A row for each task (or each run), with the columns of ``by`` and ``columns``.
+        A row for each task, or each run.
     by : sequence of str
-        Columns that make a group; NaN is a group of its own.
+        Columns whose values make groups; NaN is a value, too.
     columns : sequence of str
         Columns of numbers; NaN does not count.
 
     Returns
     -------
     DataFrame
-        A row for each group in the order of first appearance: ``by``, ``rows``, the number of
-        rows, and of each column ``x`` the mean ``x`` with ``x_low`` and ``x_high`` (BCa bootstrap,
-        NaN with fewer than three values).
+        A row for each group, in the order of first appearance: ``by``, the number of ``rows``, and
+        for each column ``x`` the mean ``x`` with its interval ``x_low`` to ``x_high`` (BCa
+        bootstrap, NaN with fewer than three values).
 
     Raises
     ------
     CoarticError
-        For a frame without rows or one of the columns, and for values of ``columns`` that are text
-        or infinite.
+        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``.
 
     Examples
     --------
@@ -190,22 +190,23 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     ----------
     frame : DataFrame
         With columns ``method``, ``task`` (names, numbers or tuples), ``reward`` and ``best_known``
-        (negative ticks). Where it has a column ``setting``, a method with several settings has a
-        row for each, ``"cma-es/bandit noise=0.1"``.
+        (negative ticks). With a column ``setting``, a method with several settings has a row for
+        each setting, ``"cma-es/bandit noise=0.1"``.
 
     Returns
     -------
     DataFrame
-        A row for each method: ``gap``, the mean over tasks of the mean over solved runs, with its
-        95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks (stratified
-        bootstrap, NaN with fewer than three runs on a task); ``tasks`` that it solved, ``runs`` and
-        ``failed``. The nearest is first. A method that did not solve every task of the frame has
-        no gap and is last.
+        A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
+        solved runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same
+        tasks (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of
+        solved ``tasks``, of ``runs`` and of ``failed`` runs. A method that did not solve every task
+        of the frame has no gap and is last.
 
     Raises
     ------
     CoarticError
-        As :func:`gaps` does, for missing names, and for several best known rewards of a task.
+        As :func:`gaps` does; also for missing names, and for a task with several best known
+        rewards.
 
     Examples
     --------
@@ -236,30 +237,30 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
-    """Share of runs and targets that methods reach within a number of trials.
+    """Return the share of targets that methods reach within a number of trials.
 
     Parameters
     ----------
     frame : DataFrame
         With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known`` (negative ticks): a row each time a run became better, or one for its end.
+        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end.
         Settings as in :func:`ranking`.
     targets : sequence of float
-        Gaps to the best known that count as reached, such as ``[0.1, 0.05, 0.01]``.
+        Gaps to the best known reward, such as ``[0.1, 0.05, 0.01]``.
 
     Returns
     -------
     DataFrame
-        A row at each number of trials at which a method's share rises: ``method``, ``trials``,
-        ``share`` of all pairs of run and target (tasks count alike) that are reached within them.
-        Of a task on which a method has no run, and of a run without a reward, no target is reached.
-        A method that reaches no target has one row, of share 0 and infinite trials.
+        A row for each number of trials at which a method's share rises: ``method``, ``trials`` and
+        ``share``, the share of all pairs of run and target reached within these trials; tasks have
+        the same weight. A task without runs, and a run without a reward, reach no target. A method
+        that reaches no target has a single row, with share 0 and infinite trials.
 
     Raises
     ------
     CoarticError
-        As :func:`ranking` does, for trials below 1, for targets that are no gaps, and where no best
-        reward is known.
+        As :func:`ranking` does; also for trials below 1, targets that are no gaps, and a frame
+        without best known rewards.
 
     Examples
     --------

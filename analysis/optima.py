@@ -90,7 +90,7 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
-    """Return (optimum − reward) / \|optimum\|: 0 at the optimum, 0.01 for 1 % more ticks."""
+    """Return (optimum − reward) / |optimum|: 0 at the optimum, 0.01 for 1 % more ticks."""
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))
 
 

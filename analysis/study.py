@@ -1,7 +1,7 @@
-"""A results folder as data: its runs, cells, tasks, movements and optima.
+"""A results folder as data: its runs, methods, cells, tasks, movements and optima.
 
-``load("results/comparison")`` reads a folder. What is computed from it is a plain function of the
-study, in the packages beside this file; :func:`cached` makes such a function compute once a study.
+``load("results/comparison")`` reads a folder. The other modules of the analysis are functions of a
+study; :func:`cached` keeps the results of a function for each study.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ CellKey = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class CellRuns:
-    """Runs of one method with its parameters on one task."""
+    """Runs of a method with its parameters on a task."""
 
     task: str
     method: str
@@ -50,18 +50,18 @@ class CellRuns:
 
     @property
     def label(self) -> str:
-        """The method with its setting."""
+        """Label: the method with its setting."""
         return label_of(self.method, self.setting)
 
     @cached_property
     def good(self) -> pd.DataFrame:
-        """The runs that have a solution."""
+        """Runs with a solution."""
         solved = self.runs["status"] == "ok"
         return self.runs if solved.all() else self.runs[solved]
 
     @property
     def all_good(self) -> bool:
-        """Whether there are runs, and all of them have a solution."""
+        """True if there are runs, and all of them have a solution."""
         return len(self.good) == len(self.runs) > 0
 
     @cached_property
@@ -76,13 +76,13 @@ class CellRuns:
 
     @property
     def gap(self) -> float:
-        """Gap of the mean reward to the best known reward; NaN where either is missing."""
+        """Gap of the mean reward to the best known reward; NaN if one of them is missing."""
         best = self.good.best_known.dropna().unique()
         return float(gap_share(self.rewards.mean(), best[0])) if len(best) else math.nan
 
     @property
     def has_best_known(self) -> bool:
-        """Whether there are runs, and a best known reward to which they can have gaps."""
+        """True if there are runs with a best known reward, to which they have gaps."""
         return bool(self.runs.best_known.notna().any())
 
 
@@ -96,7 +96,7 @@ UNITS = {
 
 
 def typical_run(solved: pd.DataFrame) -> str:
-    """Id of the run whose reward is nearest to the median."""
+    """Return the id of the run with the reward nearest to the median."""
     rewards = solved.reward.to_numpy(dtype=np.float64)
     return str(solved.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
@@ -104,11 +104,11 @@ def typical_run(solved: pd.DataFrame) -> str:
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 MOST_EXECUTED = 500
-"""Runs of a method on a task whose solutions are executed again for the signatures."""
+"""Most runs of a method on a task for which signatures are computed."""
 
 
 def check_study(study: object) -> None:
-    """Raise CoarticError for what is no study, such as a folder."""
+    """Raise CoarticError for an object that is no study, such as the path of a folder."""
     if not isinstance(study, Study):
         needed = "needed is a study, as coartic.analysis.load(folder) returns it"
         raise CoarticError(f"{needed}, not a {type(study).__name__}")
@@ -117,9 +117,9 @@ def check_study(study: object) -> None:
 def cached(
     function: Callable[Concatenate[Study, Asked], Computed],
 ) -> Callable[Concatenate[Study, Asked], Computed]:
-    """A function of a study that computes its result once for each study and its arguments.
+    """Make a function of a study keep its result for each study and its other arguments.
 
-    It raises CoarticError for what is no study, such as a folder.
+    The function raises CoarticError for an object that is no study.
     """
 
     @wraps(function)
@@ -137,7 +137,7 @@ def cached(
 def load(folder: str | Path) -> Study:
     """Read a results folder.
 
-    Raises CoarticError where the folder is not a results folder or is not finished.
+    Raises CoarticError if the folder is no results folder, or lacks runs of its suite.
     """
     folder = folder_named(folder)
     with open_store(folder) as store:
@@ -154,10 +154,10 @@ def load(folder: str | Path) -> Study:
 def tidy(
     runs: pd.DataFrame, tasks: Mapping[str, Task], optima: Mapping[str, BestKnown]
 ) -> pd.DataFrame:
-    """Return stored runs with columns for facts of their tasks, parameters and gaps.
+    """Return stored runs with columns for their tasks, parameters and gaps.
 
-    A parameter whose name is that of a stored column is left out: ``trials`` are those made,
-    ``hands`` those of the solution.
+    Stored columns take precedence over parameters of the same name: ``trials`` is the number of
+    trials made, ``hands`` the hands of the solution.
     """
     parameters = {text: json.loads(text) for text in runs.parameters.unique()}
     best = {name: each.reward for name, each in optima.items()}
@@ -186,7 +186,7 @@ def tidy(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
-    """The stored results of one folder."""
+    """The stored results of a folder."""
 
     folder: Path
     plan: Sequence[Job]
@@ -194,7 +194,7 @@ class Study:
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     stored: pd.DataFrame
-    """Runs as they are stored."""
+    """Runs as stored, a row for each."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -208,49 +208,49 @@ class Study:
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
-        """The tasks as they were run, by name; titles that several share have the name besides."""
+        """Tasks by name, with titles that differ (:func:`.titled_apart`)."""
         tasks = {job.cell.task.name: job.cell.task for job in self.plan}
         return {task.name: task for task in titled_apart(tasks.values())}
 
     @cached_property
     def declared(self) -> dict[str, MethodInfo]:
-        """The declarations of the methods that were run, by id."""
+        """Declarations of the methods by id."""
         return {job.cell.method.name: job.cell.method for job in self.plan}
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """Best known reward by task, with the proven bound and where the reward comes from."""
+        """Best known rewards by task, with proven bounds and sources."""
         return best_known(self.stored, self.tasks.values())
 
     @cached_property
     def runs(self) -> pd.DataFrame:
-        """A row for each run: rewards, hand sequences, what was spent (docs/results.md).
+        """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
-        Of its task ``family``, ``split``, ``goals`` (their number) and ``best_known``; its
-        parameters by their names; ``gap`` to the best known reward, as a share.
+        Further columns: ``family``, ``split``, number of ``goals`` and ``best_known`` reward of the
+        task; parameters by name; ``gap``, a share of the best known reward.
         """
         return tidy(self.stored, self.tasks, self.optima)
 
     @cached_property
     def methods(self) -> pd.DataFrame:
-        """A row for each method with its setting, by its label, in the order of lists and figures.
+        """A row for each method with its setting, by label, in the order of lists and figures.
 
-        The learner's conditions together are a row as well: EC1 on tasks for one arm and EC4 on
-        tasks for two. Columns:
+        Two conditions of the learner can make a further row: EC1 on tasks for one arm and EC4 on
+        tasks for two arms. Columns:
 
         - ``base``: id of the method without a setting;
         - ``condition``: exploration condition of the learner; empty for other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
-        - ``parts``: labels of the runs, of which the last that ran on a task counts there;
-        - ``title``: its name, the same wherever it is shown;
-        - ``algorithm``: what it is a form of;
-        - ``kind``: ``"learner"`` (the paper's, under its own conditions), ``"optimum search"``,
-          ``"no learning"`` (it makes trials without learning from them), or empty;
-        - ``information``: its use of the reward, one of three groups;
-        - ``built_in``: whether it is one of coartic's methods;
-        - ``stochastic``: whether the seed matters;
-        - ``headline``: whether it stands for its algorithm;
-        - ``under``: label of the method whose setting or ablation it is, if that ran as well;
+        - ``parts``: labels of the cells; of several, the last label with a cell on a task counts;
+        - ``title``: name on the page, in tables and figures;
+        - ``algorithm``: algorithm of which the method is a form;
+        - ``kind``: ``"learner"`` (the paper's learner under the paper's conditions), ``"optimum
+          search"``, ``"no learning"`` (trials without learning from them), or empty;
+        - ``information``: use of the reward, one of three groups;
+        - ``built_in``: True for methods of coartic, False for methods from files;
+        - ``stochastic``: True if results depend on the seed;
+        - ``headline``: True if the method represents its algorithm;
+        - ``under``: label of the method of a setting or ablation, if this method ran; or empty;
         - ``look``: colour and dash in figures.
         """
         return methods_of(self.cells.values(), self.declared)
@@ -270,10 +270,10 @@ class Study:
 
     @cached
     def sequences(self, task: str) -> pd.DataFrame:
-        """The corrective process alone on a task: a row for each hand sequence, best first.
+        """Return the results of the corrective process alone on a task, by hand sequence.
 
-        Columns ``hands``, ``reward`` (missing where it fails) and ``reason``. Empty where there
-        are too many sequences to try.
+        A row for each sequence, the best first: ``hands``, ``reward`` (missing for a failure) and
+        ``reason``. No rows if the task has too many sequences.
         """
         try:
             names = hand_sequences(self.tasks[task])
@@ -285,36 +285,40 @@ class Study:
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
-        """One row a movement of each run's solution."""
+        """A row for each movement of the solutions."""
         with open_store(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Runs that made trials, each with the reward of every trial, NaN where it failed."""
+        """Yield the id of each run that made trials, with the rewards of its trials, NaN for failed
+        trials."""
         with open_store(self.folder) as store:
             yield from store.rewards()
 
     @cached
     def executed(self, task: str, method: str, *, replay: bool = False) -> Solutions:
-        """Solutions of the solved runs of a method on a task, executed again.
-
-        The first 500 of them: signatures say no more with thousands.
+        """Execute the solutions of the solved runs of a method on a task again.
 
         Parameters
         ----------
         task, method : str
-            Names as in :attr:`runs`; a setting stands after its method: ``"random search
-            half_width=0.5"``.
+            Names as in :attr:`runs`; a setting follows its method: ``"random-search
+            half_width=0.5"``. Conditions of the learner may go by their own names, ``"EC4"``.
         replay : bool
-            The noiseless trial after learning in place of the solution, of the runs that have one.
-            For a learner whose solution is its best trial, it says what is learned without
-            selection.
+            Execute the noiseless trial after learning in place of the solution, for runs that have
+            such a trial. The solution of a learner is its best trial; the replay shows what was
+            learned without this selection.
+
+        Returns
+        -------
+        Solutions
+            Of the first 500 solved runs.
 
         Raises
         ------
         CoarticError
-            There are no runs of the method on the task; the stored movements cannot be executed or
-            do not do what is stored of them.
+            The folder has no runs of the method on the task, or the stored movements cannot be
+            executed or have other ticks than stored.
         """
         condition = f"{METHOD_PREFIX}{method}"  # which goes by its own name as well
         if (task, method) not in self.cells and (task, condition) in self.cells:
@@ -337,14 +341,14 @@ class Study:
         return Solutions(self.tasks[task], method, tuple(executed), tuple(solutions))
 
     def configurations(self, task: str, method: str, *, replay: bool = False) -> Array:
-        """Postures in which the solved runs of a method hit the goals of a task.
+        """Return the postures in which the solved runs of a method hit the goals of a task.
 
         Parameters
         ----------
         task, method : str
-            As in :meth:`executed`.
+            Names as in :meth:`executed`.
         replay : bool
-            Of the noiseless trial after learning in place of the solution.
+            Take the noiseless trial after learning in place of the solution.
 
         Returns
         -------
@@ -354,19 +358,19 @@ class Study:
         return self.executed(task, method, replay=replay).configurations
 
     def signature(self, name: str, *, replay: bool = False) -> pd.Series:
-        """A signature of coarticulation of every run.
+        """Return a signature of coarticulation of every run.
 
         Parameters
         ----------
         name : str
             One of ``coartic.analysis.SIGNATURES``: ``"first"``, ``"arm"``, ``"hand"``, ...
         replay : bool
-            Of the noiseless trial after learning in place of the solution.
+            Take the noiseless trial after learning in place of the solution.
 
         Returns
         -------
         Series
-            By the index of :attr:`runs`; NaN for runs that have none, and for those after the
+            By the index of :attr:`runs`; NaN for runs without the signature, and for runs after the
             first 500 of a method on a task.
         """
         from coartic.analysis.signatures.measures import SIGNATURES
@@ -389,17 +393,18 @@ class Study:
 
     @cached
     def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
-        """Movements of the ``solution`` or ``replay`` of the runs that are executed, by run id."""
+        """Return the movements of the ``solution`` or ``replay`` of each run, by run id, of the
+        first 500 runs of a method on a task."""
         with open_store(self.folder) as store:
             return store.movements(part, self.tasks, MOST_EXECUTED)
 
 
 @cached
 def one_by_one(study: Study) -> dict[str, Task]:
-    """The tasks that a report has one by one, by name.
+    """Return the tasks that a report shows one by one, by name.
 
-    All, but no instances of families, if these are more than eight. A changed task has the name of
-    its task before the first dot.
+    More than eight instances of families are left out. The name of a changed task begins with the
+    name of its task and a dot.
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     left_out = drawn if len(drawn) > 8 else ()

@@ -18,7 +18,7 @@ from coartic.analysis.methods import title_of
 from coartic.analysis.report import about, render
 from coartic.analysis.report.about import answers, attempt, limits
 from coartic.analysis.report.build import write_report
-from coartic.analysis.report.trace import rows_of, runs_behind, tables_of
+from coartic.analysis.report.trace import read_table, runs_behind, tables_of
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
@@ -69,7 +69,7 @@ def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, coart
     shutil.copy(traced.folder / RUNS_FILE, results)
     tables = tables_of(results)
     assert set(tables) == {name for name, table in tables_by_name.items() if len(table)}
-    frame = rows_of(tables["methods"])
+    frame = read_table(tables["methods"])
     names, runs = list(frame.index), frame.run_ids.iloc[0].split()
     method = tables_by_name["methods"].method[names[0]]
     assert set(traced.runs.set_index("run_id").method[runs]) == {method}
@@ -170,7 +170,7 @@ def test_no_text_is_a_formula_of_a_spreadsheet(text, tmp_path):
     path.write_text(render.table_csv(frame), "utf-8")
     cells = [line.split(",") for line in path.read_text("utf-8").splitlines()]
     assert cells[1:] == [[f"'{text} row", f"'{text}", "-1.5", ""], ["other", "a=b", "-2.0", "x"]]
-    pd.testing.assert_frame_equal(rows_of(path).fillna(""), frame, check_dtype=False)
+    pd.testing.assert_frame_equal(read_table(path).fillna(""), frame, check_dtype=False)
 
 
 def test_a_report_is_not_written_through_a_link(traced, tmp_path):

@@ -37,7 +37,7 @@ CLAIMS = {claim.id: claim for claim in (*CLAIMS_OF_THE_PAPER, *CLAIMS_ON_FAMILIE
 
 @cached
 def judgements(study: Study) -> pd.DataFrame:
-    """Judge the claims on the folder's tasks, the paper's and random tasks (:func:`judge_claims`)."""
+    """Judge the claims on the folder's tasks, by :func:`judge_claims`."""
     drawn = {task.family is not None for task in study.tasks.values()}
     paper = CLAIMS_OF_THE_PAPER if drawn != {True} else []
     return judge_claims(study, [*paper, *(CLAIMS_ON_FAMILIES if True in drawn else [])])
@@ -65,8 +65,9 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> pd.DataFrame:
         finding = replace(finding, evidence=evidence)
         groups.setdefault(claim.group, {})[claim.id] = claim.text, claim.test, finding
         run_ids = " ".join(dict.fromkeys(read.run_ids))
-        rows.append((claim.id, run_ids, tuple(dict.fromkeys(read.failed)), claim.depends))
-    columns = ["claim", "run_ids", "failed", "depends"]
+        failed, lacks_runs = tuple(dict.fromkeys(read.failed)), finding.holds is None
+        rows.append((claim.id, run_ids, failed, lacks_runs, claim.depends))
+    columns = ["claim", "run_ids", "failed", "lacks_runs", "depends"]
     read_of = pd.DataFrame(rows, columns=columns).set_index("claim")
     judged = read_of.join(pd.concat(map(judge, groups.values())))
     goals = judged.pop("depends") & (judged.verdict == "supported")

@@ -1,1 +1,1 @@
-"""The report of a results folder: its page, tables and summary."""
+"""The report of a results folder: page, tables and summary."""

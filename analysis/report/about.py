@@ -1,4 +1,4 @@
-"""Answers of a folder, the limits of its runs, and the code that made them."""
+"""Findings of a folder, and the limits of conclusions from its runs."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ Made = TypeVar("Made")
 
 
 def shown(text: str) -> str:
-    """Text as one printable line, which does not break before a per cent sign or a dagger."""
+    """Return text as a printable line without breaks before per cent signs and daggers."""
     return one_line(text).replace(" %", f"{NO_BREAK}%").replace(" †", f"{NO_BREAK}†")
 
 
 def visible_sections(study: Study) -> list[Section]:
-    """Sections but those about single tasks where these are many."""
+    """Return the sections, without sections about single tasks if a folder has many tasks."""
     return [section for section in SECTIONS if one_by_one(study) or not section.single]
 
 
 @cached
 def failures(study: Study) -> dict[str, str]:
-    """Return the errors of :func:`attempt` so far, in words, by what failed."""
+    """Return the errors of :func:`attempt` so far, in words, by the name of the failed part."""
     return {}
 
 
 def attempt(study: Study, name: str, make: Callable[[Study], Made]) -> Made | None:
-    """Make a part of a report, so that one that fails does not cost the others.
+    """Make a part of a report, and return None if this raises an exception.
 
-    Returns None where it fails; :func:`failures` then has the error and its place by the ``name``
-    of the section. Raises CoarticError, which says that the folder is at fault.
+    :func:`failures` then has the error, with file and line, by the ``name`` of the part. A
+    CoarticError, which is an error of the folder, is raised.
     """
     try:
         return make(study)
@@ -54,20 +54,20 @@ def attempt(study: Study, name: str, make: Callable[[Study], Made]) -> Made | No
 
 @cached
 def finding(study: Study, section: Section) -> list[str]:
-    """Lines of a section's sentence; none where the runs say nothing."""
+    """Return the lines of a section's sentence; none without a finding."""
     text = attempt(study, section.short, section.sentence) if section.sentence else ""
     return [shown(line.strip()) for line in text.strip().split("\n")] if text else []
 
 
 def answers(study: Study) -> list[tuple[Section, list[str]]]:
-    """Sections that answer a question in short, with the lines of their findings."""
+    """Return the sections with a short answer, and the lines of their findings."""
     answering = [section for section in visible_sections(study) if section.answer]
     return [(each, lines) for each in answering if (lines := finding(study, each))]
 
 
 @cached
 def limits(study: Study) -> dict[str, Any]:
-    """Facts that limit the conclusions from these runs."""
+    """Return facts that limit the conclusions from these runs, for the page."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, kind = study.methods.algorithm, study.methods.kind
@@ -99,7 +99,7 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """Notes that belong to numbers of these columns."""
+    """Return the notes on a table with these columns."""
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []
     if unproven and columns & {"gap", "optimum"}:

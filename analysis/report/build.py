@@ -1,4 +1,4 @@
-"""A report: one page that stands alone, ``report.html``, and its tables and figures as files."""
+"""Writing a report: the page ``report.html``, and tables and figures as files."""
 
 from __future__ import annotations
 
@@ -38,16 +38,15 @@ from coartic.play.page import text_of
 
 HERE = Path(__file__).parent
 NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "claims": [], "finding": [], "figure": None}
-"""Parts of a section that failed."""
+"""Values of :func:`parts_of` for a section that failed."""
 
 
 def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[str]:
-    """Write a report into ``folder``, in the place of an earlier one; the paths of its files.
+    """Write a report into ``folder``, in the place of an earlier report.
 
-    ``for_paper``: tables as LaTeX beside those as CSV, and figures as SVG and PDF.
-
-    Raises CoarticError where the folder holds the results themselves, the report of other results,
-    or anything that no report wrote.
+    ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF. Returns the paths of the
+    files. Raises CoarticError if the folder holds the results themselves, the report of other
+    results, or other files.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
@@ -75,7 +74,7 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
 
 
 def files_of_table(table: Table, caption: str, for_paper: bool, study: Study) -> dict[str, bytes]:
-    """Return a table as CSV, ``for_paper`` in LaTeX as well, by path; nothing without rows."""
+    """Return the files of a table by path: CSV, and LaTeX ``for_paper``; none without rows."""
     frame = table(study)
     if not len(frame):
         return {}
@@ -87,7 +86,7 @@ def files_of_table(table: Table, caption: str, for_paper: bool, study: Study) ->
 
 
 def files_of_figure(section: Section, study: Study) -> dict[str, bytes]:
-    """Return the figure of a section as SVG and PDF, by path; nothing without one."""
+    """Return the files of a section's figure by path: SVG and PDF; none without a figure."""
     files = {}
     if (plot := plot_of(study, section)) is not None:
         for ending in (".svg", ".pdf"):
@@ -98,13 +97,13 @@ def files_of_figure(section: Section, study: Study) -> dict[str, bytes]:
 
 @cached
 def plot_of(study: Study, section: Section) -> Plot | None:
-    """Return the figure of a section; None where it has none, or the runs allow none."""
+    """Return the figure of a section; None if the section or the folder has none."""
     return section.figure(study) if section.figure else None
 
 
 def sections(study: Study) -> list[dict[str, Any]]:
-    """Return the sections that the runs allow, as :func:`parts_of` has them, and those that
-    failed, with the ``failure`` in words."""
+    """Return the sections with a table or figure, as :func:`parts_of` does, and the sections that
+    failed, with their ``failure`` in words."""
     allowed = []
     for section in about.visible_sections(study):
         parts = about.attempt(study, section.short, partial(parts_of, section))
@@ -115,8 +114,7 @@ def sections(study: Study) -> list[dict[str, Any]]:
 
 
 def parts_of(section: Section, study: Study) -> dict[str, Any]:
-    """Return a section as the template wants it, with its ``finding`` and the number of ``rows`` of
-    its table; ``figure`` is None where the runs do not allow it."""
+    """Return the values of a section for the template: table, figure, finding and claims."""
     table, frame, plot = section.table, section.table(study), plot_of(study, section)
     claims = frame.reset_index(names="id") if section.id == "claims" else pd.DataFrame()
     if len(claims):
@@ -136,8 +134,10 @@ def parts_of(section: Section, study: Study) -> dict[str, Any]:
 
 
 def page(study: Study, home: str) -> str:
-    """The page of HTML, which needs no other file and no network; ``home`` leads from its folder to
-    the results."""
+    """Return the page in HTML, which needs no other file and no network.
+
+    ``home`` is the path from the page's folder to the results.
+    """
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,

@@ -1,7 +1,7 @@
-"""The figure to play with, of `coartic play`, with the runs of a folder.
+"""The interactive figure of `coartic play`, with the runs of a folder.
 
-It begins with the stored runs, as their movements are stored. When a goal is moved, the learner
-or another method answers anew.
+The figure begins with stored runs. After a reader has moved a goal, the learner or another method
+solves the changed task.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from coartic.robot import HANDS
 
 
 def player(study: Study) -> str:
-    """The figure as HTML; empty where no run has a solution.
+    """Return the figure as HTML; empty if no run has a solution.
 
-    Of each task it has, for each method of figures that moves straight, the run nearest its median
-    reward. It begins with one goal before two others if two tasks share one.
+    The figure has a preset for each task, with the run nearest the median reward of each method
+    that moves straight. The first preset is the goal that two tasks share, if two tasks do.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
@@ -64,8 +64,8 @@ def player(study: Study) -> str:
 
 
 def first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> dict[str, Any]:
-    """Return the preset and the method of the film that is chosen at first: of the nearest method
-    from a file if there is one, or else of the preferred method if the first preset has it."""
+    """Return the preset and the method shown first: the method from a file with the smallest gap,
+    or else the preferred method if the first preset has it."""
     ids = [[run["id"] for run in preset["runs"]] for preset in presets]
     for method in own_methods(study):
         for number, played in enumerate(ids):
@@ -77,11 +77,13 @@ def first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> 
 def methods_played(
     study: Study, tasks: list[str], random_search: str = RANDOM_SEARCH
 ) -> list[dict[str, Any]]:
-    """Methods with solved runs on all of these tasks: their names, and of each task the movements
-    of the run nearest the median reward; of several tasks also the postures of all runs at goal 1,
-    which they share. Methods that follow paths are left out: the script moves straight. Of random
-    search it has those with the label ``random_search``, which the script puts beside the
-    others."""
+    """Return the methods with solved runs on all of these tasks, with a film for each task.
+
+    A film has the movements of the run nearest the median reward; films of several tasks also have
+    the postures of all runs at goal 1, which the tasks share. Methods that follow paths are left
+    out, as the script moves straight. The label ``random_search`` names the setting of random
+    search with which the script compares the other methods.
+    """
     runs = []
     for label in study.methods.index:
         played = random_search if label == RANDOM_SEARCH else label
@@ -95,8 +97,10 @@ def methods_played(
 
 
 def film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """The run of a cell nearest the median reward, as ``model.js`` executes it; empty where a cell
-    has no solution, or one that follows a path."""
+    """Return the run of a cell nearest the median reward, in the form of ``model.js``.
+
+    Empty if the cell has no solution, or a solution that follows a path.
+    """
     if key not in study.cells or not len(study.cells[key].good):
         return {}
     good = study.cells[key].good[:MOST_EXECUTED]

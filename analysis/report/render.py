@@ -1,6 +1,7 @@
 """Tables as CSV, HTML and LaTeX.
 
-A column that ends in ``_low``, ``_high`` or ``_sd`` is shown behind the column to which it belongs.
+The page shows intervals and standard deviations, columns ``x_low``, ``x_high`` and ``x_sd``, in
+column ``x``.
 """
 
 from __future__ import annotations
@@ -51,11 +52,11 @@ IN_LATEX = {
     "tasks": "task, arms, base, initial, optimum, bound",
     "methods": "task, method, runs, reward, gap, hands, trials",
 }
-"""Tables for a paper, and their columns, which fit the width of a text; others are CSV alone."""
+"""Tables in LaTeX, by id, and their columns, which fit the width of a text."""
 FORMULA = ("=", "+", "-", "@")
-"""Beginnings of text that spreadsheets compute."""
+"""Beginnings of text that spreadsheets take for formulas."""
 MOST_ROWS = 50
-"""Rows of a table on one page; a longer one is CSV alone."""
+"""Most rows of a table in LaTeX, which fit a page."""
 
 
 def table_csv(frame: pd.DataFrame) -> str:
@@ -95,12 +96,12 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
 
 
 def is_number(values: pd.Series) -> bool:
-    """Whether a column holds numbers, or no value at all."""
+    """Return whether a column has numbers, or no value at all."""
     return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
 
 
 def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
-    """Return the values of a column as text, with SDs and intervals that belong to them."""
+    """Return the values of a column as text, with their SDs and intervals."""
     if not is_number(frame[name]):
         titles = frame.attrs.get("titles", {})
         shown = {each: titles.get(each) or one_line(str(each)) for each in frame[name].unique()}
@@ -123,10 +124,10 @@ def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
 
 
 def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
-    """Return a table for the page. Its first column holds while the others scroll. Rows have links,
-    and a class if they are of methods from files beside others, or of a setting or ablation.
+    """Return a table in HTML.
 
-    The caption says what is the same in all rows.
+    Its first column stays while the others scroll. Rows have links and the classes of
+    :func:`classes_of`. A text that is the same in all rows moves to the caption.
     """
     slug = slugs(map(str, frame.index))
     cells: list[list[str]] = []
@@ -172,8 +173,8 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
 
 
 def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
-    """Return the classes of each row: ``own`` of methods from files beside others, ``setting`` of
-    settings and ablations in a ranking that has their method."""
+    """Return the classes of each row: ``own`` for methods from files in a table with other methods,
+    ``setting`` for settings and ablations of a method of the same ranking."""
     labels = [str(label) for label in frame.get("method", frame.index)]
     under = frame.attrs.get("under", {}) if table.id == "ranking" else {}
     is_own = [label in frame.attrs.get("own", ()) for label in labels]
@@ -186,8 +187,8 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
     """Return the columns of :data:`IN_LATEX` in LaTeX, with booktabs.
 
-    A text that is the same in all rows stands in the caption. ``notes`` stand below the table, with
-    what a dagger means where there is one.
+    A text that is the same in all rows moves to the caption. ``notes`` are below the table, with
+    the meaning of a dagger in the table.
     """
     frame = frame[["setting" not in names for names in classes_of(table, frame)]]
     columns = columns_of(table, frame)

@@ -1,4 +1,4 @@
-"""The runs behind a row of a report's table."""
+"""Runs behind the rows of a report's tables."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from coartic.runs.plan import hash_of, label_of
 
 
 def tables_of(folder: Path) -> dict[str, Path]:
-    """CSV files of the tables by id, of the one report in a folder or below it.
+    """Return the CSV files of the tables of the report in a folder or below it, by id.
 
-    Raises CoarticError where there is none, or more than one.
+    Raises CoarticError if the folder has no report, or several.
     """
     here = folder.resolve()
     files = [path for path in folder.glob("**/tables/*.csv") if path.is_file()]
@@ -35,8 +35,8 @@ def tables_of(folder: Path) -> dict[str, Path]:
     return {path.stem: path for path in sorted(files) if path.parent == reports[0]}
 
 
-def rows_of(table: Path) -> pd.DataFrame:
-    """A table of a report. Raises CoarticError for a file that is none."""
+def read_table(table: Path) -> pd.DataFrame:
+    """Read a table of a report. Raises CoarticError for another file."""
     try:
         frame = pd.read_csv(table, index_col="row", keep_default_na=False, na_values=[""])
         if "run_ids" not in frame or not frame.index.is_unique:
@@ -53,19 +53,19 @@ def unguarded(value: Any) -> Any:
 
 
 def stamp(runs: pd.DataFrame) -> str:
-    """Hash of what runs came to, by which a report says which runs it is of."""
+    """Return the hash of the results of runs, by which a report identifies its runs."""
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
 def beginnings(table: Table, frame: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the rows of a table by id, with the first two columns of words that the page shows."""
+    """Return the ids of a table's rows, with the first two columns of text that the page shows."""
     words = [name for name in columns_of(table, frame) if not is_number(frame[name])]
     texts = [texts_of(table, frame, name) for name in words[:2]]
     return [(row, ", ".join(first)) for row, *first in zip(frame.index, *texts, strict=True)]
 
 
 def values_of(table: Table, frame: pd.DataFrame, row: str) -> list[tuple[str, str]]:
-    """Return headings and values of a row as the page shows them, without missing ones."""
+    """Return headings and values of a row as on the page, without missing values."""
     one = frame.loc[[row]]
     columns = columns_of(table, one).items()
     shown = ((header, texts_of(table, one, name)[0]) for name, header in columns)
@@ -73,8 +73,8 @@ def values_of(table: Table, frame: pd.DataFrame, row: str) -> list[tuple[str, st
 
 
 def runs_behind(study: Study, ids: Sequence[str]) -> pd.DataFrame:
-    """Return the runs with these ids: run, task, seed, hands and reward, worst of a task first, and
-    the method where there are several."""
+    """Return the runs with these ids, the lowest reward of a task first: run, task, seed, hands,
+    reward, and the method if the runs have several."""
     chosen = study.runs[study.runs.run_id.isin(ids)]
     chosen = chosen.sort_values(["task", "reward"], kind="stable")
     labels = [*map(label_of, chosen.method, chosen.setting)]

@@ -1,4 +1,4 @@
-"""The page: its sections in their order, and every table and figure of the report by its id."""
+"""Sections of the page in their order, and tables and figures of the report by id."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from coartic.analysis.words import id_of
 
 @dataclass(frozen=True)
 class Section:
-    """One section of the page. It is left out where the runs allow neither figure nor table."""
+    """A section of the page, left out if the folder has neither its table nor its figure."""
 
     id: str
     short: str
@@ -36,19 +36,19 @@ class Section:
     caption: str
     """Caption of the table."""
     figure: Callable[[Study], Plot | None] | None = None
-    """It returns None where the folder's runs do not allow it."""
+    """Function that draws the figure, or returns None if the folder has no runs for it."""
     sentence: Callable[[Study], str] | None = None
-    """Returns the finding in words, for enough runs and for too few, with the number that failed;
-    empty where the runs say nothing. Its first line stands alone on the first screen."""
+    """Function that returns the finding in words, also for too few runs, with the number of failed
+    runs; empty without a finding. The first line is an answer for the first screen."""
     answer: str = ""
-    """Word before the finding on the terminal; empty: it is neither there nor on the first
-    screen of the page."""
+    """Word before the answer on the terminal; empty for sections without an answer there and on
+    the first screen."""
     note: str = ""
-    """Explains picture and table."""
+    """Explanation of figure and table."""
     single: bool = True
-    """Whether it is about single tasks: left out for many random ones."""
+    """True for sections about single tasks, left out for many random tasks."""
     folded: bool = False
-    """Whether the page shows its table only when asked."""
+    """True if the page folds the table."""
 
 
 SECTIONS = (
@@ -219,6 +219,6 @@ SECTIONS = (
 )
 TABLES = {each.table.id: each.table for each in SECTIONS}
 TABLES["against-learner"] = ranking.list_against_learner
-"""Every table by its id, functions of a study; the last is a CSV file that no section shows."""
+"""Tables by id; the last is a CSV file without a section."""
 FIGURES = {id_of(each.figure): each.figure for each in SECTIONS if each.figure}
-"""Every figure by its id."""
+"""Figures by id."""

@@ -1,4 +1,4 @@
-"""The paper's claims with their verdicts, and how many of them hold."""
+"""Section on the paper's claims and their verdicts."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ from coartic.tasks.task import shipped_tasks
 
 
 def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:
-    """Number of claims with each verdict, including 0."""
+    """Return the number of claims with each verdict, including 0."""
     numbers = Counter(verdicts)
     return {verdict: numbers[verdict] for verdict in get_args(Verdict)}
 
 
 def papers_claims(study: Study) -> pd.DataFrame:
-    """Claims of the paper; none where the folder has no runs for any of them or its rewards."""
+    """Return the judged claims; no rows if the folder has no runs for claims or rewards of the
+    paper."""
     judged = judgements(study)
     return judged if beside_paper(study) or judged.run_ids.any() else judged[:0]
 
@@ -36,7 +37,7 @@ def papers_claims(study: Study) -> pd.DataFrame:
     "opposite_p_holm: -; sets: sets of goals in which it holds; place: where; quote: -"
 )
 def list_claims(study: Study) -> Rows:
-    """The paper's claims with their verdicts, where the folder has runs for any of them."""
+    """List the paper's claims with their verdicts, if the folder has runs for any of them."""
     for name, judged in papers_claims(study).iterrows():
         claim = CLAIMS[str(name)]
         row: Row = {
@@ -49,22 +50,21 @@ def list_claims(study: Study) -> Rows:
 
 
 def too_few(judged: pd.DataFrame) -> bool:
-    """Return whether half of the claims are undecided, as a folder lacks runs or trials, and not
-    all of the central ones are supported."""
+    """Return whether half of the claims are undecided and not all central claims are supported."""
     central = central_verdicts(judged)
     all_hold = bool(len(central)) and (central == "supported").all()
     return bool(2 * (judged.verdict == "undecided").sum() >= len(judged) and not all_hold)
 
 
 def central_verdicts(judged: pd.DataFrame) -> pd.Series:
-    """Return the verdicts on the claims that carry the paper's point, by their short words."""
+    """Return the verdicts on the central claims, by their short words."""
     short = judged.verdict.rename(lambda name: CLAIMS[name].short)
     return short[short.index != ""]
 
 
 def verdicts_in_words(judged: pd.DataFrame) -> str:
-    """Say how many claims are supported, of all and of those that carry the paper's point, and how
-    many have each verdict."""
+    """Say how many claims, and how many central claims, are supported, and how many have each
+    verdict."""
     n, central = counts(judged.verdict), central_verdicts(judged)
     if too_few(judged):
         return (
@@ -82,15 +82,17 @@ def verdicts_in_words(judged: pd.DataFrame) -> str:
         f"{capital(verdict)}: {listed(names.index)}."
         for verdict, names in central.groupby(central, sort=False)
     ]
-    lacking = judged.evidence.str.startswith("Not judged").sum()
+    lacking = judged.lacks_runs.sum()
     words.append(f"Of all {len(judged)} claims: {each}.")
     words += [f"Of the undecided, {number(lacking)} lack runs here."] * bool(lacking)
     return f"{card}.\n{' '.join(words)}"
 
 
 def claims_hold(study: Study) -> str:
-    """Say whether the paper is reproduced, by its claims; nothing of too few runs where the folder
-    has tasks that no claim is about."""
+    """Say whether the paper's claims hold.
+
+    Empty for too few runs in a folder with other tasks, which is not about the paper.
+    """
     judged = papers_claims(study)
     if judged.empty or (too_few(judged) and has_own_tasks(study)):
         return ""
@@ -99,7 +101,8 @@ def claims_hold(study: Study) -> str:
 
 
 def has_own_tasks(study: Study) -> bool:
-    """Return whether a task is neither the paper's, also changed, nor of a shipped family."""
+    """Return whether some task is neither a task of the paper, changed or not, nor an instance of a
+    shipped family."""
     shipped = {*shipped_tasks(), *shipped_families()}
     return any(
         (task.family or name.partition(".")[0]) not in shipped for name, task in study.tasks.items()

@@ -1,4 +1,4 @@
-"""Coarticulation: one goal is hit in different postures before different goals."""
+"""Sections on coarticulation: postures at a shared goal, and signatures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from coartic.analysis.random_search import (
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import as_in_isolation, preshaping_of_the_other_arm
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.standings import called, failed_runs
+from coartic.analysis.standings import failed_runs, is_learner
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -37,12 +37,12 @@ from coartic.internal.text import counted
 from coartic.robot import HANDS, Array
 
 SAME = 1e-9
-"""Postures with no larger difference, length units and rad, are the same: it is rounding."""
+"""Largest posture difference that is rounding, length unit and rad mixed."""
 
 
 def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Every goal that two tasks share before they differ, for every hand with which a method hit it
-    in both."""
+    """Yield each goal that two tasks share before they differ, for each hand with which the method
+    hit this goal in both tasks."""
     for first, second, shared in context_pairs(study.tasks):
         keys = (first, label), (second, label)
         if {first, second} <= one_by_one(study).keys() and study.cells.keys() >= {*keys}:
@@ -56,10 +56,10 @@ def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
 
 @cached
 def shared_goal(study: Study) -> TwoContexts | None:
-    """The first goal that two tasks share, by the paper's learner if it ran, or else by a method
-    from a file if one did.
+    """Return the runs at the first goal that two tasks share, of the first of these methods: the
+    paper's learner, methods from files, methods that represent their algorithms, other methods.
 
-    None where no method has solved runs on two such tasks.
+    None if no method has solved runs on two such tasks.
     """
     rows = study.methods
     subjects = rows.index[is_subject(rows) & rows.built_in], rows.index[~rows.built_in]
@@ -77,7 +77,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
     "other: difference that moves the hand (per dimension) .3"
 )
 def list_contexts(study: Study) -> Rows:
-    """Postures at a shared goal before different successors; p is corrected by method (Holm)."""
+    """List posture differences at shared goals; p is corrected over a method's goals (Holm)."""
     for label in study.methods.index:
         every = list(shared_goals(study, label))
         p = holm(
@@ -110,7 +110,7 @@ def list_contexts(study: Study) -> Rows:
     "preshaping: idle hand nearer to its next goal (share) .2"
 )
 def list_signatures(study: Study) -> Rows:
-    """The main signatures of every method on every task, means over runs and goals."""
+    """List the main signatures of every method on every task, means over runs and goals."""
     labels = study.methods.index[study.methods.kind != "optimum search"]
     for name, label in itertools.product(one_by_one(study), labels):
         cell = study.cells.get((name, label))
@@ -130,7 +130,8 @@ def list_signatures(study: Study) -> Rows:
 
 
 def mean_of_goals(values: Array) -> float:
-    """Mean over goals of the means over runs that have a value, ``(n, G)``; NaN without any."""
+    """Return the mean over goals of the means over runs, for values of shape ``(n, G)``, without
+    NaN and infinite values; NaN without other values."""
     there = [of_goal[np.isfinite(of_goal)] for of_goal in values.T]
     means = [of_goal.mean() for of_goal in there if len(of_goal)]
     return fmean(means) if means else math.nan
@@ -142,7 +143,7 @@ def mean_of_goals(values: Array) -> float:
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw postures at one goal before two others: thin every run, thick their means."""
+    """Draw postures at a goal before two different next goals: runs thin, their means thick."""
     shared = shared_goal(study)
     if shared is None:
         return None
@@ -204,20 +205,19 @@ def draw_postures(study: Study) -> Parts | None:
 def next_goal(study: Study) -> str:
     """Say whether the posture at the goal that two tasks share depends on the next goal.
 
-    For the learner, or else for a method from a file; of other methods there is no sentence, as
-    many coarticulate, or cannot, by construction.
+    About the learner, or else a method from a file: many other methods coarticulate, or do not,
+    by construction.
     """
     shared = shared_goal(study)
     if shared is None or not is_subject(study.methods.loc[shared.method]):
         return ""
     method: Any = study.methods.loc[shared.method]
     titles = study.methods.title
-    # A method whose runs differ by chance takes a test, and one that selects needs random search.
+    # Stochastic methods need a test; methods that select from trials need random search.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
     needed, random_search = selects(study, shared.method), random_search_for(study, shared)
     beyond = shared.p_beyond(random_search) if needed and random_search is not None else math.nan
-    drawn, who = method.stochastic, called(method)
-    who = "The learner" if who == "the learner" else who
+    drawn, who = method.stochastic, "The learner" if is_learner(method) else method.title
     runs, p = counted(shared.n, "run"), p_value(shared.p)
     in_sd = not math.isnan(shared.standardised_posture_difference)
 
@@ -274,13 +274,13 @@ def next_goal(study: Study) -> str:
 
 
 def is_subject(rows: Any) -> Any:
-    """Return whether a sentence may be about a method: the learner, or a method from a file; of a
-    row of :attr:`.Study.methods`, or of each of several rows."""
+    """Return whether a method is the learner or from a file, for a row of :attr:`.Study.methods` or
+    for each of several rows."""
     return (rows.kind == "learner") | ~rows.built_in
 
 
 def joints_or_hand(study: Study) -> str:
-    """Number of methods in which the next goal moves the joints more than the hand."""
+    """Say in how many methods the next goal moves the joints more than the hand."""
     rows = list_contexts(study)
     is_main = rows.method.map(study.methods.under) == ""
     rows = rows[is_main & (rows.distance > 0.01)]

@@ -1,4 +1,4 @@
-"""Cost of coming near the optimum: running times to reward targets."""
+"""Section on costs: running times to reward targets."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from coartic.internal.limits import brief_value
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
-"""Kinds of cost: columns of ``runs``; ``solve_s`` is wall time in s."""
+"""Costs, as columns of ``runs``; ``solve_s`` is wall time, s."""
 TARGETS = tuple(n / 20 for n in range(1, 21))
 """Targets, as shares of the distance from the initial solution to the optimum."""
 COSTS = (
@@ -33,15 +33,15 @@ COSTS = (
     ("forward_kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
-"""Columns of :func:`runtimes`: kind of cost, and share of the targets."""
+"""Columns of :func:`list_runtimes`, with the cost and the share of targets of each."""
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
-"""Spends that the figure of costs has a panel of, and their axes."""
+"""Costs with a panel in the figure, and the labels of their axes."""
 
 
 @cached
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Of runs that made trials: numbers of the trials that were better than all before, from 1,
-    and their rewards, by run id."""
+    """Return, by run id, the numbers of the trials that were better than all before, from 1, and
+    their rewards, for runs that made trials."""
     by_run = {}
     for run_id, rewards in study.rewards():
         best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards))
@@ -52,9 +52,10 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 @cached
 def spans(study: Study) -> dict[str, tuple[float, int]]:
-    """Return the rewards of the initial solution and best known by task, between which targets lie.
+    """Return the reward of the initial solution and the best known reward of each task.
 
-    Without tasks that have no initial solution, or none that can be bettered.
+    Targets lie between the two. Tasks without an initial solution, or with an initial solution that
+    is the best known, are left out.
     """
     rewards = {
         name: (initial_reward(study.tasks[name]), best.reward)
@@ -67,13 +68,13 @@ def spans(study: Study) -> dict[str, tuple[float, int]]:
 def times_of(
     study: Study, cell: CellRuns, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
-    """Cost at which each run of a cell reached each target, shape ``(runs, targets)``.
+    """Return the cost at which each run of a cell reached each target, shape ``(runs, targets)``.
 
-    Infinite where it did not. A planner reaches all of its targets at the end. Forward-kinematics
-    evaluations and time are known as totals of the run and spread evenly over its trials, which is
-    not exact: over the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times their
-    even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. A run whose spend is not known,
-    such as the time of a cold one, has no part; times are as :func:`solve_times` returns them.
+    Infinite for a target that the run did not reach. A planner reaches its targets at its end.
+    Forward-kinematics evaluations and time are totals of a run, spread evenly over its trials, an
+    approximation: over the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times
+    their even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. Times are of
+    :func:`solve_times`; a run without a known cost has no row.
     """
     initial, optimum = spans(study)[cell.task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
@@ -96,9 +97,10 @@ def times_of(
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
-    """Wall time of solving, s: of runs in a warm process, or of all where there are none.
+    """Return the wall time of solving, s, of solved runs in warm processes, or of all solved runs
+    if no process was warm.
 
-    ``runs`` have a solution. Their whole time stands for methods that mark no solving.
+    The time of the run stands in for methods that do not report the time of solving.
     """
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     warm = runs.warm.to_numpy(bool, na_value=False)
@@ -106,8 +108,11 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 
 def cells_with_targets(study: Study) -> dict[str, list[CellRuns]]:
-    """Return the cells of each method on those of :func:`.common_tasks` with targets, of methods
-    that ran on all of them; of methods from files that did not, on all with targets."""
+    """Return the cells of each method on the tasks of :func:`.common_tasks` that have targets.
+
+    Methods that did not run on all these tasks are left out, or, if they are from files, have their
+    cells on all tasks with targets.
+    """
     common, of_methods = (
         [task for task in standings.common_tasks(study) if task in spans(study)],
         {},
@@ -124,32 +129,34 @@ def cells_with_targets(study: Study) -> dict[str, list[CellRuns]]:
 def runtimes(
     results: str | Path | Study, *, targets: Sequence[float] | Array = TARGETS
 ) -> pd.DataFrame:
-    """Share of reward targets that methods reach within a budget: the ECDF of running times.
+    """Return the share of reward targets that methods reach within a budget: the ECDF of running
+    times.
 
-    Of the methods that the report compares and that have runs on all tasks; tasks count alike. Of a
-    method from a file that lacks some of these tasks, on the tasks that it ran on.
+    For the methods that the report compares and that ran on all tasks; tasks have the same weight.
+    Methods from files count on the tasks on which they ran.
 
     Parameters
     ----------
     results : str, Path or Study
-        A results folder, or a study of one.
+        A results folder, or its study.
     targets : sequence of float, shape (n,), optional
-        As shares of the distance from the initial solution to the optimum, above 0 and up to 1; by
-        default 0.05, 0.1, ..., 1. Rewards are whole, so a target is the next whole tick.
+        Shares of the distance from the initial solution to the optimum, above 0 and up to 1; by
+        default 0.05, 0.1, ..., 1. Targets are rounded up to whole ticks.
 
     Returns
     -------
     pandas.DataFrame
-        A row at each budget at which the share rises: ``method``, ``spend`` (``trials``;
+        A row for each budget at which the share rises: ``method``, ``spend`` (``trials``;
         ``forward_kinematics``, evaluations, and ``solve_s``, seconds, both spread evenly over the
-        trials of a run), ``budget``, and ``share`` of the pairs of run and target that are reached
-        within it. A method that reaches no target has one row, of share 0 and an infinite budget.
+        trials of a run), ``budget``, and ``share``, the share of the pairs of run and target
+        reached within the budget. A method that reaches no target has a single row, with share 0
+        and an infinite budget.
 
     Raises
     ------
     CoarticError
-        For what is no results folder, targets out of bounds, and where no task has a best known
-        reward above that of its initial solution.
+        The folder is no results folder, targets are out of bounds, or no task has a best known
+        reward above the reward of its initial solution.
     """
     study = results if isinstance(results, Study) else load(results)
     shares = np.asarray(targets, dtype=np.float64)
@@ -177,8 +184,11 @@ def runtimes(
     "seconds_to_half[]: seconds to half of the targets; half on *: -"
 )
 def list_runtimes(study: Study) -> Rows:
-    """Cost of a quarter and of half of the targets; ``half on``: median trials to the
-    target halfway, by task, infinite where most runs never reach it."""
+    """List the costs of reaching a quarter and half of the targets.
+
+    ``half on``: median trials to the target halfway, by task, infinite if most runs do not reach
+    this target.
+    """
     for method, cells in cells_with_targets(study).items():
         times = {spend: [times_of(study, cell, spend) for cell in cells] for spend in SPENDS}
         if not all(map(len, times["trials"])):
@@ -204,12 +214,11 @@ def list_runtimes(study: Study) -> Rows:
     "are lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
-    """Share of targets reached (runtime ECDF), against trials and forward-kinematics
-    evaluations."""
+    """Draw the share of reached targets against trials and forward-kinematics evaluations."""
     tabled = list_runtimes(study)
     rows = study.methods.loc[[*tabled.index]]
     rows = rows.loc[headline_methods(rows)]
-    # methods that learn, random search, the best planner, from files
+    # Shown are methods that learn, random search, the best planner, and methods from files.
     rows = rows[rows.algorithm != "corrective process alone"]
     plans = rows.index[rows.information != BY_TRIAL]
     best = tabled.reached[plans].idxmax() if len(plans) else None
@@ -260,7 +269,8 @@ def draw_runtimes(study: Study) -> Parts | None:
 
 
 def what_it_costs(study: Study) -> str:
-    """Trials that the learner and its rival need for half of the targets."""
+    """Say how many trials the learner, and the best other method that learns, need for half of the
+    targets."""
     table = list_runtimes(study)
     methods = study.methods.loc[[*table.index]]
     main = methods.loc[headline_methods(methods)]

@@ -1,4 +1,4 @@
-"""Speed of learning: rewards by trial."""
+"""Section on the speed of learning: rewards by trial."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked, number
 
 BUDGETS = (100, 1_000, 10_000)
-"""Trials after which the table reads rewards."""
+"""Numbers of trials after which the table has rewards."""
 WINDOW = 100
-"""Trials over which a learning curve averages the reward of trials."""
+"""Number of trials over which a learning curve averages."""
 CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
-"""Built-in methods whose learning curves are drawn; of others they all are."""
+"""Built-in methods with learning curves; methods from files all have learning curves."""
 
 
 @table(
@@ -32,8 +32,8 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]"
 )
 def list_learning(study: Study) -> Rows:
-    """Best reward after so many trials (mean over runs), and the trial at which half of what a run
-    gains on the initial solution is there (median and quartiles of the runs; ∞ without gain)."""
+    """List the best reward after some numbers of trials (mean over runs), and the trial at which a
+    run has half of its gain over the initial solution (median and quartiles; ∞ without gain)."""
     for (task, label), cell in study.cells.items():
         learned = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
         runs = [run for run in learned if run is not None]
@@ -77,7 +77,7 @@ def list_learning(study: Study) -> Rows:
     "far below the initial solution are cut off.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
+    """Draw rewards of the learner, hill climbing, CMA-ES and methods from files, by task."""
     data = learning_curves(study)
     if not len(data):
         return None
@@ -127,11 +127,11 @@ def draw_learning_curves(study: Study) -> Parts | None:
 
 
 def learning_curves(study: Study) -> pd.DataFrame:
-    """Best reward so far and that of the trials themselves, by task and method.
+    """Return the best reward so far, and the reward of trials, by task, method and trial.
 
-    Of runs with a solution; EC1 on tasks without the two-armed conditions. Columns ``task``,
-    ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
-    ``best_high``, ``trials`` (mean over runs and the last :data:`WINDOW` trials).
+    For runs with a solution; EC1 only on tasks without two-armed conditions. Columns ``task``,
+    ``method``, ``runs``, ``trial``, ``best`` (mean over runs), quartiles ``best_low`` and
+    ``best_high`` of the runs, and ``trials`` (mean over runs and the last :data:`WINDOW` trials).
     """
     shown, methods = list[tuple[str, str]](), study.methods
     drawn = methods.index[methods.headline & (methods.base.isin(CURVES) | ~methods.built_in)]
@@ -168,7 +168,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
 
 
 def how_fast(study: Study) -> str:
-    """When half of the gain of the learner that explores most is there, by task."""
+    """Say after how many trials the learner that explores most has half of its gain, by task."""
     half = list_learning(study).trials_to_half_gain
     after = [
         f"{number(float(f'{half[row]:.2g}'))} trials on {marked(task)}"

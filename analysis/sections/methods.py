@@ -1,4 +1,4 @@
-"""Every method on every task, with rewards, hands and costs."""
+"""Section on every method on every task: rewards, hands and costs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from coartic.estimates import standard_deviation
     "forward_kinematics: forward-kinematics evaluations; solve_s: seconds; median_run"
 )
 def list_methods(study: Study) -> Rows:
-    """Every method on every task: mean reward, gap, hands and costs (medians).
+    """List every method on every task: mean reward, gap, hands and costs (medians).
 
-    Within a task searches for the optimum come first, then the highest mean reward.
-    ``median_run``: beginning of the id of the run whose reward is nearest the median.
+    Within a task, searches for the optimum come first, then methods by mean reward. ``median_run``
+    is the beginning of the id of the run with the reward nearest to the median.
     """
     places = {task: place for place, task in enumerate(one_by_one(study))}
     cells = [cell for cell in study.cells.values() if cell.task in places]

@@ -1,4 +1,4 @@
-"""Methods from files, which are not of this project: how they do on the tasks that they ran on."""
+"""Section on methods from files, on the tasks on which they ran."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from coartic.estimates import standard_deviation
 from coartic.internal.text import counted
 
 MOST_NAMED = 3
-"""Methods from files, and tasks, that a sentence names."""
+"""Most methods, and tasks, that a sentence names."""
 UNTESTED = " (the runs are too few, or too alike, for a test)"
 
 
@@ -29,8 +29,11 @@ def own_methods(study: Study) -> list[str]:
 
 
 def nearest_others(study: Study, method: str) -> dict[str, float]:
-    """Return the gap of the nearest built-in method, and of the learner, on the tasks that a method
-    solved, by their names; of methods that use the reward as it does if there are any."""
+    """Return the gaps of the nearest built-in method and of the learner, by their names, on the
+    tasks that a method solved.
+
+    Built-in methods with the same use of the reward come first.
+    """
     rows = standings.gaps_on(study, standings.solved_tasks(study, method))
     group = study.methods.information[method]
     rows = pd.concat([standings.leaders(rows, of) for of in (group, *GROUPS)])
@@ -46,7 +49,7 @@ def nearest_others(study: Study, method: str) -> dict[str, float]:
     "nearest_gap: its gap (%) .1; learner: learner's reward .1; p_holm: p (corrected) .p"
 )
 def list_own(study: Study) -> Rows:
-    """Return methods from files on each task, with the nearest built-in method and the learner."""
+    """List methods from files on each task, with the nearest built-in method and the learner."""
     compared, tested = standings.compared(study), ranking.list_against_learner(study)
     rows = study.methods
     for task, title in ((name, marked(task)) for name, task in study.tasks.items()):
@@ -76,7 +79,7 @@ def list_own(study: Study) -> Rows:
 
 
 def own_in_words(study: Study) -> str:
-    """Say how methods from files do, the nearest first, on which tasks, and beside whom."""
+    """Say the gaps of methods from files, the smallest first, with the gaps of other methods."""
     names = own_methods(study)
     lines = [card(study, method) for method in names[:1]]
     lines += [details(study, method) for method in names[:MOST_NAMED]]
@@ -92,14 +95,14 @@ def own_in_words(study: Study) -> str:
 
 
 def card(study: Study, method: str) -> str:
-    """Return the gap of a method from a file in a line, on which tasks, and beside whom."""
+    """Say the gap of a method from a file in a line, with its tasks and the nearest other one."""
     row, title = standing(study, method), study.methods.title[method]
     text, beside = f"gap of {percent(row['gap'])}", ""
     for other, gap in [*nearest_others(study, method).items()][:1]:
         beside = f"{other} {percent(gap)}"
     if covered := standings.coverage(study, method):
-        there = "task" if covered.startswith("1 of ") else "tasks"
-        on_the_same = f"; {beside} on the same {there}" * bool(beside)
+        same = "task" if len(standings.solved_tasks(study, method)) == 1 else "tasks"
+        on_the_same = f"; {beside} on the same {same}" * bool(beside)
         return f"{title} ran on {covered}: {text} there{on_the_same}."
     if not math.isnan(row["better"]):
         tasks = counted(len(beside_learner(study, method)), "task")
@@ -110,8 +113,8 @@ def card(study: Study, method: str) -> str:
 
 
 def details(study: Study, method: str) -> str:
-    """Return the gap of a method from a file with its interval, and of others on the same tasks,
-    its trials where the learner made others, tests, and who declares its information."""
+    """Say the gap of a method from a file with its interval, gaps of other methods on the same
+    tasks, its number of trials if the learner made another number, and tests."""
     row, tests = standing(study, method), beside_learner(study, method)
     tasks = standings.solved_tasks(study, method)
     is_partial = bool(standings.coverage(study, method))
@@ -140,14 +143,16 @@ def details(study: Study, method: str) -> str:
 
 
 def beside_learner(study: Study, method: str) -> pd.DataFrame:
-    """Return the rows of table ``against-learner`` of a method."""
+    """Return the rows of a method in table ``against-learner``."""
     rows = ranking.list_against_learner(study)
     return rows[rows.method == method]
 
 
 def trials_beside(study: Study, method: str) -> str:
-    """Say how many trials a method that learns from them and the learner made at most; nothing
-    where these are the same, or one made none."""
+    """Say how many trials a method that learns from trials, and the learner, made at most.
+
+    Empty if the numbers are equal, or one of them made no trials.
+    """
     cells = standings.compared(study)[method]
     keys = [(task, most_exploring(study.tasks[task])) for task in cells]
     learners = [study.cells[key] for key in keys if key in study.cells]

@@ -1,4 +1,4 @@
-"""Gaps of methods on random tasks."""
+"""Section on gaps of methods on random tasks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.optima import gap_share
-from coartic.analysis.standings import best_of_instances, called, compared, reference
+from coartic.analysis.standings import (
+    best_of_instances,
+    called,
+    compared,
+    is_learner,
+    reference,
+)
 from coartic.analysis.statistics.instances import Scores, other_tasks
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -22,12 +28,11 @@ from coartic.analysis.words import listed, number, percent
 
 @cached
 def solved(study: Study) -> pd.DataFrame:
-    """Return a row for each compared method on each instance of a family that it solved in some
-    run, family by family.
+    """Return a row for each compared method on each instance with a solved run, by family.
 
-    Columns ``method``, ``family``, ``task``, ``cell``, and of the solved runs, shape ``(n,)``:
-    ``gap`` to the best known reward, as a share of it, and ``to_bound``, which the gap to the
-    optimum is at most; None where nothing is proven.
+    Columns ``method``, ``family``, ``task``, ``cell``, and arrays over the solved runs, shape
+    ``(n,)``: ``gap`` to the best known reward, as a share of it, and ``to_bound``, the gap to the
+    proven bound; None without a bound.
     """
     instances = best_of_instances(study)
     families = dict.fromkeys(str(study.tasks[name].family) for name in instances)
@@ -42,7 +47,7 @@ def solved(study: Study) -> pd.DataFrame:
 
 
 def by_family(rows: pd.DataFrame, column: str) -> Scores:
-    """Return values of instances by family, without instances that have none."""
+    """Return the values of a column by family and instance, without missing values."""
     rows = rows[rows[column].notna()]
     return {
         str(family): [(values,) for values in of_family[column]]
@@ -55,7 +60,7 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
     "in *: {} (%) .1"
 )
 def list_family_gaps(study: Study) -> Rows:
-    """Gap to the best known reward over families with two arms, and in each family."""
+    """List gaps to the best known reward over families with two arms, and in each family."""
     every, rows = solved(study), list[tuple[str, Row]]()
     families = every.family.unique()
     hands = every.task.map({name: len(task.hands) for name, task in study.tasks.items()})
@@ -82,7 +87,7 @@ def list_family_gaps(study: Study) -> Rows:
     "runs).",
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
-    """Gap to the best known reward of each instance, by method and family."""
+    """Draw gaps to the best known rewards of instances, by method and family."""
     methods = study.methods[(study.methods.under == "") & (study.methods.parts.map(len) == 1)]
     rows = solved(study)
     rows = rows[rows.method.isin(methods.index)]
@@ -125,7 +130,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
 
 
 def on_random_tasks(study: Study) -> str:
-    """Gaps of the nearest methods to the best known reward, over families with two arms."""
+    """Say the gaps of the nearest methods to the best known reward, over families with two arms."""
     best = best_of_instances(study)
     gaps = list_family_gaps(study).dropna(subset="gap").gap
     gaps = gaps[gaps.index.isin(headline_methods(study.methods.loc[gaps.index]))].head(4)
@@ -134,7 +139,8 @@ def on_random_tasks(study: Study) -> str:
     rows = study.methods.loc[gaps.index].to_dict("records")
     ends = [f"{called(row)} {percent(gap)}" for row, gap in zip(rows, gaps, strict=True)]
     first, *others = ends
-    beside = [end for end in others if end.startswith("the learner")] or others[:1]
+    learner = [end for row, end in zip(rows[1:], others, strict=True) if is_learner(row)]
+    second = learner or others[:1]
     unproven = [
         (str(study.tasks[name].family).partition("/")[0], 100 * gap_share(each.reward, each.bound))
         for name, each in best.items()
@@ -146,7 +152,7 @@ def on_random_tasks(study: Study) -> str:
     proven = sum(each.proven for each in best.values())
     to = reference(study, best)
     return (
-        f"Nearest to the {to}: {'; '.join([first, *beside])}.\n"
+        f"Nearest to the {to}: {'; '.join([first, *second])}.\n"
         f"Gaps to the {to} on {len(best)} random tasks (means over families with two "
         f"arms): {', '.join(ends)}. On {proven or 'none'} of them this reward is the proven "
         f"optimum{elsewhere + listed(medians) if medians else ''}."

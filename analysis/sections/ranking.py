@@ -1,4 +1,4 @@
-"""Ranking: gaps of methods to the optimum, or to the best of the folder, over all tasks."""
+"""Section on the ranking: gaps of methods to the optimum, or to the best of the folder."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ LONGEST = 36
 
 @cached
 def shown_gaps(study: Study) -> pd.DataFrame:
-    """Return :func:`.main_gaps` with methods from files that lack some of these tasks: of each its
-    gap on the ``tasks`` that it solved."""
+    """Return :func:`.main_gaps`, and gaps of methods from files that lack some of these tasks, on
+    the ``tasks`` that they solved."""
     rows = standings.main_gaps(study)
     for method in standings.compared(study):
         if not study.methods.built_in[method] and method not in {*rows.method}:
@@ -58,12 +58,12 @@ def shown_gaps(study: Study) -> pd.DataFrame:
     "least_p: -"
 )
 def list_against_learner(study: Study) -> Rows:
-    """Mean reward of every method and of the paper's learner that explores most, by task.
+    """List the mean rewards of every method and of the learner that explores most, by task.
 
-    Of methods that solved every run; p is corrected over the tasks of a method (Holm). A method
-    that draws nothing has one reward, which is exact. The test takes samples as independent, though
-    runs have the same seeds (:func:`paired_difference` pairs them): where the learner has 100 runs
-    and the other method 20, pairs would leave out 80.
+    For methods that solved every run; p is corrected over the tasks of a method (Holm). The reward
+    of a deterministic method counts as exact. The test takes samples as independent, though runs
+    have the same seeds (:func:`.paired_difference` pairs them): with 100 runs of the learner and 20
+    of the other method, pairs would leave out 80.
     """
     for label, method in study.methods[study.methods.kind != "optimum search"].iterrows():
         cells, tests = [], []
@@ -95,10 +95,10 @@ def list_against_learner(study: Study) -> Rows:
     "better: better on; worse: worse on; on *: {} (%) .1; runs"
 )
 def list_ranking(study: Study) -> Rows:
-    """Gap over all tasks and on each, methods from files first, settings behind their method.
+    """List gaps over all tasks and on each, methods from files first, settings after their method.
 
-    ``gap`` is over the tasks of :func:`.common_tasks`, of a method from a file that lacks some of
-    them over the ``tasks`` that it solved.
+    ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
+    them, over the ``tasks`` that it solved.
     """
     over, tested = shown_gaps(study).set_index("method"), list_against_learner(study)
     single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
@@ -121,8 +121,8 @@ def list_ranking(study: Study) -> Rows:
 def ranked(study: Study) -> list[str]:
     """Return the methods of the ranking in their order.
 
-    By their mean gap, then methods without one that solved every run on some task, by their gap on
-    the first such task; methods from files before all others, and settings behind their method.
+    By mean gap; then methods without a mean gap that solved every run on some task, by the gap on
+    the first such task. Methods from files come first, and settings after their method.
     """
     over, rest = [*shown_gaps(study).method], []
     for method, cells in standings.compared(study).items():
@@ -138,10 +138,10 @@ def ranked(study: Study) -> list[str]:
 
 
 def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
-    """Return the mean gap of one method less the mean gap of another, of :func:`.main_gaps`.
+    """Return the difference of the mean gaps of two methods of :func:`.main_gaps`.
 
-    Its interval is for other runs of both on the same tasks, as those of the ranking; what a method
-    that draws nothing does is exact.
+    The interval is for other runs of both methods on the same tasks; gaps of deterministic methods
+    are exact.
     """
     tasks, exact = standings.common_tasks(study), 0.0
     signs, drawn = [], []
@@ -165,8 +165,7 @@ def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
 
 
 def differences(study: Study) -> dict[str, dict[str, str]]:
-    """Return the differences of the mean gaps of any two of the nearest methods in words, by their
-    names."""
+    """Write the differences of the mean gaps of any two of the nearest methods, by their names."""
     titles = study.methods.title
     names = {str(method): titles[method] for method in standings.main_gaps(study).method[:24]}
     texts: dict[str, dict[str, str]] = {name: {} for name in names.values()}
@@ -252,20 +251,20 @@ CARDS = {
     "first of some": "{who} have the same gap to the {to} ({gap}), the smallest{of}",
     "first": "{who} comes nearest{of} ({gap})",
 }
-"""Who has the smallest gap: of one method, of equal gaps, and with others behind."""
+"""Sentences on the smallest gap, for a single method, for equal gaps, and with others behind."""
 SENTENCES = {
     "interval": "Gap of {who} to the {to}: {interval}{beside}{declared}.",
     "learner": "Gap of the learner: {learner}.",
     "random_search": "Gap of random search: {random_search}{beside_learner}.",
     "planner": "The best planner that uses the reward as a formula has a gap of {planner}.",
 }
-"""The other sentences by what of the finding each needs."""
+"""Further sentences, by the word of the finding that each needs."""
 DECLARED = "; its information is as its author declares"
 
 
 def nearest(study: Study) -> str:
-    """The method with the smallest gap and whether surely so, the learner's place, the best
-    planner, and failed runs: a sentence for each that there is."""
+    """Say which method has the smallest gap, and whether significantly so, the learner's place, the
+    gap of the best planner, and failed runs."""
     finding = who_is_nearest(study)
     if not finding:
         return ""
@@ -277,8 +276,11 @@ def nearest(study: Study) -> str:
 
 
 def who_is_nearest(study: Study) -> dict[str, str]:
-    """Return the words of :func:`nearest` by their place in :data:`SENTENCES`, empty where there is
-    nothing to say; no words at all without a method of :func:`.main_gaps`."""
+    """Return the words for :data:`CARDS` and :data:`SENTENCES`, by their places.
+
+    Empty words for sentences without content; no words at all without a method of
+    :func:`.main_gaps`.
+    """
     tasks = standings.common_tasks(study)
     every = (standings.leaders(standings.main_gaps(study), group) for group in GROUPS)
     by_trial, by_formula, others = every
@@ -316,12 +318,12 @@ def who_is_nearest(study: Study) -> dict[str, str]:
 
 
 def gap_in_words(row: Any) -> str:
-    """Return the gap of a row with its interval in per cent."""
+    """Write the gap of a row with its interval in per cent."""
     return interval(row, "gap", scale=100, unit=" %")
 
 
 def beside_next(study: Study, rows: pd.DataFrame, names: list[str]) -> str:
-    """Say whether the gap of the first is significantly smaller than the gap of the second."""
+    """Say whether the gap of the first row is significantly smaller than the gap of the second."""
     first, second = rows.method[:2]
     test = standings.paired_difference(study, first, second, standings.common_tasks(study))
     if not test.least_p <= LEVEL:
@@ -331,15 +333,15 @@ def beside_next(study: Study, rows: pd.DataFrame, names: list[str]) -> str:
 
 
 def compared_with(gap: float, other: float) -> str:
-    """Compare a gap with another one in words."""
+    """Say whether a gap is larger or smaller than another gap."""
     if abs(gap - other) <= NEGLIGIBLE:
         return "the same as"
     return "larger than" if gap > other else "smaller than"
 
 
 def place_of_learner(learn: pd.DataFrame, tied: int, to: str) -> dict[str, str]:
-    """Return the gap of the learner and, where an optimum is known, its ``standing`` among methods
-    that learn; empty where it is among the ``tied`` nearest."""
+    """Return the gap of the learner in words, and its ``standing`` among methods that learn, if an
+    optimum is known; empty if the learner is among the ``tied`` nearest."""
     behind = learn[standings.is_learner(learn) & (learn.index >= tied)]
     if behind.empty:
         return {"learner": "", "standing": ""}

@@ -1,4 +1,4 @@
-"""Learned rewards and hands beside those that the paper publishes."""
+"""Sections on learned rewards and hands, compared with the published rewards and hands."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
     "published_initial: -; ours_initial: -"
 )
 def list_published(study: Study) -> Rows:
-    """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
+    """List published and our learned rewards of the paper's cells, and their equivalence."""
     for row in beside_paper(study):
         cell = row["cell"]
         if not row["hands"]:
@@ -102,7 +102,7 @@ def list_published(study: Study) -> Rows:
     "difference[] .1"
 )
 def list_hands(study: Study) -> Rows:
-    """Learned rewards by hand sequence, published and ours, where there are several."""
+    """List learned rewards by hand sequence, published and ours, for cells with several."""
     for row in beside_paper(study):
         good = row["cell"].good
         if row["hands"]:
@@ -121,7 +121,7 @@ def list_hands(study: Study) -> Rows:
     "several published sequences.",
 )
 def draw_published(study: Study) -> Parts | None:
-    """Difference of every mean reward to the published one, with interval and margin."""
+    """Draw the differences of mean rewards to published rewards, with intervals and margins."""
     shown = []
     for pair in beside_paper(study):
         cell = pair["cell"]
@@ -168,7 +168,7 @@ def draw_published(study: Study) -> Parts | None:
 
 
 def rewards_reproduced(study: Study) -> str:
-    """Number of published rewards that agree with ours, and undecided ones that are off."""
+    """Say how many of our rewards agree with published rewards, and which undecided ones differ."""
     rows = [row for row in beside_paper(study) if not row["hands"] and row["verdict"]]
     if not rows:
         return ""
@@ -191,7 +191,7 @@ def rewards_reproduced(study: Study) -> str:
 
 
 def changed_hands(study: Study) -> str:
-    """On which tasks the learner's best condition ends with other hands than it began with."""
+    """Say on which tasks the learner's best condition ends with other than its initial hands."""
     changes = []
     for name, task in study.tasks.items():
         learners = [study.cells.get((name, label)) for label in LEARNERS]

@@ -1,4 +1,4 @@
-"""Settings of a method beside each other, for each method that ran with several."""
+"""Section on settings of methods that ran with several settings."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from coartic.estimates import LEVEL
 from coartic.internal.text import counted
 
 MOST_NAMED = 3
-"""Methods whose settings sentences name."""
+"""Most methods whose settings sentences name."""
 BEST, IDENTICAL, LARGER = "smallest gap", "identical in every run", "larger gap"
 UNSURE, UNTESTED = "no significant difference", "the runs are too few, or too alike, to tell"
 FAILED = "some runs failed"
 
 
 def settings_of(study: Study) -> Iterator[tuple[str, dict[str, list[CellRuns]]]]:
-    """Yield the id of each method that ran with several settings, and the cells of its settings on
-    the tasks on which most of these ran."""
+    """Yield the id of each method that ran with several settings, and the cells of its settings, on
+    the tasks that most settings have."""
     compared, methods = standings.compared(study), study.methods
     single = methods.index[methods.index.isin([*compared]) & (methods.parts.map(len) == 1)]
     for base, of_base in methods.loc[single].groupby("base", sort=False):
@@ -43,10 +43,10 @@ def settings_of(study: Study) -> Iterator[tuple[str, dict[str, list[CellRuns]]]]
     "p_holm: p (corrected) .p; runs"
 )
 def list_settings(study: Study) -> Rows:
-    """Mean gap of each setting over the tasks of a method's settings, the smallest gap first.
+    """List the mean gap of each setting of a method, the smallest gap first.
 
-    ``p_holm``: of the test of runs paired by seed (:func:`.paired_difference`) that the gap differs
-    from the smallest gap of the method, corrected for the settings of the method (Holm).
+    ``p_holm`` is of the test of runs paired by seed (:func:`.paired_difference`) that the gap of a
+    setting differs from the smallest gap, corrected over the settings of the method (Holm).
     """
     for base, cells in settings_of(study):
         tasks = tuple(cell.task for cell in next(iter(cells.values())))
@@ -99,7 +99,7 @@ SECOND = "; next {gap} with {setting} ({beside})"
 
 
 def best_settings(study: Study) -> str:
-    """Say which setting of each method is best, and whether it is surely better than the next."""
+    """Say which setting of each method has the smallest gap, and whether significantly so."""
     rows, cards, details = list_settings(study), [], []
     for base, of_method in rows.groupby("method", sort=False):
         is_best = of_method.beside_best.isin([BEST, IDENTICAL])

@@ -1,4 +1,4 @@
-"""The tasks: start configurations and goals (paper, Figure 4), and rewards on them."""
+"""Section on the tasks: start configurations, goals (paper, Figure 4) and rewards."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
     "source: best known from; bound: proven bound"
 )
 def list_tasks(study: Study) -> Rows:
-    """One row a task: rewards of the corrective process alone, with the initial hands and with the
-    best, and the best known reward."""
+    """List the tasks with their best known rewards, and the rewards of the corrective process alone
+    with the initial and the best hands."""
     for name, task in one_by_one(study).items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
         alone = study.sequences(name).reward.dropna()
@@ -45,7 +45,8 @@ def list_tasks(study: Study) -> Rows:
 
 
 def how_long(study: Study) -> str:
-    """Ticks of the corrective process alone, with either hands, and of the best known solutions."""
+    """Say the ticks of the corrective process alone, with its best and the initial hands, and of
+    the best known solutions."""
     rows = list_tasks(study).dropna(subset=["best_hands", "initial", "optimum"])
     if not len(rows):
         return ""

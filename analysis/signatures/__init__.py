@@ -1,5 +1,5 @@
-"""Signatures of coarticulation: how a method's solutions move, beyond their reward.
+"""Signatures of coarticulation in the movements of solutions.
 
-:mod:`~.measures` gives one number for each run, :mod:`~.two_contexts` compares the runs of two
+:mod:`~.measures` computes a number for each run, :mod:`~.two_contexts` compares the runs of two
 tasks.
 """

@@ -1,8 +1,8 @@
-"""Tests of postures at one goal in two contexts, and the distance that they are about.
+"""Posture differences at a goal between two contexts, and their tests.
 
-Configurations mix length unit (base) and rad (joints), as the model's own joint-space
-distance does. All tests permute whole runs between contexts, so they ask nothing of the
-distribution; they take runs as exchangeable if the context did nothing.
+Configurations mix length unit (base) and rad (joints), as the joint-space distance of the model
+does. Permutation tests exchange whole runs, which are exchangeable if the context has no effect;
+they assume no distribution.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from coartic.estimates import RESAMPLES, centred, slices
 from coartic.robot import Array
 
 IN_MEMORY = 500
-"""Divisions or resamples of whole runs at once: thousands of runs would fill the memory."""
+"""Most permutations or resamples of runs in memory at once."""
 
 
 def distance_of_means(first: Array, second: Array) -> float:
-    """Distance between the mean configurations of two contexts, ≥ 0.
+    """Return ‖mean(first) − mean(second)‖, the distance of mean configurations of two contexts.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``. Mixed units (see the module).
+    ``first`` and ``second`` have shape ``(runs, dof)``; length unit and rad mixed.
     """
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
 
 
 def standardised_posture_difference(first: Array, second: Array) -> float:
-    """:func:`distance_of_means` in pooled within-context standard deviations, 0 to ∞.
+    """Return :func:`distance_of_means` in pooled standard deviations within contexts, 0 to ∞.
 
-    The deviation is the root of the total variance (its trace) about each context's own
-    mean, with n₁ + n₂ - 2 degrees of freedom: a multivariate form of Cohen's d (Cohen
-    1988). Where the context does nothing, its expected square is about 1/n₁ + 1/n₂, not 0.
-    NaN where no context has two runs or runs do not differ: there is nothing to divide by.
+    d = ‖m₁ − m₂‖ / s, s² = (Σ‖x − m₁‖² + Σ‖x − m₂‖²) / (n₁ + n₂ − 2),
+
+    a multivariate form of Cohen's d (Cohen 1988). Without an effect of the context the expectation
+    of d² is about 1/n₁ + 1/n₂, not 0. NaN if no context has two runs, or if s = 0.
     """
     freedom = len(first) + len(second) - 2
     if freedom < 1:
@@ -53,12 +53,11 @@ def posture_difference_below(
     *,
     resamples: int = RESAMPLES,
 ) -> float:
-    """Probability of so small a standardised posture difference if it were ``bound`` or more.
+    """Test that the standardised posture difference is below a bound, by the bootstrap.
 
-    The share of bootstrap samples, whole runs drawn within each context, whose
-    :func:`standardised_posture_difference` is at least the bound, the observed one counted. Noise
-    adds to a distance and never takes from it, so that the share is rather too large. NaN where a
-    context has one run.
+    p is the share of bootstrap samples, with runs drawn within each context, whose
+    :func:`standardised_posture_difference` is at least ``bound``; the observed sample counts, too.
+    Noise adds to distances, so that p is rather too large. NaN if a context has a single run.
     """
     if min(len(first), len(second)) < 2:
         return math.nan
@@ -81,11 +80,11 @@ def permutation_p(
     *,
     resamples: int = RESAMPLES,
 ) -> float:
-    """Probability of so large a distance between means if the context did nothing.
+    """Test that :func:`distance_of_means` exceeds chance, by a one-sided permutation test of runs.
 
-    One-sided permutation test over runs of :func:`distance_of_means`; exact where all divisions of
-    the runs are no more than ``resamples``. 0 < p ≤ 1; 1 where no run differs from another; NaN
-    where a context has one run. ``first`` and ``second`` have shape ``(runs, dof)``.
+    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if all
+    permutations are no more than ``resamples``, 1 if all runs are equal, NaN if a context has a
+    single run.
     """
     if min(len(first), len(second)) < 2:
         return math.nan
@@ -108,12 +107,12 @@ def permutation_p(
 
 
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Numbers of the runs in a group, drawn without replacement ``size`` times, (size, chosen)."""
+    """Draw ``chosen`` of ``runs`` without replacement, ``size`` times, shape ``(size, chosen)``."""
     return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
 
 
 def smallest_p(first: int, second: int, resamples: int = RESAMPLES) -> float:
-    """Smallest p that :func:`permutation_p` can give for so many runs in each context."""
+    """Return the smallest p of :func:`permutation_p` for the numbers of runs in two contexts."""
     return 1 / min(math.comb(first + second, first), 1 + resamples)
 
 
@@ -125,28 +124,30 @@ def beyond_p(
     contrast: Sequence[float] | Array = (1.0, -1.0),
     resamples: int = RESAMPLES,
 ) -> float:
-    """Test whether a method's posture difference between contexts exceeds another's, by
+    """Test that a method's posture difference between contexts exceeds another method's, by
     permutation.
 
-    The difference is the length of the sum of mean configurations, each times its number in
-    ``contrast``: their distance for two contexts, the slope for several positions. Within each
-    context the runs of both are divided anew at random, and the statistic is the method's length
-    less the other's.
+    The posture difference is ‖Σ_k c_k m_k‖ for the mean configurations m_k in the contexts and the
+    weights c_k of ``contrast``: the distance of means for two contexts, the slope for several
+    positions. The statistic is the difference of the two methods' posture differences. Permutations
+    exchange the runs of both methods within each context.
 
     Parameters
     ----------
     method, other : sequence of arrays, shape (runs, dof)
-        Configurations in every context, length unit and rad.
+        Configurations in each context, length unit and rad.
     rng : numpy.random.Generator
-        Divides the runs.
+        Generator of the permutations.
     contrast : sequence of float, or array, shape (contexts,)
+        Weight of each context.
     resamples : int
+        Number of permutations.
 
     Returns
     -------
     float
-        Twice the upper tail, as wherever two methods are compared: 0 < p ≤ 1. NaN where a method
-        has one run in a context.
+        p, 0 < p ≤ 1: twice the upper tail, as in all comparisons of two methods. NaN if a method
+        has a single run in a context.
 
     Examples
     --------

@@ -1,9 +1,10 @@
-"""Signatures of coarticulation: one number for each run of a method on a task.
+"""Signatures of coarticulation: a number for each run of a method on a task.
 
-Claims compare them, and families of random tasks count them. In formulas, run i hits goal g at
-configuration q(i, g) after t(i, g) ticks since the goal before; q(i, 0) is the start; c(i, g) are
-the ticks of the corrective process alone with the hands of run i; G is the number of goals. A
-signature has shape ``(n,)``, and is NaN where a run has none.
+Notation: run i hits goal g = 1..G at configuration q(i, g) with hand h(i, g), t(i, g) ticks after
+the goal before; q(i, 0) is the start of the task. The corrective process alone, with the hands of
+run i, takes c(i, g) ticks for goal g. r(q, g, h) are the ticks of a reach by the corrective process
+from q to goal g with hand h, and R(q, g, h) is the configuration at its end. A signature has shape
+``(n,)`` for n runs, and is NaN for a run without this signature.
 """
 
 from __future__ import annotations
@@ -22,18 +23,28 @@ from coartic.tasks.task import hands_of
 
 
 def other(hand: Hand) -> Hand:
-    """The hand that is not chosen."""
+    """Return the other hand."""
     return "right" if hand == "left" else "left"
 
 
 def isolated_reaches(
     task: Task, q: Array, goals: NDArray[np.int64], hands: NDArray[np.int64]
 ) -> tuple[Array, Array]:
-    """Ticks in which hands reach goals from ``q`` by the corrective process alone, and where.
+    """Return r(q, g, h) and R(q, g, h), the ticks and ends of reaches by the corrective process.
 
-    ``q`` has shape ``(..., dof)``; ``goals``, which count from 1, and ``hands``, places in HANDS,
-    have the shape before it or one that spreads to it. 0 ticks and ``q`` where the hand is there;
-    NaN ticks where the corrective process brings it to no hit.
+    Parameters
+    ----------
+    task : Task
+    q : ndarray, shape (..., dof)
+        Configurations at the start, length unit and rad.
+    goals, hands : ndarray of int, shapes that broadcast to (...)
+        Numbers of goals, from 1, and places of hands in HANDS.
+
+    Returns
+    -------
+    (ndarray, shape (...), ndarray, shape (..., dof))
+        Ticks, 0 if the hand is within the goal at the start, NaN if the reach ends without a hit;
+        and configurations at the end.
     """
     shape = q.shape[:-1]
     reached = reach_goals(
@@ -49,12 +60,13 @@ def isolated_reaches(
 
 
 def gain_at_next(runs: Solutions) -> Array:
-    """Ticks that the posture at each goal saves at the next, shape ``(n, G − 1)``.
+    """Return the ticks that the posture at each goal saves on the way to the next, (n, G − 1).
 
-    How much sooner the corrective process reaches the next goal from where base and chosen arm of
-    the run hit this one than from where it would have hit it itself, from the same posture before
-    and with the hands of the run; what the other arm does meanwhile is left out. NaN where the
-    corrective process does not hit.
+    r(q', g + 1, h(i, g + 1)) − r(q'', g + 1, h(i, g + 1)),
+
+    where q' = R(q(i, g − 1), g, h(i, g)) is the posture in which the corrective process would have
+    hit goal g, and q'' is q(i, g) with the joints of the idle arm as in q', so that movements of
+    the idle arm do not count. NaN if a reach ends without a hit.
     """
     task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
@@ -71,12 +83,12 @@ def gain_at_next(runs: Solutions) -> Array:
 
 
 def ticks_slower(runs: Solutions) -> Array:
-    """Ticks by which each goal's hand is slower for that goal alone, shape ``(n, G)``.
+    """Return the ticks by which each chosen hand is slower for its goal alone, shape ``(n, G)``.
 
-    Slower than the hand with which the corrective process alone reaches the goal in the fewest
-    ticks from the posture before; 0 for that hand and one as quick. Where it is above 0, the choice
-    of hand serves other goals than its own. Infinite where the corrective process does not reach
-    the goal with the hand.
+    r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h).
+
+    A hand with more than 0 ticks is not the choice for this goal alone. Infinite if the reach with
+    the chosen hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
     alone = np.full((len(HANDS), *runs.hands.shape), np.inf)
@@ -90,14 +102,15 @@ def ticks_slower(runs: Solutions) -> Array:
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """Share of the way to its next goal that a hand covers while it waits, shape ``(G,)``.
+    """Return the share of the way to its next goal that the idle hand covers, shape ``(G,)``.
 
-    (d_held - d)/d_initial: d is the distance of the hand that is not chosen to the next goal it
-    will hit, at the moment the current goal is hit; d_held the same if the arm had kept its joints
-    since its own last hit (since the start, before any), with the base where it is; d_initial that
-    of ``initial`` (the corrective process alone with the task's hands). -∞ to ∞: 0 where the arm
-    keeps still, whatever the base does (always under the exploration conditions 1 and 3). NaN
-    where the other hand hits no later goal.
+    (d_held(g) − d(g)) / d_initial(g),
+
+    where d(g) is the distance of the idle hand to the next goal of this hand at the hit of goal g;
+    d_held(g) is this distance if the idle arm had kept its joints since its own last hit (or the
+    start); and d_initial(g) is the distance at goal g in ``initial``, the corrective process alone
+    with the task's hands. 0 if the arm keeps still, whatever the base does (always under
+    exploration conditions 1 and 3). NaN if the idle hand hits no later goal.
     """
     now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
@@ -121,28 +134,29 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
 @dataclass(frozen=True)
 class Signature:
-    """A signature of coarticulation and its words."""
+    """A signature of coarticulation, with its words."""
 
     each: Callable[[Solutions], Array]
-    """The signature of each run, shape ``(n,)``; NaN where a run has none."""
+    """Function of solutions that returns the signature of each run, shape ``(n,)``, or NaN."""
     words: str
 
     def of(self, runs: Solutions) -> Array:
-        """The signature of each run that has one, shape ``(k,)``."""
+        """Return the signature of the k runs that have it, shape ``(k,)``."""
         values = self.each(runs)
         return values[np.isfinite(values)]
 
 
 def hand(runs: Solutions) -> Array:
-    """Share of the goals g < G at which the hand is not as in isolation."""
+    """Return 1 − mean over g < G of a(i, g), for a(i, g) of :func:`as_in_isolation`."""
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
 def as_in_isolation(runs: Solutions) -> Array:
-    """a(i, g) = [r(h) = min over hands of r], for the ticks r of a reach to g from q(i, g - 1).
+    """Return a(i, g): 1 if the chosen hand is the fastest for goal g alone, or else 0.
 
-    Shape ``(n, G)``; NaN on a task for one hand.
+    a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)]. Shape ``(n, G)``;
+    NaN on a task for one hand.
     """
     if not runs.runs or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals)), np.nan)
@@ -150,7 +164,7 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 
 def other_arm(runs: Solutions) -> Array:
-    """The mean of :func:`preshaping_of_the_other_arm` over the goals that have it."""
+    """Return the mean of :func:`preshaping_of_the_other_arm` over goals, without NaN."""
     values = preshaping_of_the_other_arm(runs)
     means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
     # The last goal counts as a missing value: the order of summation decides the last bit.
@@ -160,9 +174,9 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def preshaping_of_the_other_arm(runs: Solutions) -> Array:
-    """(d_held(i, g) - d(i, g)) / d_initial(g), g < G, as :func:`preshaping` says.
+    """Return :func:`preshaping` of each run at goals g < G, shape ``(n, G − 1)``.
 
-    Shape ``(n, G - 1)``; NaN on a task for one hand, and without an initial solution.
+    NaN on a task for one hand, and without an initial solution.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:
@@ -171,7 +185,7 @@ def preshaping_of_the_other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """r(i, g + 1) - r'(i, g + 1), mean over g < G, as :func:`gain_at_next` says."""
+    """Return the mean of :func:`gain_at_next` over goals g < G."""
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
     return np.asarray(gain_at_next(runs).mean(axis=1))
@@ -202,6 +216,6 @@ SIGNATURES = {
         "ticks by which the whole task is shorter than the corrective process's",
     ),
 }
-"""Every signature by its name in claims, in the order of the tables: ``first`` is t(i, 1) -
-c(i, 1), ``whole`` Σ_g c(i, g) - t(i, g); both are NaN where the corrective process fails with the
-hands."""
+"""Signatures by their names in claims: ``first`` is t(i, 1) − c(i, 1), and ``whole`` is
+Σ_g c(i, g) − t(i, g); NaN if the corrective process does not complete the task with the hands of
+the run."""

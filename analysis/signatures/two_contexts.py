@@ -1,7 +1,7 @@
-"""One goal in two contexts: hit on the way to different successors.
+"""Comparison of postures at a goal in two contexts, which differ in the goals that follow.
 
-Anticipatory coarticulation is a difference between contexts that share all that comes
-before (Shah, Barto & Fagg 2013, tasks ascending and descending, which share goal 1).
+Anticipatory coarticulation is a difference between contexts that share everything up to this goal
+(Shah, Barto & Fagg 2013, tasks ascending and descending, which share goal 1).
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ from coartic.tasks.optima import KEPT
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Pairs of tasks that differ only after their first goals, and how many they share.
+    """Return pairs of tasks that differ only after their first goals, with the number of shared
+    goals.
 
-    Shared goals count that are followed by another goal in both tasks.
+    Shared goals count if another goal follows in both tasks.
     """
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
@@ -45,22 +46,22 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
 
 
 def movable(task: Task, hand: Hand) -> Array:
-    """Indices of the joints that can move a hand: unlocked base coordinates, its arm."""
+    """Return the indices of the joints that can move a hand: free base coordinates and its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
-    """The motor-equivalent and the other part of a difference between configurations.
+    """Return the motor-equivalent part and the other part of a difference of configurations Δq.
 
-    ``difference`` has shape ``(k,)``, length unit and rad mixed; ``jacobian`` ``(2, k)``, of the
-    joints that can move. Each part, ≥ 0, is its length
-    over the root of the dimension of its space, so that a difference in a random direction has
-    equal parts. A difference between contexts is motor-equivalent where the first exceeds the
-    second: the same subgoal reached by another posture. Caveat: hits of one disc bound the
-    second part, and nothing bounds the first. NaN for a space of dimension 0. Source: Mattos,
-    Latash and colleagues, Experimental Brain Research (doi:10.1007/s00221-015-4327-4,
-    10.1007/s00221-018-5215-5).
+    ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, for orthonormal bases N of the null space of the Jacobian
+    J and R of the row space. ``difference`` Δq has shape ``(k,)``, length unit and rad mixed,
+    ``jacobian`` J shape ``(2, k)``, for the k joints that can move. A random direction has equal
+    parts in expectation. A difference between contexts is motor-equivalent if the first part
+    exceeds the second: another posture with the same position of the hand. Caveat: the radius of
+    the goal bounds the second part, and nothing bounds the first. NaN for a space of dimension 0.
+    Source: Mattos, Latash and colleagues, Experimental Brain Research
+    (doi:10.1007/s00221-015-4327-4, 10.1007/s00221-018-5215-5).
     """
     equivalent, other = (
         float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
@@ -71,16 +72,16 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 
 @dataclass(frozen=True)
 class TwoContexts:
-    """Runs of one method that hit the same goal with the same hand before other successors.
+    """Runs of a method that hit the same goal with the same hand, before different next goals.
 
     Parameters
     ----------
     first, second : Solutions
-        Runs on two tasks that share the goal, as ``study.executed(task, method)`` gives them.
+        Runs on two tasks that share the goal, as ``study.executed(task, method)`` returns them.
     goal : int
         Number of the goal, from 1.
     hand : {"left", "right"}
-        Runs that hit the goal with the other hand do not count.
+        Hand that hits the goal; runs with the other hand do not count.
     """
 
     first: Solutions
@@ -90,7 +91,7 @@ class TwoContexts:
 
     @property
     def tasks(self) -> tuple[Task, Task]:
-        """The tasks of both contexts."""
+        """Tasks of the two contexts."""
         return self.first.task, self.second.task
 
     @property
@@ -100,10 +101,8 @@ class TwoContexts:
 
     @cached_property
     def configurations(self) -> tuple[Array, Array]:
-        """Configurations of the runs that hit the goal with the hand, in either context.
-
-        Shape ``(runs, dof)``, length unit and rad.
-        """
+        """Configurations at the goal in each context, shape ``(runs, dof)``, length unit and
+        rad."""
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
             runs.configurations[runs.hands[:, goal] == hand, goal]
@@ -113,28 +112,28 @@ class TwoContexts:
 
     @property
     def in_both(self) -> bool:
-        """Whether some runs of either context hit the goal with the hand."""
+        """True if both contexts have runs that hit the goal with the hand."""
         return all(map(len, self.configurations))
 
     @property
     def n(self) -> int:
-        """Runs of both."""
+        """Number of runs in both contexts."""
         return sum(map(len, self.configurations))
 
     @property
     def posture_difference(self) -> float:
-        """Posture difference between contexts: distance of the mean postures, length unit and
-        rad."""
+        """Distance of the mean postures in both contexts, length unit and rad mixed."""
         return distance_of_means(*self.configurations)
 
     @property
     def standardised_posture_difference(self) -> float:
-        """Posture difference in pooled SDs of the runs; NaN where no runs differ."""
+        """Posture difference in pooled SDs within contexts; NaN if runs do not differ."""
         return standardised_posture_difference(*self.configurations)
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Parts of the difference of mean postures: leaving the hand in place, and moving it."""
+        """Parts of the posture difference that leave the hand in place and that move the hand
+        (:func:`motor_equivalence`)."""
         task, joints = self.first.task, movable(self.first.task, self.hand)
         posture = np.concatenate(self.configurations).mean(axis=0)
         first, second = (configurations.mean(axis=0) for configurations in self.configurations)
@@ -143,15 +142,15 @@ class TwoContexts:
 
     @cached_property
     def p(self) -> float:
-        """P-value of the permutation test over runs; NaN where a context has one run."""
+        """P-value of the permutation test of runs; NaN if a context has a single run."""
         return permutation_p(*self.configurations, self._rng("context dependence"))
 
     def p_beyond(self, other: TwoContexts) -> float:
-        """P-value of the test that the posture difference exceeds that of others; NaN where a
-        context has one run."""
+        """Return the p-value of the test that the posture difference exceeds the posture difference
+        of another method; NaN if a context has a single run."""
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:
-        """A generator for each test, the same in every folder."""
+        """Return the random generator of a test, the same in every folder."""
         where = f"goal {self.goal}, {self.hand} hand, against {self.second.task.name}"
         return np.random.default_rng([SEED, zlib.crc32(f"{test} {where}".encode())])

@@ -1,1 +1,1 @@
-"""Estimates with intervals, tests, and equivalence; docs/statistics.md says which is used where."""
+"""Statistics of the report: means with intervals, tests, equivalence (docs/statistics.md)."""

@@ -1,9 +1,8 @@
-"""Tests of means and shares, and Holm's correction for many of them.
+"""Tests of means and shares, and Holm's correction for several tests.
 
-A mean is tested against a number or another mean by the bootstrap, paired differences by flips of
-their signs, a share by the exact binomial test, counts by Fisher's exact test. Postures have
-permutation tests of their own, in :mod:`coartic.analysis.signatures`. Samples, numbers taken as
-known, and seeds: as in :mod:`coartic.estimates`.
+Means have bootstrap tests, paired differences sign-flip tests, shares exact binomial tests, counts
+Fisher's exact test; permutation tests of postures are in :mod:`coartic.analysis.signatures`.
+Samples, exact numbers and seeds are as in :mod:`coartic.estimates`.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 16;
 A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
@@ -45,24 +44,24 @@ def bootstrap_test(
     *,
     resamples: int = RESAMPLES,
 ) -> Estimate:
-    """Test of equal means by the bootstrap: the paper's own kind of test.
+    """Test the difference of two means, or of a mean and a number, by the bootstrap.
 
-    Efron & Tibshirani (1993), Algorithm 16.2: every sample is shifted to the mean 0 and resampled,
-    and the statistic is the difference of means over its standard error, with a variance for each
-    sample. Against a plain number it is their one-sample test (section 16.4). The paper cites the
-    book without naming the statistic. ``"greater"``: one-tailed, the mean of ``first`` is higher.
-    Unlike in the book, the p-value is (1 + resamples at least as extreme) / (1 + resamples), never
-    0 (Davison & Hinkley 1997): with the default, 0.0001 is the smallest there is.
+    Algorithm 16.2 of Efron & Tibshirani (1993), the book that the paper cites: every sample is
+    shifted to the mean 0 and resampled, and the statistic is the difference of means over its
+    standard error, with a variance for each sample. Against a number, their one-sample test
+    (section 16.4). Unlike in the book, p = (1 + resamples at least as extreme) / (1 + resamples),
+    never 0 (Davison & Hinkley 1997): the smallest p is 0.0001 by default. ``"greater"``:
+    one-tailed, the mean of ``first`` is higher.
 
-    Without spread in any sample p is that of the exact test of so many values, by signs or by
-    exchange. NaN with fewer than two values in a sample, or without spread and difference.
+    Without spread in any sample, p is the p-value of the exact test of as many values, by signs or
+    by exchange. NaN with fewer than two values in a sample, or without spread and difference.
     """
     samples = samples_of(first, second)
     difference = float(samples[0].mean() - sum(other.mean() for other in samples[1:]))
     n = tuple(map(len, samples))
     shifted = list(map(centred, samples))
     size = max(np.abs(values).max() for values in shifted)
-    # No less is credible than an exact test of so few values could give: by signs, or by exchange.
+    # The smallest p of an exact test of as many values, by signs or by exchange, is a bound.
     tails = 2 if alternative == "two-sided" else 1
     ways = math.comb(sum(n), n[0]) if len(n) > 1 else 2 ** n[0]
     least = max(tails / ways, 1 / (1 + resamples))
@@ -82,7 +81,7 @@ def bootstrap_test(
             means = drawn.mean(axis=1, keepdims=True)
             sums[part] += sign * means[:, 0]
             variances[part] += drawn.var(axis=1, ddof=1, mean=means) / len(values)
-    # What is rounding is none: resamples of equal values have no spread, means can be equal.
+    # Rounding is neither spread nor difference: resamples of equal values, equal means.
     sums[np.abs(sums) < NEGLIGIBLE * size] = 0.0
     variances[variances < (NEGLIGIBLE * size) ** 2] = 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -96,11 +95,10 @@ def bootstrap_test(
 
 
 def sign_flip_test(differences: ArrayLike) -> Estimate:
-    """Permutation test of paired differences (n,): each may change its sign.
+    """Test paired differences, shape ``(n,)``, by permutations of their signs, two-tailed.
 
-    Exact in level where the differences are symmetric about 0, as they are if within each
-    pair the two are exchangeable. All 2^n signs are enumerated where there are no more than
-    :data:`RESAMPLES` (13 pairs), otherwise as many are drawn. NaN with fewer than two pairs.
+    The level is exact if the two members of a pair are exchangeable. All 2^n signs are enumerated
+    up to :data:`RESAMPLES` (13 pairs), and as many are drawn beyond. NaN with fewer than two pairs.
     """
     values = vector(differences)
     mean, n = float(values.mean()), (len(values),)
@@ -122,9 +120,9 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
 
 
 def share_test(count: int, total: int, share: float, alternative: Alternative) -> Estimate:
-    """Exact binomial test of ``count`` of ``total`` runs against a share (0 to 1).
+    """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
-    The estimate is the share seen less that one.
+    The value of the estimate is the difference ``count / total - share``.
     """
     from scipy import stats  # as in estimates
 
@@ -133,12 +131,12 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
 
 
 def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
-    """Adjusted p-values of a family of tests (Holm 1979), in the order given.
+    """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
-    Those at or below α are rejected with a family-wise error rate of at most α, whatever
-    the dependence. NaN, a test that could not be made, stays NaN and does not count; with a
-    ``family``, the number of tests that were planned, those that are missing count as p = 1.
-    Raises ValueError for a p-value outside 0 to 1, and for fewer tests planned than made.
+    Rejecting adjusted p-values at or below α has a family-wise error rate of α at most, whatever
+    the dependence. NaN, a missing test, stays NaN and does not count, unless ``family`` says the
+    number of planned tests: then missing tests count as p = 1. Raises ValueError for a p-value
+    outside 0 to 1, and for fewer planned tests than p-values.
     """
     p = np.asarray(p_values, dtype=np.float64)
     if ((p < 0) | (p > 1)).any():
@@ -158,8 +156,8 @@ def equivalence(estimate: Estimate, margin: float) -> Equivalence:
     """Compare the interval of a difference with ±margin: two one-sided tests at level 2.5 %
     (TOST; D. J. Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15).
 
-    Equivalent where the interval lies within the margin, different where it lies outside,
-    undecided where it does neither or there is none.
+    Equivalent if the interval lies within the margin, different if it lies outside, or else
+    undecided.
     """
     if -margin <= estimate.low and estimate.high <= margin:
         return "equivalent"
@@ -171,11 +169,11 @@ def equivalence(estimate: Estimate, margin: float) -> Equivalence:
 def difference_to_published(
     ours: ArrayLike, published: float, sd: float | None, runs: int
 ) -> Estimate:
-    """Our mean less the published mean, with Welch's interval by the published SD and number of
-    runs.
+    """Return our mean less the published mean, with Welch's interval from the published SD and
+    number of runs.
 
-    Where no SD is published (None) the published mean is taken as exact, and the interval is
-    Student's. No interval for a single run; a point where no sample has any spread.
+    Without a published SD (None) the published mean counts as exact, and the interval is Student's.
+    No interval for a single run; an interval of no length without spread in any sample.
     """
     values = vector(ours)
     n, value = len(values), float(values.mean()) - published

@@ -1,15 +1,14 @@
-"""Means over tasks: over those that there are, and for others like them.
+"""Means over tasks, with intervals for other runs on the same tasks or for other tasks.
 
-Over given tasks, every task counts alike, however many runs it has, and runs are resampled within
-their task; the interval is about other runs on the same tasks.
+For other runs on the same tasks, all tasks have the same weight, whatever their number of runs, and
+the bootstrap resamples runs within tasks.
 
-A sample of tasks is runs within instances within families. Instances are drawn anew, and so are
-runs: a mean over few instances is uncertain by the instances, however many runs each has. Families
-are given and count alike. Intervals are of a hierarchical bootstrap (A. C. Davison & D. V. Hinkley
-1997, Bootstrap Methods and their Application, section 3.8): instances are drawn with replacement
-within their family, then runs within each instance drawn. A mixed model is not used: gaps to an
-optimum are skewed and end at 0, methods that draw nothing have no spread over runs, and the spread
-of the others differs by a factor of ten between tasks.
+For other tasks, the sample has runs within instances within families. The bootstrap is hierarchical
+(A. C. Davison & D. V. Hinkley 1997, Bootstrap Methods and their Application, section 3.8): it
+resamples instances within families, then runs within instances. Families are fixed and have the
+same weight. A mixed model does not fit: gaps to an optimum are skewed and bounded by 0,
+deterministic methods have no spread over runs, and the spread of other methods differs by a factor
+of ten between tasks.
 """
 
 from __future__ import annotations
@@ -25,14 +24,14 @@ from coartic.estimates import FEWER_RESAMPLES, Estimate
 from coartic.robot import Array
 
 Runs = tuple[Array, ...]
-"""Scores of the runs (n,) on an instance; of two methods, whose difference counts: first less
-second."""
+"""Scores of the runs on an instance, shape ``(n,)``; two arrays for the difference of two methods,
+first less second."""
 Scores = Mapping[str, Sequence[Runs]]
-"""Scores of the runs on each instance, by family."""
+"""Scores of each instance, by family."""
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
-    """Mean over given tasks of the mean over runs, with stratified BCa interval."""
+    """Return the mean over tasks of the mean over runs, with its stratified BCa interval."""
 
     def statistic(*strata: Array, axis: int = -1) -> Array:
         return np.asarray(sum(runs.mean(axis) for runs in strata) / len(strata))
@@ -41,18 +40,18 @@ def task_mean(values: Iterable[ArrayLike]) -> Estimate:
 
 
 def value(runs: Runs) -> float:
-    """Score of an instance: the mean over its runs, or the difference of two means."""
+    """Return the score of an instance: the mean over its runs, or the difference of two means."""
     return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
 
 
 def other_tasks(scores: Scores) -> Estimate:
-    """Mean over families of the mean over instances of the mean over runs, for other tasks.
+    """Return the mean over families, instances and runs, with its interval for other tasks.
 
     Parameters
     ----------
     scores : mapping of str to sequence of tuples of arrays
-        By family, for each instance the scores of its runs in a tuple of one array ``(runs,)``; of
-        two arrays where the difference of two methods counts, first less second.
+        For each family, and each instance, the scores of its runs: a tuple of one array, shape
+        ``(runs,)``, or of two arrays for the difference of two methods, first less second.
 
     Returns
     -------
@@ -73,10 +72,11 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Notes
     -----
-    The percentile interval, wider by √(k / (k − 1)) for the k instances of a family: by so much
-    k draws of k fall short of the spread of its mean. It is a little too wide where few runs
-    vary much (their noise is in the instances' means already), and ends at what the runs can
-    make at all. No interval where a family has fewer than three instances.
+    A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, as the
+    bootstrap underestimates the spread of a mean by this factor. The interval is a little too wide
+    for few runs with much noise, which the means of instances contain already, and does not exceed
+    the least and greatest means of the runs. No interval for a family with fewer than three
+    instances.
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
@@ -109,6 +109,6 @@ def other_tasks(scores: Scores) -> Estimate:
 
 
 def greatest_value(runs: Runs, sign: int) -> float:
-    """Greatest value that an instance's runs can make, or (``sign`` -1) that less it can."""
+    """Return the greatest score of an instance by single runs; minus the least for ``sign`` -1."""
     signs = (sign, -sign)
     return math.fsum(float((s * of_runs).max()) for s, of_runs in zip(signs, runs, strict=False))

@@ -1,7 +1,7 @@
-"""Running times: costs at which runs reach targets.
+"""Running times: the costs at which runs reach targets, after COCO (Hansen et al. 2021).
 
-After COCO (Hansen et al. 2021). The ECDF of running times is the share of pairs of run and target
-that are reached within a budget. It is exact, not read off a grid.
+The ECDF of running times is the share of pairs of run and target reached within a budget, exact at
+every budget.
 """
 
 from __future__ import annotations
@@ -26,13 +26,15 @@ from coartic.robot import Array
 
 _MOST_DRAWN = 20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
 RunningTimes = Sequence[Array]
-"""Running times of one method: for each task the cost at which every run reached every target,
-shape ``(runs, targets)``; infinite where the target is not reached."""
+"""Running times of a method: for each task the cost at which each run reaches each target, shape
+``(runs, targets)``; infinite for a target that the run does not reach."""
 
 
 def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Running times of all pairs of run and target in ascending order, their weights, which sum to
-    1, and the number of the run of each; without pairs that are not reached."""
+    """Return the finite running times in ascending order, with their weights and numbers of runs.
+
+    The weights of all pairs of run and target, also of pairs that are not reached, sum to 1.
+    """
     values = np.concatenate([of_task.ravel() for of_task in times])
     order = np.argsort(values, kind="stable")
     order = order[np.isfinite(values[order])]
@@ -42,8 +44,10 @@ def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Budgets at which the share of targets reached rises, and the share from there on; an infinite
-    budget and a share of 0 where none is reached."""
+    """Return the budgets at which the share of reached targets rises, and the shares.
+
+    An infinite budget and a share of 0 if no target is reached.
+    """
     values, weights, _ = pairs(times)
     if not len(values):
         return np.array([math.inf]), np.zeros(1)
@@ -52,16 +56,15 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 
 def share_reached(times: RunningTimes) -> float:
-    """Share of targets that are reached in the end."""
+    """Return the share of targets that runs reach in the end."""
     return float(pairs(times)[1].sum())
 
 
 def budget_for(times: RunningTimes, share: float) -> Estimate:
-    """The least budget within which a share of the targets is reached; infinite without any.
+    """Return the least budget that reaches a share of the targets, infinite if no budget does.
 
-    With its percentile interval: runs are drawn anew within their task, and the tasks stay. It is
-    not widened as means over tasks are, as a budget can be infinite. No interval where a task has
-    too few runs.
+    The percentile interval is of the bootstrap over runs within tasks, without widening, as budgets
+    can be infinite. No interval if a task has too few runs.
     """
     values, weights, runs = pairs(times)
 
@@ -74,16 +77,16 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     if min(sizes) < FEWEST:
         return Estimate(value)
     drawn, at_once = draws(sizes), 1 + IN_CACHE // (1 + len(values))
-    anew = [budgets(drawn[part]) for part in slices(len(drawn), at_once)]
-    low, high = np.quantile(np.concatenate(anew), TAILS, method="inverted_cdf")
+    resampled = [budgets(drawn[part]) for part in slices(len(drawn), at_once)]
+    low, high = np.quantile(np.concatenate(resampled), TAILS, method="inverted_cdf")
     return Estimate(value, float(low), float(high))
 
 
 @lru_cache(maxsize=4)  # methods mostly have as many runs as another
 def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
-    """How often each run is drawn within its task, a row for each resample.
+    """Return the number of times that each resample draws each run, shape ``(resamples, runs)``.
 
-    A byte each, as there may be many runs; none is drawn 256 times.
+    A byte is enough: no run is drawn 256 times.
     """
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MOST_DRAWN // sum(sizes), 200))

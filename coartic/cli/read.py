@@ -98,7 +98,7 @@ def trace(
         return
     if table not in tables or table not in TABLES:
         raise CoarticError(unknown("table", table, tables))
-    frame, results = traced.rows_of(tables[table]), tables[table].parents[2]
+    frame, results = traced.read_table(tables[table]), tables[table].parents[2]
     # A report may lie elsewhere.
     study = load(results) if (results / RUNS_FILE).is_file() else None
     frame.attrs = shown_names(study) if study else {}
