@@ -149,7 +149,7 @@ def test_groups_are_corrected_apart():
     """A claim that is not judged counts in its group as one with p = 1."""
     findings = found(True, 0.02), found(True, 0.001), None
     papers = [(finding, {"group": "paper"}) for finding in findings]
-    groups = ("beside", "families") * 4
+    groups = ("comparison", "families") * 4
     others = [(found(True, 0.0001), {"group": group}) for group in groups]
     adjusted = judged(*papers, *others).p_holm.tolist()
     assert adjusted[:2] == pytest.approx([0.04, 0.003])

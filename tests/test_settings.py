@@ -45,7 +45,7 @@ def test_each_setting_is_tested_against_the_smallest_gap_of_its_method():
     assert rows.index.tolist() == [f"{EC1} noise_sd=0.1", f"{EC1} noise_sd=0.2", EC1]
     assert rows.setting.tolist() == ["σ 0.1", "σ 0.2", "σ 0.05 (default)"]
     assert rows.gap.tolist() == pytest.approx([10.5 / 292, 11.25 / 292, 14.5 / 292])
-    assert rows.beside_best.tolist() == [BEST, UNSURE, LARGER]
+    assert rows.comparison.tolist() == [BEST, UNSURE, LARGER]
     assert exact_p(OFF) > 0.05
     assert rows.p_holm.tolist()[1:] == pytest.approx([exact_p(OFF), 2 * 2 / 2**8])
 
@@ -53,13 +53,13 @@ def test_each_setting_is_tested_against_the_smallest_gap_of_its_method():
 def test_few_runs_tell_nothing():
     """Of five pairs 2 of 32 signs are as extreme at least."""
     rows = TABLES["settings"](study(of_one_task(BASE[:5], BASE[:5] - 9)))
-    assert rows.beside_best.tolist() == [BEST, UNTESTED]
+    assert rows.comparison.tolist() == [BEST, UNTESTED]
 
 
 def test_settings_with_the_same_rewards_are_called_identical():
     """One arm has no hand to explore: with the same seeds ε changes nothing."""
     rows = TABLES["settings"](study(of_one_task(BASE - 4, BASE, BASE)))
-    assert rows.beside_best.tolist() == [BEST, IDENTICAL, LARGER]
+    assert rows.comparison.tolist() == [BEST, IDENTICAL, LARGER]
     assert rows.p_holm.isna().tolist() == [True, True, False]
     assert rows.p_holm.iloc[2] == pytest.approx(2 / 2**8)
     sentence = settings.best_settings(study(of_one_task(BASE, BASE)))
@@ -73,7 +73,7 @@ def test_an_own_method_beside_a_grid_takes_no_test_away():
     alone = study(grid)
     both = study(grid | of_one_task(BASE - 2, method=OWN))
     labels = [f"{EC1} noise_sd=0.1", f"{EC1} noise_sd=0.2"]
-    columns = ["beside_best", "p_holm", "gap"]
+    columns = ["comparison", "p_holm", "gap"]
     assert TABLES["settings"](both)[columns].equals(TABLES["settings"](alone)[columns])
     assert TABLES["settings"](both).index.tolist() == labels
     assert TABLES["ranking"](both).index.tolist() == [OWN, *labels]
@@ -94,7 +94,7 @@ def test_a_setting_with_a_failed_run_has_no_gap():
     runs = study(rewards).stored
     runs.loc[runs.setting == "noise_sd=0.1", "status"] = ["timeout"] + ["ok"] * 7
     rows = TABLES["settings"](study_of(runs, optima=made_up_optima("ascending")))
-    assert rows.beside_best.tolist() == [BEST, LARGER, FAILED]
+    assert rows.comparison.tolist() == [BEST, LARGER, FAILED]
     assert rows.gap.isna().tolist() == [False, False, True]
 
 

@@ -30,11 +30,11 @@ class Claim:
     test: str
     """The test, in words."""
     judge: Callable[[Reader], Finding]
-    group: Literal["paper", "beside", "families", "exact"] = "beside"
+    group: Literal["paper", "comparison", "families", "exact"] = "comparison"
     """Group of claims over which p-values are corrected. ``paper``: claims on the paper's seven
-    cells; ``beside``: claims that compare these cells with other runs, apart, so that they change
-    no verdict on the seven cells; ``families``: claims on families of random tasks; ``exact``: no
-    correction, as the claim is counted without a test."""
+    cells; ``comparison``: claims that compare these cells with other runs, apart, so that other
+    runs change no verdict on the seven cells; ``families``: claims on families of random tasks;
+    ``exact``: no correction, as the claim is counted without a test."""
     fitted: bool = False
     """True if the claim rests on goals that the paper does not publish."""
     sets: str = ""

@@ -158,7 +158,7 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
         more = min(does.mean() - of_random_search.mean(), does.mean() - margins.FEW)
         tests.append(Estimate(more, p=p, n=(total, len(of_random_search))))
         against.append(share_test(count, total, margins.FEW, "less"))
-        parts.append(f"{task} {who_is(label)}: {count} of {total} runs")
+        parts.append(f"{read.title(task)} {who_is(label)}: {count} of {total} runs")
         if count:
             ticks = number(chosen[label][does].mean(), 0)
             parts[-1] += f", slower for these goals by {ticks} ticks"

@@ -18,9 +18,7 @@ that verdicts do not change with the other runs of a folder.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
-from dataclasses import replace
 
 import pandas as pd
 
@@ -52,17 +50,12 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> pd.DataFrame:
     """
     groups: dict[str, dict[str, tuple[str, str, Finding]]] = {}
     rows = []
-    ids = "|".join(re.escape(name) for name in sorted(study.tasks, key=len, reverse=True))
-    task_name = re.compile(rf"(?<![\w.-])({ids})(?![\w-]|\.\w)")
     for claim in claims:
         read = Reader(study)
         try:
             finding = claim.judge(read)
         except MissingError as missing:
             finding, read.run_ids = Finding(None, str(missing)), []
-        # People's names of tasks in place of their ids.
-        evidence = task_name.sub(lambda match: study.tasks[match[1]].label, finding.evidence)
-        finding = replace(finding, evidence=evidence)
         groups.setdefault(claim.group, {})[claim.id] = claim.text, claim.test, finding
         run_ids = " ".join(dict.fromkeys(read.run_ids))
         failed, lacks_runs = tuple(dict.fromkeys(read.failed)), finding.holds is None

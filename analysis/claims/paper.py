@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from statistics import mode
 
 import numpy as np
@@ -81,7 +82,7 @@ def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
         excess = ways / shortest - 1
         most = max(most, float(excess.max()))
         each = ", ".join(f"{share:.1%}" for share in excess)
-        parts.append(f"{name} {each} (in all {ways.sum() / shortest.sum() - 1:.1%})")
+        parts.append(f"{task.label} {each} (in all {ways.sum() / shortest.sum() - 1:.1%})")
     return Finding(
         most <= margins.CLOSE,
         f"Excess of each subtask over the shortest path: {'; '.join(parts)}",
@@ -142,7 +143,9 @@ def corrected_less_later(read: Reader, cells: Cells) -> Finding:
         runs, goals = read.runs(task, label), len(read.task(task).goals)
         movements = (runs.trials - 1) * goals / TENTHS
         early, late, last = (
-            Measurement(task, who_is(label), shares.to_numpy(np.float64), f"{words} {when}")
+            Measurement(
+                read.title(task), who_is(label), shares.to_numpy(np.float64), f"{words} {when}"
+            )
             for shares, when in (
                 (runs.early_corrections / movements, "first tenth of the trials"),
                 (runs.late_corrections / movements, "last tenth of the trials"),
@@ -168,7 +171,7 @@ def resemblance(read: Reader, task: str) -> Measurement:
     before = distance(read.initial_execution(task))
     shares = np.array([1 - distance(run) / before for run in learned])
     return Measurement(
-        task, who_is(EC1), shares,
+        read.title(task), who_is(EC1), shares,
         "share of the distance of the initial solution to the plan of minimum squared joint "
         "displacement that learning has covered (postures at the goals)",
     )  # fmt: skip
@@ -211,10 +214,10 @@ def most_do(words: str, does: Sequence[bool], *, claimed: bool = True) -> Findin
     return Finding(fewer.value < 0, words, (fewer,), (more,))
 
 
-def runs_that(task: str, label: str, what: str, does: Sequence[bool], hands: list[str]) -> str:
+def runs_that(title: str, label: str, what: str, does: Sequence[bool], hands: list[str]) -> str:
     """Say how many runs do something, with the hand sequences of all runs."""
     each = tally(Counter(hands))
-    return f"{task} {who_is(label)} {what}: {sum(does)} of {len(does)} runs ({each})"
+    return f"{title} {who_is(label)} {what}: {sum(does)} of {len(does)} runs ({each})"
 
 
 def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
@@ -238,9 +241,10 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
         n=(total, of_published),
         p=float(stats.fisher_exact(table).pvalue),
     )
+    words = runs_that(read.title(task), label, hands, does, learned)
     return Finding(
         margins.FEW < share < margins.MOST,
-        f"{runs_that(task, label, hands, does, learned)}, {low:.0%} to {high:.0%} of all (95 %); "
+        f"{words}, {low:.0%} to {high:.0%} of all (95 %); "
         f"published {published.runs} of {of_published}{' (derived)' * published.derived_runs}",
         (within,),
         (unlike,),
@@ -252,10 +256,10 @@ def no_reversal(read: Reader) -> Finding:
     learned, q0 = read.hands(TASK_1, EC2), read.task(TASK_1).q0
     runs = [run for run in read.cell(TASK_1, EC2).runs if run.hands == "RRLR"]
     if not runs:
-        raise MissingError(f"no run of EC2 on {TASK_1} learned RRLR")
+        raise MissingError(f"no run of EC2 on {read.title(TASK_1)} learned RRLR")
     along = [np.append(q0[0], run.configurations[:, 0]) for run in runs]  # the base, length unit
     rightward = [bool((np.diff(x) > 0).all()) for x in along]
-    words = runs_that(TASK_1, EC2, "RRLR rightward", rightward, learned)
+    words = runs_that(read.title(TASK_1), EC2, "RRLR rightward", rightward, learned)
     return most_do(words, rightward)
 
 
@@ -263,17 +267,18 @@ def ec4_mixed(read: Reader) -> Finding:
     """Count the runs without the commonest hand sequence; the claim is that there are some."""
     learned = read.hands(TASK_2, EC4)
     others = [hands != mode(learned) for hands in learned]
-    return Finding(any(others), runs_that(TASK_2, EC4, "not commonest", others, learned))
+    return Finding(
+        any(others), runs_that(read.title(TASK_2), EC4, "not commonest", others, learned)
+    )
 
 
 def proficiency_rises(read: Reader) -> Finding:
     """Test that each condition beats the condition before it, and the first the initial
     solution."""
     comparisons: list[Higher] = []
-    for task, label in CELLS_OF_TWO_ARMS:
-        first = not comparisons or comparisons[-1].first.task != task
-        before = read.initial(task) if first else comparisons[-1].first
-        comparisons.append(Higher(read.reward(task, label), before))
+    for task, cells in itertools.groupby(CELLS_OF_TWO_ARMS, itemgetter(0)):
+        rewards = [read.initial(task), *(read.reward(*cell) for cell in cells)]
+        comparisons += [Higher(higher, lower) for lower, higher in itertools.pairwise(rewards)]
     return all_higher(comparisons)
 
 
@@ -283,7 +288,7 @@ def rail(read: Reader) -> Finding:
     for task, consistent in ((TASK_1, True), (FREE_BASE, False)):
         learned = read.hands(task, EC3)
         does = [hands == mode(learned) for hands in learned]
-        words = runs_that(task, EC3, "commonest", does, learned)
+        words = runs_that(read.title(task), EC3, "commonest", does, learned)
         findings.append(most_do(words, does, claimed=consistent))
     return all_of(*findings)
 

@@ -31,6 +31,7 @@ class Measurement:
     """Values of runs, or a single number, with the words by which evidence names them."""
 
     task: str
+    """Title of the task."""
     who: str
     """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random-search``."""
     numbers: Array
@@ -77,16 +78,20 @@ class Reader:
             raise MissingError(f"this folder has no task {name}")
         return self.study.tasks[name]
 
+    def title(self, name: str) -> str:
+        """Return the title of a task, or its name if the folder has no such task."""
+        return self.study.tasks[name].label if name in self.study.tasks else name
+
     def runs(self, task: str, label: str) -> pd.DataFrame:
         """Return the runs of a method on a task, if all of them have a solution."""
-        cell = self.study.cells.get((task, label))
+        cell, title = self.study.cells.get((task, label)), self.title(task)
         if cell is None or not len(cell.runs):
-            raise MissingError(f"this folder has no runs of {label} on {task}")
+            raise MissingError(f"this folder has no runs of {label} on {title}")
         if len(cell.good) < len(cell.runs):
             self.failed.append((task, label))
             failed = len(cell.runs) - len(cell.good)
             raise MissingError(
-                f"{failed} of {len(cell.runs)} runs of {label} on {task} failed, so "
+                f"{failed} of {len(cell.runs)} runs of {label} on {title} failed, so "
                 "the mean of the others would mislead"
             )
         runs = cell.good
@@ -94,11 +99,11 @@ class Reader:
             trials = sorted(cell.runs.trials.unique())
             if trials != [TRIALS]:
                 raise MissingError(
-                    f"the paper's runs have {TRIALS} trials; those of {label} on {task} have "
+                    f"the paper's runs have {TRIALS} trials; those of {label} on {title} have "
                     f"{', '.join(map(str, trials))}"
                 )
             if len(runs) < FEWEST:
-                raise MissingError(f"fewer than {FEWEST} runs of {label} on {task}")
+                raise MissingError(f"fewer than {FEWEST} runs of {label} on {title}")
         self.run_ids.extend(runs.run_id)
         return runs
 
@@ -116,7 +121,8 @@ class Reader:
         rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
         if not self.study.methods.stochastic[label]:
             rewards = np.array(rewards.mean())
-        return Measurement(task, who_is(label), rewards, published=published_reward(task, label))
+        published = published_reward(task, label)
+        return Measurement(self.title(task), who_is(label), rewards, published=published)
 
     def replay(self, task: str, label: str) -> Measurement:
         """Return the rewards of noiseless replays after learning.
@@ -127,26 +133,30 @@ class Reader:
         runs = self.runs(task, label)
         rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         if np.isnan(rewards).any():
-            raise MissingError(f"{who_is(label)} on {task} has no replay")
+            raise MissingError(f"{who_is(label)} on {self.title(task)} has no replay")
         published = published_reward(task, label)
-        return Measurement(task, f"replay of {who_is(label)}", rewards, published=published)
+        who = f"replay of {who_is(label)}"
+        return Measurement(self.title(task), who, rewards, published=published)
 
     def initial(self, task: str) -> Measurement:
         """Return the reward of a task's initial solution."""
         reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
-        return Measurement(
-            task, "initial", reward, published=in_words(published_alone(task, "initial hands"))
-        )
+        published = in_words(published_alone(task, "initial hands"))
+        return Measurement(self.title(task), "initial", reward, published=published)
 
     def best(self, task: str) -> Measurement:
         """Return the highest reward of the corrective process alone over all hand sequences."""
         rewards = self.alone(task)
         if np.isnan(rewards).all():
+            title = self.title(task)
             raise MissingError(
-                f"the corrective process alone completes {task} with no hand sequence"
+                f"the corrective process alone completes {title} with no hand sequence"
             )
-        published = in_words(published_alone(task, "best of all sequences"))
-        return Measurement(task, "best", np.array(np.nanmax(rewards)), published=published)
+        published, best = (
+            published_alone(task, "best of all sequences"),
+            np.array(np.nanmax(rewards)),
+        )
+        return Measurement(self.title(task), "best", best, published=in_words(published))
 
     def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
         """Return a signature of coarticulation of the runs that have this signature."""
@@ -167,8 +177,8 @@ class Reader:
     ) -> Measurement:
         """Return a signature with its words. Raises MissingError if no run has this signature."""
         if not len(values):
-            raise MissingError(f"{who_is(label)} on {task} has no {name}")
-        return Measurement(task, who_is(label), values, words + SIGNATURES[name].words)
+            raise MissingError(f"{who_is(label)} on {self.title(task)} has no {name}")
+        return Measurement(self.title(task), who_is(label), values, words + SIGNATURES[name].words)
 
     def random_search(self, task: str) -> list[str]:
         """Return the labels of the settings of random search that solved a task."""
@@ -179,7 +189,7 @@ class Reader:
         hands."""
         execution = initial_solution(self.task(task))
         if execution is None:
-            raise MissingError(f"the corrective process alone does not complete {task}")
+            raise MissingError(f"the corrective process alone does not complete {self.title(task)}")
         return execution
 
     def alone(self, task: str) -> Array:
@@ -187,8 +197,9 @@ class Reader:
         sequences that it does not complete."""
         rewards = self.study.sequences(self.task(task).name).reward
         if not len(rewards):
+            title = self.title(task)
             raise MissingError(
-                f"this folder has no rewards of the corrective process alone on {task}"
+                f"this folder has no rewards of the corrective process alone on {title}"
             )
         return rewards.to_numpy(dtype=np.float64, na_value=np.nan)
 

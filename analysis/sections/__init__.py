@@ -133,8 +133,8 @@ SECTIONS = (
         caption="Mean gap of each setting of a method, the smallest first",
         sentence=settings.best_settings,
         answer="Settings",
-        note="Gaps are means over the tasks of a method's settings. Beside the smallest: by a test "
-        "of runs paired by seed; p is corrected for the settings of the method (Holm).",
+        note="Gaps are means over the tasks of a method's settings. Comparisons with the smallest "
+        "are tests of runs paired by seed; p is corrected for the settings of the method (Holm).",
         single=False,
         folded=True,
     ),

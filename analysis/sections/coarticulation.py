@@ -228,19 +228,19 @@ def next_goal(study: Study) -> str:
     posture_difference = f"{number(distance(shared), digits)} {unit}"
     by_chance = [distance(each) for each in every_random_search_for(study, shared)]
     by_chance = [each for each in by_chance if not math.isnan(each)]
-    beside = f"random search: {number(max(by_chance), digits)}" if by_chance else ""
-    difference_beside = f"{posture_difference} ({beside})" if beside else posture_difference
+    chance = f"random search: {number(max(by_chance), digits)}" if by_chance else ""
+    both_differences = f"{posture_difference} ({chance})" if chance else posture_difference
     if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):
         text = "Too few runs to tell whether the next goal changes the posture."
     elif not drawn and shared.posture_difference <= SAME:
         text = f"No. {who} hits the same goal in the same posture."
     elif drawn and not shared.p < LEVEL:
-        text = f"No significant difference: between next goals it is {difference_beside}."
+        text = f"No significant difference: between next goals it is {both_differences}."
     elif not needed or beyond < LEVEL:
         different = "clearly different" if drawn else "different"
         text = (
             f"Yes. {who} hits the same goal in {different} postures "
-            f"(difference {'; '.join(filter(None, (posture_difference, beside)))})."
+            f"(difference {'; '.join(filter(None, (posture_difference, chance)))})."
         )
     elif random_search is None:
         text = (
@@ -254,7 +254,7 @@ def next_goal(study: Study) -> str:
         )
     else:
         text = (
-            f"Not shown: the posture difference is {difference_beside}, which is not "
+            f"Not shown: the posture difference is {both_differences}, which is not "
             "significantly more."
         )
     text += (

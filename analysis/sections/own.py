@@ -97,18 +97,18 @@ def own_in_words(study: Study) -> str:
 def card(study: Study, method: str) -> str:
     """Say the gap of a method from a file in a line, with its tasks and the nearest other one."""
     row, title = standing(study, method), study.methods.title[method]
-    text, beside = f"gap of {percent(row['gap'])}", ""
+    text, nearest = f"gap of {percent(row['gap'])}", ""
     for other, gap in [*nearest_others(study, method).items()][:1]:
-        beside = f"{other} {percent(gap)}"
+        nearest = f"{other} {percent(gap)}"
     if covered := standings.coverage(study, method):
         same = "task" if len(standings.solved_tasks(study, method)) == 1 else "tasks"
-        on_the_same = f"; {beside} on the same {same}" * bool(beside)
+        on_the_same = f"; {nearest} on the same {same}" * bool(nearest)
         return f"{title} ran on {covered}: {text} there{on_the_same}."
     if not math.isnan(row["better"]):
         tasks = counted(len(beside_learner(study, method)), "task")
         text += f", better than the learner on {row['better']:.0f} of {tasks}"
-    elif beside:
-        text += f" ({beside})"
+    elif nearest:
+        text += f" ({nearest})"
     return f"{title}: {text}."
 
 

@@ -189,7 +189,7 @@ def differences(study: Study) -> dict[str, dict[str, str]]:
     "Diamonds: the paper's learner. Bold names: the learner and methods from files.",
 )
 def draw_ranking(study: Study) -> Parts | None:
-    """Draw the gap of every method, a mean over tasks, with its name beside it."""
+    """Draw the gap of every method, a mean over tasks, with its name."""
     rows, tasks = shown_gaps(study), standings.common_tasks(study)
     rows = rows[rows.under == ""]
     if not len(rows):
@@ -226,13 +226,13 @@ def draw_ranking(study: Study) -> Parts | None:
             style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
             ends = across.transform([(low, 0), (high, 0)])[:, 0]
             right = ends[1] < 1 - ends[0]  # there is more room
-            beside: Any = {"textcoords": "offset points", "va": "center_baseline"}
-            beside |= {"ha": "left"} if right else {"ha": "right"}
-            beside |= {"weight": "bold"} if learner or not row["built_in"] else {}
+            style_of_name: Any = {"textcoords": "offset points", "va": "center_baseline"}
+            style_of_name |= {"ha": "left"} if right else {"ha": "right"}
+            style_of_name |= {"weight": "bold"} if learner or not row["built_in"] else {}
             if len(name) > LONGEST:  # its end may say on how many tasks
                 name = f"{name[: LONGEST - 20]}…{name[-19:]}"
             text, place = (f"{gap}  {name}", (high, 6)) if right else (f"{name}  {gap}", (low, -6))
-            axes.annotate(text, (place[0], line), (place[1], 0), **beside)
+            axes.annotate(text, (place[0], line), (place[1], 0), **style_of_name)
         line += 1.4
     axes.set_ylim(line - 0.8, -0.6)
     axes.set_yticks([])
@@ -253,9 +253,9 @@ CARDS = {
 }
 """Sentences on the smallest gap, for a single method, for equal gaps, and with others behind."""
 SENTENCES = {
-    "interval": "Gap of {who} to the {to}: {interval}{beside}{declared}.",
+    "interval": "Gap of {who} to the {to}: {interval}{to_next}{declared}.",
     "learner": "Gap of the learner: {learner}.",
-    "random_search": "Gap of random search: {random_search}{beside_learner}.",
+    "random_search": "Gap of random search: {random_search}{to_learner}.",
     "planner": "The best planner that uses the reward as a formula has a gap of {planner}.",
 }
 """Further sentences, by the word of the finding that each needs."""
@@ -305,12 +305,12 @@ def who_is_nearest(study: Study) -> dict[str, str]:
         "to": to,
         "of": of,
         "interval": gap_in_words(rows.iloc[0]),
-        "beside": beside_next(study, rows, names) if case == "first" else "",
+        "to_next": compared_with_next(study, rows, names) if case == "first" else "",
         "declared": DECLARED * (not rows.built_in[0]),
         "planner": "".join(gap_in_words(row) + DECLARED * (not row["built_in"]) for row in best),
         "random_search": "".join(map(percent, random_search)),
         **place_of_learner(learn, tied if rows is learn else len(learn), to),
-        "beside_learner": "".join(
+        "to_learner": "".join(
             f", {compared_with(gap, learned)} the learner's"
             for gap in random_search for learned in learn.gap[standings.is_learner(learn)]
         ),
@@ -322,7 +322,7 @@ def gap_in_words(row: Any) -> str:
     return interval(row, "gap", scale=100, unit=" %")
 
 
-def beside_next(study: Study, rows: pd.DataFrame, names: list[str]) -> str:
+def compared_with_next(study: Study, rows: pd.DataFrame, names: list[str]) -> str:
     """Say whether the gap of the first row is significantly smaller than the gap of the second."""
     first, second = rows.method[:2]
     test = standings.paired_difference(study, first, second, standings.common_tasks(study))

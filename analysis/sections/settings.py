@@ -39,8 +39,8 @@ def settings_of(study: Study) -> Iterator[tuple[str, dict[str, list[CellRuns]]]]
 
 
 @table(
-    "method; setting; gap[]: gap (%) .1; tasks: over tasks; beside_best: beside the smallest; "
-    "p_holm: p (corrected) .p; runs"
+    "method; setting; gap[]: gap (%) .1; tasks: over tasks; "
+    "comparison: compared with the smallest; p_holm: p (corrected) .p; runs"
 )
 def list_settings(study: Study) -> Rows:
     """List the mean gap of each setting of a method, the smallest gap first.
@@ -55,20 +55,20 @@ def list_settings(study: Study) -> Rows:
         tests = {label: standings.paired_difference(study, best, label, tasks) for label in others
                  if not identical(cells[best], cells[label])}  # fmt: skip
         p = dict(zip(tests, holm([test.p for test in tests.values()]), strict=True))
-        beside = {best: BEST} | dict.fromkeys(others, IDENTICAL)
+        comparison = {best: BEST} | dict.fromkeys(others, IDENTICAL)
         for label, test in tests.items():
             enough = len(tests) * test.least_p < LEVEL
-            beside[label] = (LARGER if p[label] < LEVEL else UNSURE) if enough else UNTESTED
+            comparison[label] = (LARGER if p[label] < LEVEL else UNSURE) if enough else UNTESTED
         for label in sorted(cells, key=[best, *others, *cells].index):
             row: Row = {
                 "method": base,
                 "setting": names[label],
                 "tasks": len(tasks),
-                "beside_best": beside.get(label, FAILED),
+                "comparison": comparison.get(label, FAILED),
                 "p_holm": p.get(label, math.nan),
                 "runs": sum(len(cell.runs) for cell in cells[label]),
             }
-            if label in beside:
+            if label in comparison:
                 row |= {name: gaps[name][label] for name in ("gap", "gap_low", "gap_high")}
             yield label, row | runs_of(*cells[label])
 
@@ -95,14 +95,14 @@ def varied(cells: dict[str, list[CellRuns]]) -> dict[str, str]:
 
 CARD = "{title} has the smallest gap with {setting} ({gap})."
 DETAIL = "{title}: gap of {interval} with {setting}{alike}{second}."
-SECOND = "; next {gap} with {setting} ({beside})"
+SECOND = "; next {gap} with {setting} ({comparison})"
 
 
 def best_settings(study: Study) -> str:
     """Say which setting of each method has the smallest gap, and whether significantly so."""
     rows, cards, details = list_settings(study), [], []
     for base, of_method in rows.groupby("method", sort=False):
-        is_best = of_method.beside_best.isin([BEST, IDENTICAL])
+        is_best = of_method.comparison.isin([BEST, IDENTICAL])
         best, others = of_method[is_best], of_method[~is_best & of_method.gap.notna()]
         if best.empty:
             continue
@@ -116,7 +116,7 @@ def best_settings(study: Study) -> str:
                 SECOND.format(
                     setting=row["setting"],
                     gap=percent(row["gap"]),
-                    beside=", ".join(filter(None, (row["beside_best"], p_value(row["p_holm"])))),
+                    comparison=", ".join(filter(None, (row["comparison"], p_value(row["p_holm"])))),
                 )
                 for row in others.head(1).to_dict("records")
             ),
