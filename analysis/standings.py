@@ -60,7 +60,9 @@ def cells_on(study: Study, method: str, tasks: Iterable[str]) -> list[CellRuns]:
     return cells if whole and {c.label for c in cells} == {*study.methods.parts[method]} else []
 
 
-def widest_tasks(ran_on: Iterable[tuple[str, Iterable[str]]], least: int = 1) -> set[str]:
+def widest_tasks(
+    study: Study, ran_on: Iterable[tuple[str, Iterable[str]]], least: int = 1
+) -> tuple[str, ...]:
     """Return the tasks for means: all tasks, unless too few methods ran on all of them.
 
     ``ran_on`` has names and the tasks on which each ran. Of these sets of tasks, the set with the
@@ -73,15 +75,15 @@ def widest_tasks(ran_on: Iterable[tuple[str, Iterable[str]]], least: int = 1) ->
         names = len({name for name, on in sets if on >= tasks})
         return names >= least, len(tasks) * names, len(tasks)
 
-    return max((tasks for _, tasks in sets), key=pairs, default=set())
+    widest = max((tasks for _, tasks in sets), key=pairs, default=set())
+    return tuple(task for task in study.tasks if task in widest)
 
 
 @cached
 def common_tasks(study: Study) -> tuple[str, ...]:
     """Return the tasks over which algorithms are compared (:func:`widest_tasks`)."""
     algorithms = study.methods.algorithm
-    widest = widest_tasks((algorithms[m], cells) for m, cells in compared(study).items())
-    return tuple(task for task in study.tasks if task in widest)
+    return widest_tasks(study, ((algorithms[m], cells) for m, cells in compared(study).items()))
 
 
 @cached

@@ -1,4 +1,4 @@
-"""Settings of a method beside each other, against gaps and tests by hand."""
+"""Comparisons of the settings of a method, against gaps and tests by hand."""
 
 import itertools
 import json
@@ -105,3 +105,13 @@ def test_settings_on_other_tasks_are_not_compared():
     rows = TABLES["settings"](study({("ascending", EC1, 0.05): BASE} | other | more))
     assert rows.tasks.tolist() == [1, 1]
     assert rows.index.tolist() == [f"{EC1} noise_sd=0.1", EC1]
+
+
+def test_tasks_of_settings_have_the_order_of_the_study():
+    """The tests draw signs by position: the order of a set would change p from run to run."""
+    tasks = "two-armed-2", "ascending", "two-armed-1"
+    seen = study({(task, EC1, sd): BASE - 200 for task in tasks for sd in (0.05, 0.1)})
+    ((_, cells),) = settings.settings_of(seen)
+    assert [[cell.task for cell in of_setting] for of_setting in cells.values()] == [
+        [*seen.tasks]
+    ] * 2

@@ -31,7 +31,7 @@ def settings_of(study: Study) -> Iterator[tuple[str, dict[str, list[CellRuns]]]]
     single = methods.index[methods.index.isin([*compared]) & (methods.parts.map(len) == 1)]
     for base, of_base in methods.loc[single].groupby("base", sort=False):
         ran_on = [(label, compared[label]) for label in of_base.index]
-        widest = standings.widest_tasks(ran_on, least=2)
+        widest = standings.widest_tasks(study, ran_on, least=2)
         cells = {label: standings.cells_on(study, label, widest) for label, _ in ran_on}
         cells = {label: of_label for label, of_label in cells.items() if of_label}
         if len(cells) > 1:
