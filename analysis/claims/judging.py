@@ -86,10 +86,7 @@ def tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimat
 
 
 def mean_beyond(
-    sentence: str,
-    values: ArrayLike,
-    bound: float = 0.0,
-    side: Side = "greater",
+    sentence: str, values: ArrayLike, bound: float = 0.0, side: Side = "greater"
 ) -> Finding:
     """Test whether the mean over tasks lies beyond a bound, by a one-tailed bootstrap test.
 

@@ -84,8 +84,7 @@ def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
         each = ", ".join(f"{share:.1%}" for share in excess)
         parts.append(f"{task.label} {each} (in all {ways.sum() / shortest.sum() - 1:.1%})")
     return Finding(
-        most <= margins.CLOSE,
-        f"Excess of each subtask over the shortest path: {'; '.join(parts)}",
+        most <= margins.CLOSE, f"Excess of each subtask over the shortest path: {'; '.join(parts)}"
     )
 
 

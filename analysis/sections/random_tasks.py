@@ -13,13 +13,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.optima import gap_share
-from coartic.analysis.standings import (
-    best_of_instances,
-    called,
-    compared,
-    is_learner,
-    reference,
-)
+from coartic.analysis.standings import best_of_instances, called, compared, is_learner, reference
 from coartic.analysis.statistics.instances import Scores, other_tasks
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table

@@ -28,13 +28,7 @@ from coartic.analysis.words import (
     percent,
     spelled,
 )
-from coartic.estimates import (
-    FEWER_RESAMPLES,
-    LEVEL,
-    NEGLIGIBLE,
-    Estimate,
-    bootstrap_estimate,
-)
+from coartic.estimates import FEWER_RESAMPLES, LEVEL, NEGLIGIBLE, Estimate, bootstrap_estimate
 from coartic.robot import Array
 
 LONGEST = 36

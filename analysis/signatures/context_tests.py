@@ -74,11 +74,7 @@ def posture_difference_below(
 
 
 def permutation_p(
-    first: Array,
-    second: Array,
-    rng: np.random.Generator,
-    *,
-    resamples: int = RESAMPLES,
+    first: Array, second: Array, rng: np.random.Generator, *, resamples: int = RESAMPLES
 ) -> float:
     """Test that :func:`distance_of_means` exceeds chance, by a one-sided permutation test of runs.
 

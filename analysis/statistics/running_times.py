@@ -13,15 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.estimates import (
-    FEWER_RESAMPLES,
-    FEWEST,
-    IN_CACHE,
-    SEED,
-    TAILS,
-    Estimate,
-    slices,
-)
+from coartic.estimates import FEWER_RESAMPLES, FEWEST, IN_CACHE, SEED, TAILS, Estimate, slices
 from coartic.robot import Array
 
 _MOST_DRAWN = 20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
