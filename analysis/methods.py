@@ -17,8 +17,7 @@ from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in (*CONDITIONS, *ABLATIONS)}
 """Exploration conditions and ablations of the learner by the id of the method."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
-"""Ids of the learner under the paper's conditions: the first with one arm, the others with two,
-more exploration later."""
+"""Ids of the learner under the paper's conditions, EC1 for one arm; later ones explore more."""
 RANDOM_SEARCH = "random-search"
 """Id of random search: the best of random targets around those of the corrective process."""
 INITIAL = "corrective-alone/given"

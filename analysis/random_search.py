@@ -58,19 +58,16 @@ def random_search_for(study: Study, contexts: TwoContexts) -> TwoContexts | None
 
 
 def every_random_search_for(study: Study, contexts: TwoContexts) -> list[TwoContexts]:
-    """Return each setting of random search in the same two contexts that made as many trials as
-    the method."""
+    """Return the settings of random search in the same contexts, with as many trials or more."""
     names, pairs = [task.name for task in contexts.tasks], []
-    for label in (
-        each
-        for each in random_search_on(study, names[0])
-        if each in random_search_on(study, names[1])
-    ):
-        most, wanted = (
-            [study.cells[name, who].runs.trials.fillna(0).max() for name in names]
-            for who in (label, contexts.method)
-        )
-        if all(m >= w for m, w in zip(most, wanted, strict=True)):
+
+    def trials(label: str) -> Array:
+        made = [study.cells[name, label].runs.trials.fillna(0).max() for name in names]
+        return np.array(made, dtype=np.float64)
+
+    on_first, on_second = (random_search_on(study, name) for name in names)
+    for label in (each for each in on_first if each in on_second):
+        if (trials(label) >= trials(contexts.method)).all():
             first, second = (study.executed(name, label) for name in names)
             pairs.append(TwoContexts(first, second, contexts.goal, contexts.hand))
     return [pair for pair in pairs if pair.in_both]

@@ -155,8 +155,7 @@ def leaders(rows: pd.DataFrame, group: str) -> pd.DataFrame:
 
 
 def is_learner(rows: Any) -> Any:
-    """Return whether a row of :attr:`.Study.methods`, or each of several rows, is the paper's
-    learner with its own parameters."""
+    """Return whether rows of :attr:`.Study.methods`, or a row, are the learner with defaults."""
     return (rows["kind"] == "learner") & (rows["setting"] == "")
 
 

@@ -174,12 +174,8 @@ def tidy(
     runs = runs.join(more[[name for name in more if name not in runs]])
     as_it_is = restrictions(runs).base == BASE  # other runs solve another task
     runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
-    runs["gap"] = gap_share(
-        *(
-            runs[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
-            for name in ("reward", "best_known")
-        )
-    )
+    rewards = runs[["reward", "best_known"]].astype("Float64")
+    runs["gap"] = gap_share(*rewards.to_numpy(np.float64, na_value=np.nan).T)
     runs.attrs["units"] = UNITS
     return runs
 
@@ -290,8 +286,7 @@ class Study:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id of each run that made trials, with the rewards of its trials, NaN for failed
-        trials."""
+        """Yield the id of each run that made trials, with its rewards, NaN for failed trials."""
         with open_store(self.folder) as store:
             yield from store.rewards()
 
@@ -393,8 +388,7 @@ class Study:
 
     @cached
     def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of the ``solution`` or ``replay`` of each run, by run id, of the
-        first 500 runs of a method on a task."""
+        """Return the movements of the ``solution`` or ``replay`` of executed runs, by run id."""
         with open_store(self.folder) as store:
             return store.movements(part, self.tasks, MOST_EXECUTED)
 

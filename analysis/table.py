@@ -59,10 +59,10 @@ class Table:
 
     def column(self, name: str) -> Column:
         """Return the column to which a name in the CSV file belongs."""
-        exact = [c for c in self.columns if c.ending != "*" and c.name == name]
-        return (exact or [c for c in self.columns if c.ending == "*" and name.startswith(c.name)])[
-            0
-        ]
+        for column in self.columns:
+            if name == column.name or (column.ending == "*" and name.startswith(column.name)):
+                return column
+        raise KeyError(name)
 
 
 def table(columns: str) -> Callable[[Callable[[Study], Rows]], Table]:

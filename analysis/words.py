@@ -169,9 +169,8 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
     """Return a slug for every name (small letters, digits, dashes), no two equal."""
     taken: dict[str, str] = {}
     for name in names:
-        base = (
-            re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] or "x"
-        )  # names of files are short
+        # Names of files are short.
+        base = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] or "x"
         slug, count = base, 1
         while slug in taken.values():
             count += 1

@@ -86,8 +86,7 @@ def earns_more(families: Sequence[str], *pairs: tuple[str, str]) -> Callable[[Re
 
 
 def shows(signature: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
-    """Return the comparison of a signature of the learner that explores most with 0, another
-    condition or random search."""
+    """Compare a signature of the learner with 0, with another condition or with random search."""
 
     def compare(read: Reader, task: str) -> Higher:
         first = read.signature(signature, task, most_exploring(read.task(task)))

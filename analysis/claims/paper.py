@@ -186,8 +186,7 @@ def beats_smooth_plans(read: Reader, tasks: Iterable[str], label: str) -> Findin
 
 
 def some_of(every: Finding) -> Finding:
-    """Return the finding that one test at least is as claimed, with the smallest p times their
-    number."""
+    """Return the finding that some test is as claimed, with the smallest p times their number."""
     best = min(every.tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)
     holds = any(test.value > 0 for test in every.tests)
     if holds:
@@ -220,8 +219,7 @@ def runs_that(title: str, label: str, what: str, does: Sequence[bool], hands: li
 
 
 def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
-    """Test that neither few nor most runs learn a hand sequence; the opposite is that their share
-    differs from the published share."""
+    """Test that neither few nor most runs learn these hands, against the published share."""
     learned = read.hands(task, label)
     does = [each == hands for each in learned]
     count, total = sum(does), len(does)
@@ -272,8 +270,7 @@ def ec4_mixed(read: Reader) -> Finding:
 
 
 def proficiency_rises(read: Reader) -> Finding:
-    """Test that each condition beats the condition before it, and the first the initial
-    solution."""
+    """Test that each condition beats the one before, and the first beats the initial solution."""
     comparisons: list[Higher] = []
     for task, cells in itertools.groupby(CELLS_OF_TWO_ARMS, itemgetter(0)):
         rewards = [read.initial(task), *(read.reward(*cell) for cell in cells)]

@@ -165,8 +165,7 @@ class Reader:
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
     def signature_of_random_search(self, name: str, task: str) -> Measurement:
-        """Return a signature of the setting of random search that shows most of this signature on
-        the task, or in its family."""
+        """Return a signature of random search (:func:`.most_of_random_search`)."""
         for label in self.random_search(task):
             self.runs(task, label)
         values = most_of_random_search(self.study, name, task)
@@ -185,16 +184,14 @@ class Reader:
         return random_search_on(self.study, task) or [RANDOM_SEARCH]
 
     def initial_execution(self, task: str) -> Execution:
-        """Return the initial solution of a task: the corrective process alone with its initial
-        hands."""
+        """Return the initial solution of a task."""
         execution = initial_solution(self.task(task))
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {self.title(task)}")
         return execution
 
     def alone(self, task: str) -> Array:
-        """Return the rewards of the corrective process alone with each hand sequence, NaN for
-        sequences that it does not complete."""
+        """Return the rewards of the corrective process alone by hand sequence, NaN for failures."""
         rewards = self.study.sequences(self.task(task).name).reward
         if not len(rewards):
             title = self.title(task)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from coartic.analysis.methods import RANDOM_SEARCH
 from coartic.analysis.random_search import every_random_search_for
 from coartic.analysis.sections.coarticulation import shared_goal
@@ -26,13 +28,9 @@ def player(study: Study) -> str:
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
-        widths = every_random_search_for(study, shared)
         strongest = max(
-            widths,
-            key=lambda each: (
-                each.standardised_posture_difference >= 0,
-                each.standardised_posture_difference,
-            ),
+            every_random_search_for(study, shared),
+            key=lambda each: np.nan_to_num(each.standardised_posture_difference, nan=-1.0),
             default=None,
         )
         (up, down), first = shared.tasks, shared.method

@@ -41,8 +41,7 @@ class Section:
     """Function that returns the finding in words, also for too few runs, with the number of failed
     runs; empty without a finding. The first line is an answer for the first screen."""
     answer: str = ""
-    """Word before the answer on the terminal; empty for sections without an answer there and on
-    the first screen."""
+    """Word before the answer on the terminal; empty for sections without a short answer."""
     note: str = ""
     """Explanation of figure and table."""
     single: bool = True

@@ -26,8 +26,7 @@ def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:
 
 
 def papers_claims(study: Study) -> pd.DataFrame:
-    """Return the judged claims; no rows if the folder has no runs for claims or rewards of the
-    paper."""
+    """Return the judged claims; no rows if the folder has no runs for claims."""
     judged = judgements(study)
     return judged if beside_paper(study) or judged.run_ids.any() else judged[:0]
 
@@ -63,8 +62,7 @@ def central_verdicts(judged: pd.DataFrame) -> pd.Series:
 
 
 def verdicts_in_words(judged: pd.DataFrame) -> str:
-    """Say how many claims, and how many central claims, are supported, and how many have each
-    verdict."""
+    """Say how many claims, and how many central claims, are supported or have other verdicts."""
     n, central = counts(judged.verdict), central_verdicts(judged)
     if too_few(judged):
         return (
@@ -101,8 +99,7 @@ def claims_hold(study: Study) -> str:
 
 
 def has_own_tasks(study: Study) -> bool:
-    """Return whether some task is neither a task of the paper, changed or not, nor an instance of a
-    shipped family."""
+    """Return whether some task is neither the paper's, changed or not, nor of a shipped family."""
     shipped = {*shipped_tasks(), *shipped_families()}
     return any(
         (task.family or name.partition(".")[0]) not in shipped for name, task in study.tasks.items()

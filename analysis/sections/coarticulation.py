@@ -41,8 +41,7 @@ SAME = 1e-9
 
 
 def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Yield each goal that two tasks share before they differ, for each hand with which the method
-    hit this goal in both tasks."""
+    """Yield each first goal that two tasks share, for each hand that hit this goal in both."""
     for first, second, shared in context_pairs(study.tasks):
         keys = (first, label), (second, label)
         if {first, second} <= one_by_one(study).keys() and study.cells.keys() >= {*keys}:
@@ -80,12 +79,9 @@ def list_contexts(study: Study) -> Rows:
     """List posture differences at shared goals; p is corrected over a method's goals (Holm)."""
     for label in study.methods.index:
         every = list(shared_goals(study, label))
-        p = holm(
-            [
-                math.nan if math.isnan(shared.standardised_posture_difference) else shared.p
-                for shared in every
-            ]
-        )
+        spreads = [shared.standardised_posture_difference for shared in every]
+        tested = zip(every, np.isnan(spreads).tolist(), strict=True)
+        p = holm([math.nan if no_spread else shared.p for shared, no_spread in tested])
         for shared, adjusted in zip(every, p, strict=True):
             first, second = shared.tasks
             row: Row = {
@@ -216,7 +212,7 @@ def next_goal(study: Study) -> str:
     # Stochastic methods need a test; methods that select from trials need random search.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
     needed, random_search = selects(study, shared.method), random_search_for(study, shared)
-    beyond = shared.p_beyond(random_search) if needed and random_search is not None else math.nan
+    beyond = context_beyond_p(study, shared)
     drawn, who = method.stochastic, "The learner" if is_learner(method) else method.title
     runs, p = counted(shared.n, "run"), p_value(shared.p)
     in_sd = not math.isnan(shared.standardised_posture_difference)
@@ -274,8 +270,7 @@ def next_goal(study: Study) -> str:
 
 
 def is_subject(rows: Any) -> Any:
-    """Return whether a method is the learner or from a file, for a row of :attr:`.Study.methods` or
-    for each of several rows."""
+    """Return whether rows of :attr:`.Study.methods`, or a row, are the learner or from files."""
     return (rows.kind == "learner") | ~rows.built_in
 
 

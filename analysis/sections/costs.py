@@ -113,10 +113,8 @@ def cells_with_targets(study: Study) -> dict[str, list[CellRuns]]:
     Methods that did not run on all these tasks are left out, or, if they are from files, have their
     cells on all tasks with targets.
     """
-    common, of_methods = (
-        [task for task in standings.common_tasks(study) if task in spans(study)],
-        {},
-    )
+    common = [task for task in standings.common_tasks(study) if task in spans(study)]
+    of_methods = {}
     for method, of_method in standings.compared(study).items():
         cells = standings.cells_on(study, method, common)
         if not (cells or study.methods.built_in[method]):
@@ -269,7 +267,7 @@ def draw_runtimes(study: Study) -> Parts | None:
 
 
 def what_it_costs(study: Study) -> str:
-    """Say how many trials the learner, and the best other method that learns, need for half of the
+    """Say how many trials the learner and the best other learning method need for half of the
     targets."""
     table = list_runtimes(study)
     methods = study.methods.loc[[*table.index]]

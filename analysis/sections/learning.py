@@ -59,13 +59,8 @@ def list_learning(study: Study) -> Rows:
         ]
         halves = [trials[0] if len(trials) else math.inf for trials in gained]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
-        row |= dict(
-            zip(
-                ("trials_to_half_gain", "trials_to_half_gain_low", "trials_to_half_gain_high"),
-                quartiles,
-                strict=True,
-            )
-        )
+        names = (f"trials_to_half_gain{end}" for end in ("", "_low", "_high"))
+        row |= dict(zip(names, quartiles, strict=True))
         yield f"{task} {label}", row | runs_of(cell)
 
 

@@ -37,8 +37,7 @@ LONGEST = 36
 
 @cached
 def shown_gaps(study: Study) -> pd.DataFrame:
-    """Return :func:`.main_gaps`, and gaps of methods from files that lack some of these tasks, on
-    the ``tasks`` that they solved."""
+    """Return :func:`.main_gaps`, with methods from files on the ``tasks`` that they solved."""
     rows = standings.main_gaps(study)
     for method in standings.compared(study):
         if not study.methods.built_in[method] and method not in {*rows.method}:

@@ -45,8 +45,7 @@ def list_tasks(study: Study) -> Rows:
 
 
 def how_long(study: Study) -> str:
-    """Say the ticks of the corrective process alone, with its best and the initial hands, and of
-    the best known solutions."""
+    """Say the ticks of the corrective process alone and of the best known solutions."""
     rows = list_tasks(study).dropna(subset=["best_hands", "initial", "optimum"])
     if not len(rows):
         return ""

@@ -101,8 +101,7 @@ class TwoContexts:
 
     @cached_property
     def configurations(self) -> tuple[Array, Array]:
-        """Configurations at the goal in each context, shape ``(runs, dof)``, length unit and
-        rad."""
+        """Configurations at the goal in each context, ``(runs, dof)``, length unit and rad."""
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
             runs.configurations[runs.hands[:, goal] == hand, goal]
@@ -132,8 +131,7 @@ class TwoContexts:
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Parts of the posture difference that leave the hand in place and that move the hand
-        (:func:`motor_equivalence`)."""
+        """Parts of the posture difference by :func:`motor_equivalence`."""
         task, joints = self.first.task, movable(self.first.task, self.hand)
         posture = np.concatenate(self.configurations).mean(axis=0)
         first, second = (configurations.mean(axis=0) for configurations in self.configurations)

@@ -24,8 +24,7 @@ from coartic.estimates import FEWER_RESAMPLES, Estimate
 from coartic.robot import Array
 
 Runs = tuple[Array, ...]
-"""Scores of the runs on an instance, shape ``(n,)``; two arrays for the difference of two methods,
-first less second."""
+"""Scores of the runs on an instance, shape ``(n,)``; two arrays for a difference of two methods."""
 Scores = Mapping[str, Sequence[Runs]]
 """Scores of each instance, by family."""
 
