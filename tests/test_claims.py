@@ -12,17 +12,23 @@ import pytest
 
 from coartic import corrective_trial, load_task
 from coartic.analysis.claims.claim import Claim, Higher, all_higher
+from coartic.analysis.claims.coarticulation import chosen_slower
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
-from coartic.analysis.claims.paper import CLAIMS_OF_THE_PAPER, shortest_reach, some_of
-from coartic.analysis.claims.reader import Measurement, MissingError
+from coartic.analysis.claims.paper import (
+    CLAIMS_OF_THE_PAPER,
+    excess_over_shortest,
+    shortest_reach,
+    some_of,
+)
+from coartic.analysis.claims.reader import Measurement, MissingError, Reader
 from coartic.analysis.sections import TABLES
 from coartic.analysis.sections.claims import counts, verdicts_in_words
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.estimates import Estimate
-from tests.support.made_up import MadeUp, made, plan_for, row, study_of
+from tests.support.made_up import plan_for, row, runs_of, study_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED
 from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
 
@@ -157,15 +163,8 @@ def test_groups_are_corrected_apart():
 
 
 def learner(task, condition, rewards, hands="LRLR", initial=-671, trials=10_000, **more):
-    """Planted runs of one cell; ``hands`` one for all or one each."""
-    sequences = [hands] * len(rewards) if isinstance(hands, str) else hands
-    return [
-        row(
-            f"dual-process/{condition}", reward, task=task, run=k, trials=trials,
-            **{"initial_reward": initial, "replay_reward": reward, "hands": sequence, **more},
-        )
-        for k, (reward, sequence) in enumerate(zip(rewards, sequences, strict=True))
-    ]  # fmt: skip
+    return runs_of(task, f"dual-process/{condition}", rewards, hands=hands, trials=trials,
+                   **{"initial_reward": initial, "replay_reward": rewards, **more})  # fmt: skip
 
 
 SEQUENCES = {
@@ -175,13 +174,16 @@ SEQUENCES = {
 
 
 def planted_study(rows, sequences=SEQUENCES, tasks=()):
-    by_name = {each["task"]: load_task(each["task"]) for each in rows if "." not in each["task"]}
-    by_name |= {task.name: task for task in tasks}
-    tables = {
-        name: pd.DataFrame(sequences.get(name, {}).items(), columns=["hands", "reward"])
-        for name in by_name
-    }
-    return study_of(rows, by_name.values(), sequences=tables.__getitem__)
+    return study_of(rows, tasks, sequences=alone_with(sequences))
+
+
+def alone_with(sequences):
+    """The method ``Study.sequences`` with these rewards."""
+    return lambda task: pd.DataFrame(sequences.get(task, {}).items(), columns=["hands", "reward"])
+
+
+def finding_of(claim, study):
+    return CLAIMS[claim].judge(Reader(study))
 
 
 def verdict_of(claim, study):
@@ -257,12 +259,9 @@ CELLS = [
 def seven(replays):
     """Runs of the paper's cells, by what their replays gain; learned rewards are never below."""
     return [
-        entry | {"replay_reward": initial + gain}
-        for task, condition, initial in CELLS
-        for entry, gain in zip(
-            learner(task, condition, [initial + abs(r) for r in replays], initial=initial),
-            replays, strict=True,
-        )
+        run for task, condition, initial in CELLS
+        for run in learner(task, condition, [initial + abs(gain) for gain in replays],
+                           initial=initial, replay_reward=[initial + gain for gain in replays])
     ]  # fmt: skip
 
 
@@ -299,11 +298,12 @@ def test_corrections_early_and_late():
         ]
         study = planted_study(rows)
         for which in ("one", "two"):
-            judged = verdict_of(f"corrections-{which}-armed", study)
-            assert judged.verdict == verdict
-        # Of 999.9 trials with four goals; first and last tenth.
-        early = np.mean([row["early_corrections"] for row in rows[-5:]]) / 3999.6
-        assert f"Two-armed 2, EC4: {early:.3f} [" in judged.evidence
+            assert verdict_of(f"corrections-{which}-armed", study).verdict == verdict
+        # Of 999.9 trials with four goals; first and last tenth; the last cell is EC4's on task 2.
+        early, late = (np.mean([row[f"{when}_corrections"] for row in rows[-5:]]) / 3999.6
+                       for when in ("early", "late"))  # fmt: skip
+        *_, test = finding_of("corrections-two-armed", study).tests
+        assert test.value == pytest.approx(early - late)
 
 
 EVERY = {"ascending": {"RRR": -319}, "descending": {"RRR": -333}, **SEQUENCES}
@@ -357,9 +357,9 @@ def test_the_corrective_process_is_near_the_shortest_way():
     assert [verdict_of(claim, shipped).verdict for claim in claims] == ["supported"] * 2
     study = planted_study(seven([9, 10, 11]), tasks=[AS_RELEASED])
     assert verdict_of(claims[0], study).verdict == "supported"
-    two = verdict_of(claims[1], study)
-    assert two.verdict == "not supported"
-    assert "Two-armed 2 0.3%, 13.2%" in two.evidence
+    assert verdict_of(claims[1], study).verdict == "not supported"
+    excess = excess_over_shortest(study.tasks[T2], corrective_trial(study.tasks[T2], "RRRR"))
+    assert excess[:2] == pytest.approx([0.003, 0.132], abs=0.0005)
 
 
 BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
@@ -406,20 +406,17 @@ def plant(solutions, replays=None, rewards=MIDDLE):
 
     ``rewards``: of all replays, or by cell.
     """
-    rows = [
-        row(label, -500 - k % 3, task=task, run=k, trials=10_000, initial_reward=-671,
-            hands=getattr(run, "hands", "LRLR"),
-            replay_reward=(rewards[task, label] if isinstance(rewards, dict) else rewards)[k % 8])
-        for (task, label), runs in solutions.items()
-        for k, run in enumerate(runs)
-    ]  # fmt: skip
-    study = planted_study(rows)
-    executed = {
-        (*key, *again): Solutions(study.tasks[key[0]], key[1], tuple(runs))
-        for each, again in ((solutions, ()), (solutions if replays is None else replays, (True,)))
-        for key, runs in each.items()
-    }
-    return MadeUp(study, **vars(study), executed=made(executed))
+    rows = []
+    for (task, label), runs in solutions.items():
+        replayed = (rewards[task, label] if isinstance(rewards, dict) else rewards) * len(runs)
+        rows += runs_of(task, label, [-500 - k % 3 for k in range(len(runs))], trials=10_000,
+                        initial_reward=-671, replay_reward=replayed,
+                        hands=[getattr(run, "hands", "LRLR") for run in runs])  # fmt: skip
+    cells, again = (
+        [Solutions(load_task(task), label, tuple(runs)) for (task, label), runs in of.items()]
+        for of in (solutions, solutions if replays is None else replays)
+    )
+    return study_of_solutions(cells, rows, again, sequences=alone_with(SEQUENCES))
 
 
 def at(q, **more):
@@ -438,9 +435,10 @@ def test_resemblance_is_half_the_initial_distance(share, verdict):
         solutions[task, "dual-process/EC1"] = [
             at(planned + (share + 0.01 * k) * (initial - planned)) for k in range(-4, 5)
         ]
-    judged = verdict_of("resembles-squared-displacement", plant(solutions))
-    assert judged.verdict == verdict
-    assert judged.evidence.count(f"{1 - share:.3f} [".replace("-", "−")) == 2
+    study = plant(solutions)
+    assert verdict_of("resembles-squared-displacement", study).verdict == verdict
+    beyond_half = [test.value for test in finding_of("resembles-squared-displacement", study).tests]
+    assert beyond_half == pytest.approx([0.5 - share] * 2)
 
 
 SLOWER = ["LLRR"] * 8 + ["LRLR"] * 31 + ["RRRR"]
@@ -474,11 +472,13 @@ def test_hands_that_serve_other_goals(hands, of_random_search, verdict):
         (T1, label): [runs[h] for h in (SLOWER if h.startswith("few") else [h] * 40)]
         for label, h in of.items()
     }
-    judged = verdict_of("hand-coarticulation-task-1", plant(solutions))
+    study = plant(solutions)
+    judged = verdict_of("hand-coarticulation-task-1", study)
     assert judged.verdict == verdict, judged.evidence
     if verdict == "supported":
         ticks = corrective_trial(task, "LLRR").ticks_by_goal()[1] - quick["LRRR"][1]
-        assert f"40 of 40 runs, slower for these goals by {ticks} ticks" in judged.evidence
+        slower = chosen_slower(study.executed(T1, "dual-process/EC2"), "RRRR")
+        assert slower.tolist() == [ticks] * 40
 
 
 def idle(task, part):

@@ -18,7 +18,7 @@ from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.study import one_by_one
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
-from tests.support.made_up import MadeUp, made, row, study_of
+from tests.support.made_up import MadeUp, made, runs_of, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 FEW = (*ONE, "two-armed/v1", "long/v1")
@@ -37,16 +37,10 @@ def hands_of(name, letter="R"):
     return letter * len(load_task(name).goals)
 
 
-def runs_of(name, label, centre, *, hands=None, noise=NOISE, **more):
-    return [
-        row(
-            label, round(centre) + off, task=name, run=k, trials=10_000, initial_reward=ALONE,
-            replay_reward=round(centre) + off, hands=hands or hands_of(name),
-            initial_hands=hands_of(name), failed_trials=0,
-            **{"run_id": f"{name}-{label}-{k}", **more},
-        )
-        for k, off in enumerate(noise)
-    ]  # fmt: skip
+def learner(name, label, centre, *, noise=NOISE, **more):
+    rewards, hands = [round(centre) + off for off in noise], hands_of(name)
+    return runs_of(name, label, rewards, trials=10_000, initial_reward=ALONE, hands=hands,
+                   replay_reward=rewards, initial_hands=hands, failed_trials=0, **more)  # fmt: skip
 
 
 def rewarded(centres, *, families=FEW, split="i", count=COUNT):
@@ -60,7 +54,7 @@ def rewarded(centres, *, families=FEW, split="i", count=COUNT):
                 if (label == EC1) == (family in ONE) or label in (INITIAL, RANDOM_SEARCH):
                     value = centre(number) if callable(centre) else centre
                     noise = (0,) if label == INITIAL else NOISE
-                    rows += runs_of(name, label, value, noise=noise)
+                    rows += learner(name, label, value, noise=noise)
     sequences = {
         (task.name,): pd.DataFrame({"hands": [hands_of(task.name)], "reward": [ALONE]})
         for task in tasks
@@ -197,7 +191,7 @@ def test_development_instances_are_not_judged():
     [("two-armed/v1/i000", "best known reward"), ("two-armed/v1/2030-000", "best of this folder")],
 )
 def test_what_only_a_folder_says_is_not_called_known(name, to):
-    runs = (runs_of(name, label, 9 * ALONE, commit="") for label in (EC4, RANDOM_SEARCH))
+    runs = (learner(name, label, 9 * ALONE, commit="") for label in (EC4, RANDOM_SEARCH))
     seen = study_of([run for of_label in runs for run in of_label])
     assert random_tasks.on_random_tasks(seen).startswith(f"Nearest to the {to}: ")
     assert len(about.limits(seen)["own"]) == (to == "best of this folder")

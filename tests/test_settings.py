@@ -8,7 +8,7 @@ import pytest
 
 from coartic.analysis.sections import TABLES, settings
 from coartic.analysis.sections.settings import BEST, FAILED, IDENTICAL, LARGER, UNSURE, UNTESTED
-from tests.support.made_up import made_up_optima, row, study_of
+from tests.support.made_up import made_up_optima, runs_of, study_of
 
 EC1, OWN = "dual-process/EC1", "mine"
 BASE = np.array([-304, -301, -303, -302, -305, -300, -303, -302])
@@ -19,11 +19,9 @@ OFF = np.array([3, -1, 2, 1, -2, 2, -1, 2])
 def study(rewards):
     """Runs of settings by task: ``{(task, method, σ): rewards}``; σ 0.05 is the default."""
     rows = [
-        row(method, reward, task=task, run=k, seed=k, run_id=f"{task}{method}{sd}{k}",
-            setting="" if sd == 0.05 else f"noise_sd={sd}",
-            parameters=json.dumps({"noise_sd": sd, "trials": 10}))
-        for (task, method, sd), of_setting in rewards.items()
-        for k, reward in enumerate(of_setting)
+        run for (task, method, sd), of_setting in rewards.items()
+        for run in runs_of(task, method, of_setting, setting=f"noise_sd={sd}" * (sd != 0.05),
+                           parameters=json.dumps({"noise_sd": sd, "trials": 10}))
     ]  # fmt: skip
     return study_of(rows, optima=made_up_optima(*{each["task"] for each in rows}))
 

@@ -24,7 +24,7 @@ from coartic.analysis.signatures.two_contexts import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.robot import HANDS
-from tests.support.made_up import made, row, study_of
+from tests.support.made_up import study_of_solutions
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
 
 
@@ -269,8 +269,9 @@ def test_signs_are_one_number_a_run():
     assert not any(signature.of(Solutions(task, "", ())).size for signature in SIGNATURES.values())
     one = load_task("ascending")
     alone = Solutions(one, "", (corrective_trial(one, "RRR"),))
-    assert [signature.of(alone).size for signature in SIGNATURES.values()] == [0, 1, 0, 1, 1]
-    assert [signature.each(alone).size for signature in SIGNATURES.values()] == [1] * 5
+    sizes = {name: signature.of(alone).size for name, signature in SIGNATURES.items()}
+    assert sizes == {name: int(name not in ("hand", "other arm")) for name in SIGNATURES}
+    assert {signature.each(alone).size for signature in SIGNATURES.values()} == {1}
 
 
 def test_choice_in_isolation():
@@ -339,18 +340,6 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
 # Studies
 
 
-def study_with(*cells):
-    """A study of cells, those without solutions of one failed run; no replays."""
-    rows = [
-        row(cell.label, -300 if cell.runs else None, task=cell.task.name, run=run,
-            status="ok" if cell.runs else "infeasible")
-        for cell in cells for run in range(max(1, len(cell.runs)))
-    ]  # fmt: skip
-    executed = {(cell.task.name, cell.label): cell for cell in cells}
-    executed |= {(*key, True): replace(cell, runs=()) for key, cell in executed.items()}
-    return study_of(rows, [cell.task for cell in cells], executed=made(executed))
-
-
 def beside_random_search(
     posture_difference,
     of_random_search=0.5,
@@ -368,7 +357,7 @@ def beside_random_search(
         noise = 0.1 * rng(2).standard_normal(count)
         for task, x in ((load_task("ascending"), 0.0), (load_task("descending"), shift)):
             cells.append(posed(task, label, [posture(each) for each in noise + x]))
-    study = study_with(*cells)
+    study = study_of_solutions(cells)
     study.runs.loc[study.runs.method == RANDOM_SEARCH, "trials"] = random_search_trials
     return study
 
@@ -407,12 +396,12 @@ def test_a_method_that_selects_has_to_exceed_random_search(made_up, answer):
 def test_the_random_search_that_shows_most_of_a_signature_counts():
     tasks, drawn = [load_task("ascending"), load_task("descending")], "random-search/hands"
     alone = {task.name: corrective_trial(task, "RRR").ticks_by_goal() for task in tasks}
-    study = study_with(*(
+    study = study_of_solutions([
         posed(task, label, [posture(shift * number + noise) for noise in (0.0, 0.1, 0.2)],
               np.add(alone[task.name], [slower, 0, 0]))
         for label, shift, slower in ((EC1, 1.0, 5), (RANDOM_SEARCH, 0.8, 1), (drawn, 0.3, 2))
         for number, task in enumerate(tasks)
-    ))  # fmt: skip
+    ])  # fmt: skip
     assert random_search.random_search_on(study, "ascending") == [RANDOM_SEARCH, drawn]
     assert (
         random_search.random_search_for(study, coarticulation.shared_goal(study)).method
@@ -431,7 +420,7 @@ def test_of_a_family_one_width_counts():
         for label, slower in ((RANDOM_SEARCH, (9, -7)), (drawn, (3, 3)))
         for more in [[slower[number]] + [0] * (len(task.goals) - 1)]
     ]
-    study = study_with(*cells)
+    study = study_of_solutions(cells)
     for name in study.tasks:
         assert random_search.most_of_random_search(study, "first", name).tolist() == [3]
 
@@ -448,7 +437,7 @@ def test_p_of_shared_goals_is_corrected_by_method():
         for label, count in ((EC1, 3), (RANDOM_SEARCH, 2))
         for place, task in enumerate(tasks[:count])
     ]
-    table = TABLES["contexts"](study_with(*cells)).set_index("method")
+    table = TABLES["contexts"](study_of_solutions(cells)).set_index("method")
     assert table.p_holm[EC1].tolist() == pytest.approx([6 * 2 / 70] * 6)
     assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 70] * 2)
 
@@ -475,7 +464,7 @@ def beside_corrective(method, posture_difference, *, stochastic, runs):
         )
         for name, shift in zip(("ascending", "descending"), shifts, strict=True)
     ]  # fmt: skip
-    study = study_with(*cells)
+    study = study_of_solutions(cells)
     study.runs["trials"] = 0
     study.declared[method] = replace(study.declared[method], stochastic=stochastic)
     return study
@@ -516,9 +505,9 @@ def test_the_sentence_is_about_the_learner_or_a_method_from_a_file():
 
 def test_one_run_beside_many_is_no_test():
     """Of the 41 divisions one is as far apart, which would be below 5 %."""
-    study = study_with(*(
+    study = study_of_solutions([
         posed(load_task(name), "mine", [posture(x + 0.01 * run) for run in range(count)])
         for name, x, count in (("ascending", 0.0, 40), ("descending", 0.5, 1))
-    ))  # fmt: skip
+    ])  # fmt: skip
     study.runs["trials"] = 0
     assert coarticulation.next_goal(study).startswith("Too few runs")

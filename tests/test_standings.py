@@ -20,16 +20,7 @@ from coartic.analysis.sections.rewards import changed_hands
 from coartic.analysis.statistics import running_times
 from coartic.estimates import RESAMPLES, SEED
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
-
-
-def study(rewards):
-    """Runs of methods by task: ``{(task, method): rewards}``."""
-    rows = [
-        row(method, reward, task=task, run=k, seed=100 + k)
-        for (task, method), of_method in rewards.items()
-        for k, reward in enumerate(of_method)
-    ]
-    return study_of(rows, optima=made_up_optima(*{each["task"] for each in rows}))
+from tests.support.made_up import study_of_rewards as study
 
 
 def test_targets_lie_between_the_initial_solution_and_the_best_known():
@@ -44,7 +35,7 @@ def test_which_tasks_are_ranked_does_not_depend_on_the_corrective_process():
                   hands=["right"])  # fmt: skip
     tasks = [load_task("ascending"), behind]
     ticks = {"ascending": {"one": -319, "two": -330}, "behind": {"one": -110, "two": -100}}
-    rows = [row(method, reward, task=task, run_id=f"{task}-{method}", seed=0)
+    rows = [row(method, reward, task=task)
             for task, of_task in ticks.items() for method, reward in of_task.items()]  # fmt: skip
     best = {"ascending": BestKnown(-319, None), "behind": BestKnown(-100, -100)}
     seen = study_of(rows, tasks, optima=best, rewards=lambda: iter(()))

@@ -15,7 +15,7 @@ from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL
 from coartic.analysis.report.render import latex_table
 from coartic.analysis.sections import FIGURES, TABLES, costs
 from coartic.analysis.sections.tasks import how_long
-from tests.support.made_up import made_up_optima, row, study_of
+from tests.support.made_up import made_up_optima, row, runs_of, study_of, study_of_trials
 
 ONE, TWO = "ascending", "two-armed-1"
 EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
@@ -42,20 +42,14 @@ STEPS = {
 
 @pytest.fixture(scope="module")
 def study():
-    rows, rewards = [], {}
-    for (task, method), runs in STEPS.items():
-        for run, steps in enumerate(runs):
-            run_id, trials = f"{task}-{method}-{run}", max(steps)
-            rewards[run_id] = trials_of(steps, trials)
-            best = int(np.nanmax(rewards[run_id]))
-            rows.append(row(method, best, task=task, run=run, run_id=run_id, trials=trials,
-                            seed=run, forward_kinematics=1_000 * trials))  # fmt: skip
-    information = "kinematic model, reward as a formula"
-    for task, reward, ticks in ((ONE, -296, 0), (TWO, -500, 100)):
-        rows.append(row(PLAN, reward, task=task, run_id=f"{task}-plan", trials=0,
-                        information=information, forward_kinematics=500, movement_ticks=ticks,
-                        seed=0))  # fmt: skip
-    return study_of(rows, optima=made_up_optima(ONE, TWO), rewards=lambda: iter(rewards.items()))
+    trials = {cell: [trials_of(steps, max(steps)) for steps in runs]
+              for cell, runs in STEPS.items()}  # fmt: skip
+    plans = [
+        row(PLAN, reward, task=task, information="kinematic model, reward as a formula", trials=0,
+            forward_kinematics=500, movement_ticks=ticks)
+        for task, reward, ticks in ((ONE, -296, 0), (TWO, -500, 100))
+    ]  # fmt: skip
+    return study_of_trials(trials, plans, forward_kinematics=1_000)
 
 
 def same(table, expected):
@@ -115,10 +109,9 @@ def test_methods(study):
 
 def test_the_median_run_is_nearest_to_the_median():
     """-309, from which the mean, -324, is far."""
-    rows = [row(EC1, reward, task=ONE, run=run, run_id=f"id-{run}")
-            for run, reward in enumerate((-400, -300, -309, -301, -310))]  # fmt: skip
+    rows = runs_of(ONE, EC1, [-400, -300, -309, -301, -310], run_id=[*"abcde"])
     table = TABLES["methods"](study_of(rows, optima=made_up_optima(ONE)))
-    assert table.median_run.tolist() == ["id-2"]
+    assert table.median_run.tolist() == ["c"]
 
 
 def test_runtimes(study):
@@ -179,8 +172,7 @@ def test_tasks_of_one_title_have_their_names_besides():
     changed = up.model_copy(update={"name": "ascending.radius-0.3", "radius": 0.3})
     names = ["Ascending (ascending)", "Ascending (copied)", "Ascending, radius-0.3"]
     tasks = up, same, changed
-    rows = [row(CMA, -300 - n, task=task.name, run=n, run_id=f"{task.name}-{n}")
-            for task in tasks for n in range(3)]  # fmt: skip
+    rows = [run for task in tasks for run in runs_of(task.name, CMA, [-300, -301, -302])]
     seen = study_of(rows, tasks, optima={}, rewards=lambda: iter(()))
     assert [task.label for task in seen.tasks.values()] == names
     for table in ("tasks", "methods"):

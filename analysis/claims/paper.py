@@ -73,19 +73,23 @@ def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
     """Compare each subtask of the initial solutions with its shortest path in joint space."""
     parts, most = [], 0.0
     for name in tasks:
-        task, initial = read.task(name), read.initial_execution(name)
-        after = initial.configurations
-        before = np.array([task.q0, *after[:-1]])
-        reaches = zip(before, hands_of(initial.hands), itertools.count(1), after, strict=False)
-        shortest = np.array([shortest_reach(task, *reach) for reach in reaches])
-        ways = np.linalg.norm(after - before, axis=1)
-        excess = ways / shortest - 1
-        most = max(most, float(excess.max()))
+        *excess, in_all = excess_over_shortest(read.task(name), read.initial_execution(name))
+        most = max(most, *excess)
         each = ", ".join(f"{share:.1%}" for share in excess)
-        parts.append(f"{task.label} {each} (in all {ways.sum() / shortest.sum() - 1:.1%})")
+        parts.append(f"{read.title(name)} {each} (in all {in_all:.1%})")
     return Finding(
         most <= margins.CLOSE, f"Excess of each subtask over the shortest path: {'; '.join(parts)}"
     )
+
+
+def excess_over_shortest(task: Task, initial: Execution) -> list[float]:
+    """Return the shares by which subtasks, and last all together, exceed the shortest paths."""
+    after = initial.configurations
+    before = np.array([task.q0, *after[:-1]])
+    reaches = zip(before, hands_of(initial.hands), itertools.count(1), after, strict=False)
+    shortest = np.array([shortest_reach(task, *reach) for reach in reaches])
+    ways = np.linalg.norm(after - before, axis=1)
+    return [*(ways / shortest - 1).tolist(), float(ways.sum() / shortest.sum() - 1)]
 
 
 def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, near: Array) -> float:

@@ -1,8 +1,10 @@
-"""Rows of runs that nobody ran, for what is computed of them."""
+"""The builder of planted studies: rows of runs, rewards of trials and solutions by hand."""
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from coartic import load_task
@@ -44,17 +46,27 @@ def made_up_optima(*tasks):
     return {task: BestKnown(best[task], best[task]) for task in tasks}
 
 
-def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
+def row(method, reward, *, task="two-armed-1", run=0, setting="", **more):
     return {
-        "task": task, "method": method, "setting": "", "run": run, "status": status,
-        "run_id": f"{method}-{run}", "reason": "", "reward": reward, "hands": "LRLR",
+        "task": task, "method": method, "setting": setting, "run": run, "seed": run,
+        "status": "ok" if reward is not None else "infeasible", "reason": "", "reward": reward,
+        "run_id": f"{task}-{method}-{setting}-{run}", "hands": "LRLR",
         "information": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
         "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
         "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
         "warm": run > 0, "together": 1,
         "solution_corrections": 0, "early_corrections": 30, "late_corrections": 20,
-        "other_arm_travel": travel, "proven_bound": None, **more,
+        "other_arm_travel": 0.0, "proven_bound": None, **more,
     }  # fmt: skip
+
+
+def runs_of(task, method, rewards, **more):
+    """Rows of the runs of a cell; a list in ``more`` has a value for each run."""
+    return [
+        row(method, reward, task=task, run=run,
+            **{name: of[run] if isinstance(of, list) else of for name, of in more.items()})
+        for run, reward in enumerate(rewards)
+    ]  # fmt: skip
 
 
 def declared(method):
@@ -77,13 +89,44 @@ def plan_for(tasks, runs=None):
     return plan
 
 
-def study_of(rows, tasks=None, **parts):
-    """A study of rows of runs, with parts made up; tasks are those of the names unless given."""
-    runs = (
-        pd.DataFrame(rows)
-        .reset_index(drop=True)
-        .astype({"reward": "Int64", "proven_bound": "Int64"})
-    )
-    if tasks is None:
-        tasks = [load_task(name) for name in runs.task.unique()]
+def study_of(rows, tasks=(), **parts):
+    """A study of rows of runs, with parts made up; tasks that are not given are loaded by name."""
+    runs = pd.DataFrame(rows).reset_index(drop=True)
+    runs = runs.astype({"reward": "Int64", "proven_bound": "Int64"})
+    given = {task.name: task for task in tasks}
+    tasks = [given.get(name) or load_task(name) for name in runs.task.unique()]
     return MadeUp(Study(Path("made-up"), plan_for(tasks, runs), MADE_WITH, runs), **parts)
+
+
+def study_of_rewards(rewards, **more):
+    """A study of ``{(task, method): rewards}`` with proven optima of the paper's tasks."""
+    rows = [run for cell, of in rewards.items() for run in runs_of(*cell, of, **more)]
+    return study_of(rows, optima=made_up_optima(*{task for task, _ in rewards}))
+
+
+def study_of_trials(trials, plans, **more):
+    """A study of the rewards of trials of each run, ``{(task, method): [rewards, ...]}``.
+
+    ``plans`` are rows of runs without trials; each trial takes ``more["forward_kinematics"]``.
+    """
+    rows, by_run = [], {}
+    evaluations = more.pop("forward_kinematics")
+    for cell, runs in trials.items():
+        sizes, best = [*map(len, runs)], [int(np.nanmax(rewards)) for rewards in runs]
+        more["forward_kinematics"] = [evaluations * size for size in sizes]
+        rows += (of_cell := runs_of(*cell, best, trials=sizes, **more))
+        names = (each["run_id"] for each in of_cell)
+        by_run |= {name: np.array(r, float) for name, r in zip(names, runs, strict=True)}
+    optima = made_up_optima(*{task for task, _ in trials})
+    return study_of([*rows, *plans], optima=optima, rewards=lambda: iter(by_run.items()))
+
+
+def study_of_solutions(cells, rows=None, replays=(), **parts):
+    """A study whose runs are executed as these ``Solutions``; one without runs is a failed run."""
+    if rows is None:
+        rows = [run for cell in cells for run in runs_of(
+            cell.task.name, cell.label, [-300] * len(cell.runs) or [None])]  # fmt: skip
+    executed = {(cell.task.name, cell.label): cell for cell in cells}
+    executed |= {(*key, True): replace(cell, runs=()) for key, cell in executed.items()}
+    executed |= {(cell.task.name, cell.label, True): cell for cell in replays}
+    return study_of(rows, [cell.task for cell in cells], executed=made(executed), **parts)
