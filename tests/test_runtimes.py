@@ -6,7 +6,7 @@ import pytest
 
 from coartic import CoarticError
 from coartic.analysis import runtimes
-from tests.support.made_up import MadeUp, row
+from tests.support.made_up import MadeUp, row, study_of_trials
 
 ONE, TWO, LEARNER, PLAN = "ascending", "two-armed-1", "dual-process/EC4", "posture-qp/current-goal"
 LIMITS = {ONE: (-319, -292), TWO: (-675, -465)}  # initial solution, optimum
