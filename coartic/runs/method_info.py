@@ -28,49 +28,53 @@ BUILT_IN = "built in"
 
 @dataclass(frozen=True)
 class MethodInfo:
-    """The declaration of a method, its origin, and where its code is."""
+    """The declaration of a method, its origin, and the place of its code."""
 
     name: str
+    """Id of the method."""
     title: str
     citation: str
     information: tuple[str, ...]
+    """Information that the method declares."""
     stochastic: bool
-    """Whether the seed matters; the others are run once."""
+    """True if the seed matters; a method without it is run once on a task."""
     defaults: dict[str, Any]
-    """Its parameters; None for one that has no default."""
+    """Default of each parameter; None for a parameter without a default."""
     origin: str
     """``built in``, or the path of a method file."""
     code: str
-    """Hash of the code that its results come from."""
+    """Hash of the code that the method's results come from."""
     where: str = field(default="", compare=False)
-    """Module or method file that a worker imports. Not stored."""
+    """Module or method file that a worker imports; not stored."""
 
     @property
     def is_ours(self) -> bool:
-        """Whether it is one of this project's methods."""
+        """True for a built-in method of coartic."""
         return self.origin == BUILT_IN
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Where it is imported from, its name and, as a file may change, its code."""
+        """Place, id and, as a method file may change, code: the arguments of
+        :func:`load_method`."""
         return self.where, self.name, "" if self.is_ours else self.code
 
     def load(self) -> type[Method]:
-        """The method itself, imported once a process, unless its code has changed since."""
+        """Import the method; each process imports a method once, until its code changes."""
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
-        """The method with these parameters."""
+        """Return the method with these parameters."""
         method = self.load()
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """All parameters, defaults included, as plain data; CoarticError names those that are
-        wrong."""
+        """Return all parameters, defaults included, as plain data. Raises CoarticError for a wrong
+        parameter."""
         return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
-        """Why the method with parameters does not apply to a task; None where it does.
+        """Return the reason why the method with parameters does not apply to a task; None if it
+        applies.
 
         Raises CoarticError for wrong parameters.
         """
@@ -78,23 +82,27 @@ class MethodInfo:
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """``quick`` parameters for a check, and the ``config`` of all its parameters: what is done
-        with unknown ones, and whether they can be changed."""
+        """Return ``quick``, the parameters for a check, and ``config``, which says if unknown
+        parameters are refused (``extra``) and if parameters cannot be changed (``frozen``)."""
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
-        """The answer of the method, or of the process that has read its file."""
+        """Return the answer of the method, or of the process that has imported its file."""
         if self.where in READERS:
             return READERS[self.where](self.name, question, *arguments)
         return answer(self.load(), question, *arguments)
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Readers of method files, which this process does not import, by :attr:`MethodInfo.where`."""
+"""Functions that ask a process about its method file, by :attr:`MethodInfo.where`; this process
+does not import method files."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
-    """The answer of a method to :class:`MethodInfo`, as plain data. Raises CoarticError."""
+    """Return the answer of a method to a question of :class:`MethodInfo`, as plain data.
+
+    Raises CoarticError for wrong parameters, and if the method fails to answer.
+    """
     if question == "rules":
         config = method.Parameters.model_config
         wanted = {key: config.get(key) for key in ("extra", "frozen")}
@@ -120,7 +128,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """The info of a method that is imported from ``where``."""
+    """Return the info of a method that is imported from ``where``."""
     fields = method.Parameters.model_fields.items()
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
@@ -141,8 +149,10 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 @cache
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
-    """A method from its module or file, whose ``code`` may change. Raises CoarticError where it is
-    not there."""
+    """Return a method from its module or file. Raises CoarticError if the method is not there.
+
+    A change of ``code``, the hash of a file, makes the process import the file again.
+    """
     module = load_file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
     for method in [*getattr(module, "METHODS", ()), *methods_in(module)]:
         if method.name == name:
@@ -151,7 +161,7 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 
 
 def methods_in(module: ModuleType) -> list[type[Method]]:
-    """The methods that a module itself defines, complete ones."""
+    """Return the methods that a module itself defines, without abstract classes."""
     return [
         value
         for value in vars(module).values()
@@ -163,7 +173,7 @@ def methods_in(module: ModuleType) -> list[type[Method]]:
 
 
 def load_file(path: Path) -> ModuleType:
-    """Import a method file, which can import modules beside it."""
+    """Import a method file, which can import modules from its folder."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

@@ -1,6 +1,6 @@
 """Cells and jobs: the runs that a suite asks for, with their ids and seeds.
 
-A plan is a list of jobs, one for each cell.
+A plan is a list of jobs, one job for each cell.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from coartic.runs.method_info import MethodInfo
 from coartic.tasks.task import Task
 
 SEARCH = "optimum/"
-"""Ids of the searches for the optimum begin so; they alone may state a bound."""
+"""Beginning of the ids of searches for the optimum, the only methods that may state a bound."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A method with its parameters on a task: all that a result depends on, except the seed."""
+    """A method with its parameters on a task: everything that a result depends on, but the seed."""
 
     task: Task
     method: MethodInfo
@@ -58,7 +58,7 @@ class Cell:
     def digest(self) -> str:
         """Hash of the cell without the code of its method.
 
-        A time limit is not a part of it: it decides whether there is a result, not which.
+        A time limit is not a part of the cell: it can prevent a result, and cannot change one.
         """
         return hash_of(
             {
@@ -73,7 +73,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Job:
-    """Runs of one cell, which one process performs side by side."""
+    """Runs of one cell, which a process performs side by side."""
 
     cell: Cell
     seed: int
@@ -86,7 +86,8 @@ class Job:
     """Name of the suite that asks for the runs."""
 
     def run_id(self, number: int) -> str:
-        """Return the id of a run: a hash of cell, seed and number, then the hash of the code."""
+        """Return the id of a run: a hash of cell, seed and number, then the hash of the method's
+        code."""
         text = f"{self.cell.digest} {self.seed} {number}"
         return f"{hashlib.sha256(text.encode()).hexdigest()[:16]}-{self.cell.method.code}"
 
@@ -102,10 +103,10 @@ def cell_of(
     trials: int | None = None,
     trial_budget: int | None = None,
 ) -> Cell:
-    """Return the cell of a method with some parameters, completed by the defaults.
+    """Return the cell of a method with these parameters and defaults for all others.
 
-    ``trials`` stands in place of the default number of trials, if the method has this parameter.
-    Raises CoarticError for parameters that the method does not take.
+    ``trials`` replaces the default number of trials if the method has this parameter. Raises
+    CoarticError for parameters that the method does not take.
     """
     if trials is not None and "trials" in method.defaults:
         method = replace(method, defaults=method.defaults | {"trials": trials})
@@ -116,7 +117,7 @@ def cell_of(
 def run_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of a run, from the suite's seed, the task's name and the run's number alone.
 
-    Every method gets the same seed for the same task and run, so runs are paired.
+    Every method gets the same seed for the same task and number, so that runs are paired.
     """
     words = np.frombuffer(hashlib.sha256(task.encode()).digest()[:16], dtype="<u4")
     sequence = np.random.SeedSequence(suite_seed, spawn_key=(*map(int, words), number))
@@ -130,7 +131,7 @@ def hash_of(content: Any) -> str:
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:
-    """Return the trials that a run with these parameters makes; 0 if they do not say."""
+    """Return the number of trials that a method's parameters name; 0 if they name none."""
     trials = parameters.get("trials")
     return trials if type(trials) is int and trials > 0 else 0
 
@@ -141,5 +142,5 @@ def size_of(plan: Sequence[Job]) -> int:
 
 
 def label_of(method: str, setting: str) -> str:
-    """Return a method with its setting, as it is named where there is no room for both."""
+    """Return the label of a method under a setting, such as ``CMA-ES sigma=0.1``."""
     return f"{method} {setting}".strip()

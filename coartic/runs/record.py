@@ -28,17 +28,18 @@ from coartic.tasks.task import Task
 STATUSES = ("ok", "infeasible", "solver-failed", "timeout", "crashed")
 """Statuses of a run."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
-"""Parts of a run that are scored (its solution, the first trial of a learner, and one noiseless
-greedy trial with what it has learned), and how the columns of each part begin."""
+"""Prefixes of columns by the part of a run that they score: the solution, the first trial of a
+learner, and one noiseless greedy trial after learning."""
 PARTS = tuple(PREFIXES)
 MOST_MOVEMENTS = 10_000
-"""Most movements of one solution."""
+"""Most movements of a solution."""
 MOST_STEPS = 1_000_000
-"""Most movement steps along one solution, its targets visited in order: thousands do."""
+"""Most movement steps of a solution through its targets in order; solutions of the paper's tasks
+have some thousands."""
 
 
 class Score(NamedTuple):
-    """One part of a run as it was executed."""
+    """The score of a part of a run, from its execution."""
 
     reward: int | None = None
     hands: str | None = None
@@ -52,54 +53,57 @@ class Score(NamedTuple):
 
 @dataclass(frozen=True)
 class Times:
-    """Time and memory that a run took: an equal share of its batch's time."""
+    """Time and memory of a run. Runs of one job share the time of the job evenly."""
 
     wall_s: float | None = None
-    """None if the worker died and nobody knows when it began."""
+    """Wall time, s; None if the worker died and its start is unknown."""
     cpu_s: float | None = None
+    """CPU time, s."""
     warm: bool | None = None
-    """Whether the process had run the method before."""
+    """True if the process had run the method before."""
     together: int = 1
-    """Runs of the batch."""
+    """Number of runs of the job."""
     process_peak_mb: float | None = None
-    """Memory of the worker so far, all its runs included."""
+    """Most memory of the worker so far, MiB, with all its earlier runs."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The statement of a method about one run, as plain data."""
+    """The result of a run as its method states it, in plain data, before it is scored."""
 
     status: Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
     reason: str = ""
-    """Why the run is not ok; empty if it is."""
+    """The reason why the run is not ok; empty if the run is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
-    """Movements of each part (:data:`PARTS`) that there is, to be executed and scored."""
+    """Movements by part (:data:`PARTS`), still to be executed and scored."""
     bound: int | None = None
-    """Reward that no solution exceeds, if it is proven."""
+    """Proven reward that no solution exceeds."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Whatever the method keeps beside its solution."""
+    """Further data that the method keeps, such as corrective movements by trial."""
     used: tuple[str, ...] = ()
     """Declared information that the method used."""
     meter: Meter | None = None
-    """None if the worker died."""
+    """Counts of trials, of evaluations and of movements; None if the worker died."""
     rewards: list[Annotated[int, Field(gt=-(2**31), lt=2**31)] | None] = field(default_factory=list)
-    """Reward of each trial; None if the trial failed, or if its reward is not kept."""
+    """Reward of each trial; None if the trial failed or its reward is not kept."""
     times: Times = Times()
     environment: dict[str, Any] | None = None
-    """Versions, platform, processor, threads and commit; None for those of this process."""
+    """Versions, platform, processor, threads and commit; None for the environment of this
+    process."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run."""
+    """One run: its job, its outcome and the scores of its parts."""
 
     job: Job
     """A job of this run alone."""
     outcome: Outcome
-    """What became of the run; its ``parts`` are among the scores."""
+    """The outcome, without ``parts``: the scores have their movements."""
     scores: dict[str, Score]
-    """Scores of the parts (:data:`PARTS`) that there are."""
+    """Scores by part (:data:`PARTS`); empty if the run is not ok."""
     date: str
+    """Date and time at the end of the run, UTC."""
 
     @property
     def cell(self) -> Cell:
@@ -123,27 +127,27 @@ class Run:
 
     @property
     def solution(self) -> Score:
-        """Score of the solution; a blank one if there is none."""
+        """Score of the solution; a blank score if the run has no solution."""
         return self.scores.get("solution", Score())
 
     @property
     def initial(self) -> Score:
-        """Score of the first trial of a learner; a blank one for other methods."""
+        """Score of the first trial of a learner; a blank score for other methods."""
         return self.scores.get("initial", Score())
 
     @property
     def replay(self) -> Score:
-        """Score of the trial after learning; a blank one for other methods."""
+        """Score of the greedy trial after learning; a blank score for other methods."""
         return self.scores.get("replay", Score())
 
     @property
     def counts(self) -> Any:
-        """The meter; one of blanks if the worker died."""
+        """The meter; a meter of blanks if the worker died."""
         return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
 
     @property
     def best_trial(self) -> int | None:
-        """The first trial with the solution's reward, if any."""
+        """The first trial with the reward of the solution, from 0; None if no trial has it."""
         reward, rewards = self.solution.reward, self.outcome.rewards
         return None if reward is None or reward not in rewards else rewards.index(reward)
 
@@ -158,20 +162,20 @@ class Run:
         return self._corrections()[-1]
 
     def _corrections(self) -> list[int | None]:
-        """Corrective movements of a learner in trial 0 and in each tenth of the others; blanks for
-        other methods."""
+        """Return the corrective movements of a learner in trial 0 and in each tenth of the other
+        trials; blanks for other methods."""
         counts = self.outcome.details.get(CORRECTIONS)
         return counts if isinstance(counts, list) and len(counts) == 11 else [None] * 11
 
     @property
     def is_downsampled(self) -> bool:
-        """Whether rewards of some trials are not kept (:meth:`downsample`)."""
+        """True if rewards of some trials are not kept (:meth:`downsample`)."""
         meter = self.outcome.meter
         return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
 
     def downsample(self) -> Run:
         """Return the run with the rewards of its best trial and of the trials that were better than
-        all before; the others are None. It takes a tenth of the room."""
+        all earlier trials; the other rewards are None. The run then takes a tenth of the space."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best
@@ -181,9 +185,9 @@ class Run:
 
     @cached_property
     def result(self) -> str:
-        """Hash of status, bound, rewards of all trials, and solutions to the last joint.
+        """Hash of status, bound, rewards of all trials, and every joint of every movement.
 
-        Equal for runs that came out the same, whatever was spent on the way.
+        Two runs with the same outcome have the same hash, whatever time and evaluations they took.
         """
         content: list[Any] = [self.outcome.status, self.outcome.bound, self.outcome.rewards]
         for part in PARTS:
@@ -191,9 +195,9 @@ class Run:
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
     def movement_data(self, part: str) -> list[list[Any]]:
-        """Return the movements of a part as plain data; none if there is no such part.
+        """Return the movements of a part as plain data; an empty list if the run lacks the part.
 
-        SQLite keeps no sign of zero; adding 0.0 loses it here as well.
+        SQLite drops the sign of -0.0; adding 0.0 drops the sign here as well.
         """
         data = []
         for m in self.scores[part].movements if part in self.scores else ():
@@ -221,7 +225,7 @@ class Run:
         """Return a run from its row of table ``results``, its movements by part, and the rewards of
         its trials.
 
-        Raises ValueError if it is not the run of its id.
+        Raises ValueError if the id of the row belongs to another run.
         """
         meter = {name: row[name] for name in vars(Meter())}
         outcome = Outcome(
@@ -252,15 +256,16 @@ class Run:
 
 
 class Column(NamedTuple):
-    """A column of view ``runs``, which has a row for each run that the last command asked for."""
+    """A column of view ``runs``, which has a row for each run of the plan."""
 
     name: str
     kind: str
-    """Its type in SQL, with ``NOT NULL`` if every run has a value."""
+    """Type in SQL, with ``NOT NULL`` if every run has a value."""
     source: str
-    """Attribute of :class:`Run`, in table ``results``; empty for a column of another table."""
+    """Attribute of :class:`Run` that table ``results`` stores; empty for a column of another
+    table."""
     meaning: str
-    """For the documentation."""
+    """Sentence of the documentation."""
 
 
 COLUMNS = tuple(
@@ -340,8 +345,9 @@ COLUMNS = tuple(
 def movements_from(
     task: Task, rows: Iterable[Mapping[str, Any]], waypoints: Iterable[Mapping[str, Any]] = ()
 ) -> tuple[Movement, ...]:
-    """The movements of one solution from its rows of ``solutions`` and, for movements of kind
-    ``path``, of ``paths``. Raises ValueError where a joint is not a finite number."""
+    """Return the movements of one solution from its rows of table ``movements`` and, for movements
+    along a path, its rows of table ``waypoints``. Raises ValueError for a joint that is not a
+    finite number."""
 
     def joints(row: Mapping[str, Any]) -> list[float]:
         return [row[name] for name in task.robot.joint_names]
@@ -363,9 +369,10 @@ def movements_from(
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions side by side: the only scores that count.
+    """Execute solutions of a task side by side; scores come from these executions alone.
 
-    In place of an execution, the error of a solution that breaks the task's rules.
+    Returns for each solution its execution, or the error of a solution that breaks the rules of
+    the task.
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
@@ -374,7 +381,8 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """The error of a solution that would take very long to execute."""
+    """Return the error of a solution that would take too long to execute; None for a solution
+    within the limits."""
     if len(solution) > MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
     corners = [task.q0]

@@ -46,9 +46,7 @@ if TYPE_CHECKING:
 
 RUNS_FILE = "runs.sqlite"
 FORMAT = 5
-"""Raised when a table changes its meaning, or a table or a view its text."""
-_READ_BY = {1: ", which version 1.1.0 reads", 2: ", which version 2.0.0 reads"}
-"""Released versions of coartic that read an earlier format."""
+"""Number of the format: a change of a table or of a view raises it."""
 _APPLICATION = 0x636F6172  # "coar"
 FAILED_TRIAL = -(2**31)
 """Stored in place of the reward of a trial that did not hit every goal."""
@@ -59,7 +57,7 @@ _DTYPES: dict[str, Any] = {
     **dict.fromkeys(("part", "hand", "kind"), "string"),
     **dict.fromkeys(("result_id", "order", "goal", "ticks"), "Int64"),
 }
-"""Types with which columns of views are read; all have room for missing values."""
+"""Types of the columns of views in data frames; all have room for missing values."""
 _CELL, _JOB = TypeAdapter(Cell), TypeAdapter(Job)
 _JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
 _OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # a journal ends so that names another
@@ -106,13 +104,13 @@ _SURROUNDINGS: dict[str, Any] = {
     **dict.fromkeys(("coartic", "model_code", "python", "platform", "processor", "date"), str),
     **{"command": list, "packages": dict, "cores": int, "commit": str},
 }
-"""Of what kind the facts are that reports show of the surroundings of a suite."""
+"""Types of the facts about the surroundings of a suite that reports show."""
 _LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # how the names of errors begin
-WAIT_S = 1.0  # for another program, before more is done about it
+WAIT_S = 1.0  # wait for another program
 
 
 class Store:
-    """The runs of one results folder. Made by :func:`open_store` and :func:`writing`."""
+    """The runs of one results folder, from :func:`open_store` or :func:`writing`."""
 
     def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
         self.folder = folder
@@ -121,7 +119,8 @@ class Store:
     # What was asked for.
 
     def begin_as(self, other: Store) -> bool:
-        """Become a copy of another store where no run is here, and say whether this is one."""
+        """Become a copy of another store if this store has no run; return True if it has become
+        a copy."""
         if empty := not self.ids():
             other._db.backup(self._db)
         return empty
@@ -129,9 +128,10 @@ class Store:
     def replace_plan(
         self, plan: Sequence[Job], environment: dict[str, Any], command: list[str], date: str
     ) -> None:
-        """Ask for the runs of this plan from now on. Runs of earlier plans stay, and are not shown.
+        """Put a plan in place of the earlier plan. Runs that only the earlier plan asked for stay
+        in the file, and no view shows them.
 
-        Raises CoarticError for a folder of another suite.
+        Raises CoarticError if the folder holds another suite.
         """
         first = plan[0]
         with self.transaction():
@@ -159,7 +159,7 @@ class Store:
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
 
     def plan(self) -> list[Job]:
-        """Return the plan of the folder. Raises CoarticError if there is none yet."""
+        """Return the plan of the folder. Raises CoarticError if no plan is stored yet."""
         with explain_errors(self.folder):
             suite = self._one("SELECT * FROM suite")
             if suite is None:
@@ -178,7 +178,7 @@ class Store:
             return jobs
 
     def made_with(self) -> dict[str, Any]:
-        """Versions, platform, commit, command and date of the last command."""
+        """Return versions, platform, commit, command line and date of the last ``coartic run``."""
         with explain_errors(self.folder):
             row = self._one(
                 "SELECT content, command, date FROM suite JOIN environments ON id = environment"
@@ -193,9 +193,10 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Write all of this block or nothing; it may stand within another.
+        """Write all changes of this block, or none if it fails. A block within another block is a
+        part of that block.
 
-        Raises CoarticError where the disk does not take it, or the file is no longer there.
+        Raises CoarticError if the disk is full or the file is gone.
         """
         if self._db.in_transaction:
             yield
@@ -213,8 +214,8 @@ class Store:
     # Which runs there are.
 
     def present(self) -> list[tuple[int, int, str, float | None]]:
-        """Position of the cell, number, status and time limit of the runs asked for that there
-        are."""
+        """Return the runs of the plan that the folder has: for each run the position of its job in
+        the plan, its number, its status and its time limit in s."""
         query = "SELECT position, run, status, time_limit_s FROM asked"
         with explain_errors(self.folder):
             return list(map(tuple, self._db.execute(query)))
@@ -236,7 +237,7 @@ class Store:
             return Counter(dict(self._db.execute(query)))
 
     def ids(self, prefix: str = "") -> list[str]:
-        """Ids of all runs, asked for or not, that begin so."""
+        """Return the ids of all runs that begin with ``prefix``, of earlier plans as well."""
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         with explain_errors(self.folder):
             return [run_id for (run_id,) in self._db.execute(query, (len(prefix), prefix))]
@@ -244,9 +245,9 @@ class Store:
     # Runs, in and out.
 
     def write(self, runs: Iterable[Run]) -> None:
-        """Keep finished runs together, all of them or none; they replace earlier ones.
+        """Write finished runs, all of them or none, in place of earlier runs with their ids.
 
-        Raises CoarticError where the disk does not take them, or the tables a run.
+        Raises CoarticError if the disk is full or a run does not fit the tables.
         """
         with self.transaction():
             for run in runs:
@@ -258,7 +259,7 @@ class Store:
                     ) from None
 
     def run(self, run_id: str) -> Run:
-        """Return a run by its id. Raises CoarticError if there is none."""
+        """Return a run by its id. Raises CoarticError if the folder has no such run."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
@@ -296,8 +297,11 @@ class Store:
     def movements(
         self, part: str, tasks: Mapping[str, Task], most: int
     ) -> dict[str, tuple[Movement, ...]]:
-        """Movements of one part (:data:`PARTS`) by the ids of the first runs of each cell that are
-        ok, so many at most. ``tasks`` are the plan's, by name."""
+        """Return the movements of a part (:data:`PARTS`) of runs that are ok, by run id.
+
+        Of each cell only the first ``most`` of these runs count. ``tasks`` holds the tasks of the
+        plan by name.
+        """
         points: dict[str, list[Any]] = defaultdict(list)
         of_waypoints = """SELECT run_id, waypoints.* FROM solved
             JOIN waypoints ON result_id = solved.id WHERE place <= ?
@@ -315,8 +319,8 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the runs asked for that made trials, each with the reward of every trial, NaN if it
-        failed."""
+        """Yield the id of each run of the plan that made trials, with the rewards of its trials,
+        shape ``(trials,)``; NaN stands for a failed trial."""
         query = """SELECT run_id, rewards, trials FROM asked
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
         with explain_errors(self.folder):
@@ -327,7 +331,7 @@ class Store:
     # Inside.
 
     def _write_run(self, run: Run) -> None:
-        """Put a run into the tables, in place of an earlier one of its id."""
+        """Write a run into the tables, in place of an earlier run with its id."""
         if earlier := self._one("SELECT id FROM results WHERE run_id = ?", run.id):
             for table in ("movements", "waypoints", "learning"):
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
@@ -354,7 +358,8 @@ class Store:
             self._insert("learning", {"result_id": result, "rewards": blob})
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
-        """Return a cell from its row. Raises ValueError for what no cell has, and TaskError."""
+        """Return a cell from its row. Raises ValueError or TaskError if coartic cannot have written
+        the row."""
         method = {name: row[name] for name in ("title", "citation", "stochastic", "origin", "code")}
         method |= {"name": row["method"], "defaults": json.loads(row["defaults"])}
         method |= {"information": tuple(filter(None, row["information"].split(", ")))}
@@ -370,7 +375,7 @@ class Store:
         return cell
 
     def _environment(self, content: dict[str, Any]) -> int:
-        """Id of the row of an environment, which is inserted where there is none."""
+        """Return the id of the row of an environment; insert the row if it is missing."""
         commit = content.get("commit")
         row = {
             "content": json.dumps(content, ensure_ascii=False, sort_keys=True),
@@ -380,25 +385,26 @@ class Store:
         return self._id_of("environments", row, "content")
 
     def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
-        """Id of the row with these keys, which is inserted where there is none."""
+        """Return the id of the row with the values of these keys; insert the row if it is
+        missing."""
         condition = " AND ".join(f"{key} = ?" for key in keys)
         query = f"SELECT id FROM {table} WHERE {condition}"
         stored = self._one(query, *(row[key] for key in keys))
         return self._insert(table, row) if stored is None else int(stored["id"])
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
-        """Insert a row, lists and tables as JSON; its id."""
+        """Insert a row, lists and tables as JSON, and return its id."""
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
         return int(self._db.execute(text, [*map(as_text, row.values())]).lastrowid or 0)
 
     def _one(self, query: str, *values: object) -> Any:
-        """The first row of a query, or None."""
+        """Return the first row of a query, or None."""
         return self._db.execute(query, values).fetchone()
 
     def _frame(self, view: str) -> pd.DataFrame:
-        """A view as a data frame, with nullable types."""
+        """Return a view as a data frame, with nullable types."""
         import pandas as pd
 
         rows = self._db.execute(f"SELECT * FROM {view}")
@@ -408,7 +414,7 @@ class Store:
             return frame.astype({name: _DTYPES.get(name, "float64") for name in names})  # joints
 
     def _wait_for(self, statement: str) -> None:
-        """Execute it as soon as other programs that have the file open let it."""
+        """Execute a statement as soon as other programs that have the file open allow it."""
         for tries in itertools.count():
             if tries == 2:
                 warnings.warn(
@@ -453,10 +459,10 @@ def cell_row(cell: Cell) -> dict[str, Any]:
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """The runs of a results folder, to be read in this block.
+    """Open a results folder for reading.
 
-    Raises CoarticError for what is no results folder of this version, and while a suite is at
-    work in it.
+    Raises CoarticError if this version of coartic did not write the folder, and while a
+    ``coartic run`` writes into it.
     """
     path = folder / RUNS_FILE
     if not os.path.lexists(path):
@@ -479,8 +485,7 @@ def open_store(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def open_content(content: bytes, name: str) -> Iterator[Store]:
-    """The runs of a results folder whose file is in memory, to be read in this block; ``name``
-    stands for it."""
+    """Open the content of a ``runs.sqlite`` in memory for reading; messages call it ``name``."""
     with closing(connect(":memory:", WAIT_S)) as connection:
         connection.deserialize(content)
         yield Store(Path(name), connection)
@@ -488,10 +493,10 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[Store]:
-    """The runs of a results folder, made where there is none, while this process alone has them.
+    """Open a results folder for writing, for this process alone, and make a missing folder.
 
-    Raises CoarticError where the folder holds something else, cannot be written, or another
-    process is at work in it.
+    Raises CoarticError if the folder holds something else or cannot be written, and while another
+    process writes into it.
     """
     visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
     if not (folder / RUNS_FILE).exists() and any(visible):
@@ -516,10 +521,10 @@ def writing(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Have a folder in this block alone, or with others that share it, where the system and the
-    disk have such locks. What other programs read there is no matter.
+    """Lock a folder for this process, or share the lock with other readers. Systems and disks
+    without such locks are left as they are.
 
-    Raises CoarticError where another process has it.
+    Raises CoarticError while another process holds the lock.
     """
     try:
         import fcntl
@@ -549,7 +554,7 @@ def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
 
 
 def connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """A connection to a path or a ``file:`` address, which waits so long for a lock."""
+    """Return a connection to a path or a ``file:`` address that waits ``timeout_s`` for a lock."""
     connection = sqlite3.connect(
         where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
     )
@@ -560,7 +565,10 @@ def connect(where: str, timeout_s: float) -> sqlite3.Connection:
 
 
 def check_files(folder: Path) -> None:
-    """Raises CoarticError where opening the file of a stranger would change another one."""
+    """Refuse a results folder whose file would make SQLite change another file.
+
+    Raises CoarticError for a link and for the journal of several databases.
+    """
     for ending in ("", "-journal", "-wal", "-shm"):
         path = folder / f"{RUNS_FILE}{ending}"
         if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -576,8 +584,11 @@ def check_files(folder: Path) -> None:
 
 
 def has_tables(connection: sqlite3.Connection) -> bool:
-    """Whether the file has our tables; False for an empty one. Raises CoarticError for others, and
-    ValueError where a run names what is not there: views would not show it."""
+    """Return True if the file has the tables of coartic, and False if the file is empty.
+
+    Raises CoarticError for any other file, and ValueError for a row that names a missing row: no
+    view would show its run.
+    """
 
     def schema(of: sqlite3.Connection) -> set[tuple[str, str, str]]:
         rows = of.execute("SELECT type, name, sql FROM sqlite_master")
@@ -590,11 +601,12 @@ def has_tables(connection: sqlite3.Connection) -> bool:
         if there:
             raise CoarticError("it is not a file of coartic; move it away")
         return False
-    if version != FORMAT:
-        reads = _READ_BY.get(version, "")
-        do = "update coartic" if version > FORMAT else "run the suite again with another --out"
+    if version > FORMAT:
+        raise CoarticError("it was written by a later version of coartic: update coartic")
+    if version < FORMAT:
         raise CoarticError(
-            f"it has format {version}{reads}; this version of coartic reads {FORMAT}: {do}"
+            "it was written by coartic 2.0.0 or earlier; version 2.0.0 reads it. With this version "
+            "run the suite again, with another --out"
         )
     with closing(sqlite3.connect(":memory:")) as ours:
         ours.executescript(_SCHEMA)
@@ -611,7 +623,7 @@ def has_tables(connection: sqlite3.Connection) -> bool:
 
 
 def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
-    """Add columns for these joints."""
+    """Add a column for each of these joints that has no column yet."""
     names = list(dict.fromkeys(names))
     for table in ("movements", "waypoints"):
         there = {column[1] for column in connection.execute(f"PRAGMA table_info({table})")}
@@ -624,12 +636,13 @@ UNREADABLE = (
     *(sqlite3.DatabaseError, zlib.error),
     *(ValueError, KeyError, TypeError, OverflowError, RecursionError),
 )
-"""Errors where the content of a file is not as coartic writes it."""
+"""Errors that a file raises whose content coartic did not write."""
 
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Raises CoarticError for an error of SQLite, and for content that cannot be read."""
+    """Turn an error of this block into a CoarticError, be it an error of SQLite or of the content
+    of the file."""
     try:
         yield
     except (CoarticError, *UNREADABLE) as error:
@@ -637,7 +650,7 @@ def explain_errors(folder: Path) -> Iterator[None]:
 
 
 def explain(path: Path, error: Exception) -> str:
-    """A sentence on a file that cannot be used, with advice where SQLite cannot read it."""
+    """Return a sentence on a file that cannot be used, with advice if SQLite cannot read it."""
     if isinstance(error, CoarticError):
         said = one_line(str(error))
         return said if str(path.parent) in said else f"{path}: {said}"
@@ -667,9 +680,10 @@ def explain(path: Path, error: Exception) -> str:
 
 
 def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:
-    """Rewards of all trials as they are stored: those that failed are :data:`FAILED_TRIAL`.
+    """Return the stored rewards of a run, shape ``(trials,)``: :data:`FAILED_TRIAL` stands for a
+    trial that failed or whose reward is not kept.
 
-    Raises ValueError where there are more of them than trials, some of which have none kept.
+    Raises ValueError for more rewards than trials.
     """
     size = 4 * min(trials or 0, MOST_TRIALS)
     content = zlib.decompressobj().decompress(blob, size + 1)
@@ -679,7 +693,7 @@ def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:
 
 
 def check_runs(runs: pd.DataFrame) -> pd.DataFrame:
-    """View ``runs``, if all is of the kind that runs have. Raises ValueError where it is not."""
+    """Return view ``runs`` unchanged. Raises ValueError for a value that no run can have."""
     solved = runs.status == "ok"
     rules = {"status": runs.status.isin(STATUSES)}
     for name in ("reward", "hands"):
