@@ -1,10 +1,9 @@
-"""From a suite and a request to a plan: every run with all its parameters."""
+"""Plan a suite: from a suite and a request to jobs, with all parameters of every run."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,25 +12,25 @@ from pydantic import BeforeValidator, Field, PlainValidator, ValidationError
 
 from coartic import CoarticError, Task, builtin_tasks, load_task
 from coartic.benchmarks.registry import Registry, methods_named, registry
-from coartic.benchmarks.suites import WILDCARD, Suite, changed_tasks, load_suite
+from coartic.benchmarks.suites import WILDCARD, Suite, load_suite, tasks_of
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.internal.text import unknown
 from coartic.internal.validation import FileData, error_saying, explain_inline
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Cell, Job, cell_of, trials_in
+from coartic.runs.plan import Job, cell_of, trials_in
 from coartic.tasks.families import instance_of, named_by, own_families
 from coartic.tasks.task import address_of, check_task
 
 
 def task_or_name(value: Any) -> Task | str:
-    """Return a task or its name; a path as a text."""
+    """Return a task, or its name or path as a text."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise error_saying(f"{value!r} is no task; it should be a name, a path or a task")
 
 
 def number_of_python(value: Any) -> Any:
-    """Return a number of NumPy as a number of Python, and any other value as it is."""
+    """Return a NumPy number as a Python number, and any other value unchanged."""
     return value.item() if isinstance(value, np.number) else value
 
 
@@ -41,32 +40,32 @@ _plain = BeforeValidator(number_of_python)
 
 
 class Request(FileData):
-    """The part of a suite that is run, and how."""
+    """The part of a suite to run, with its numbers of runs and trials, its seed and its limits."""
 
     tasks: _Tasks = ()
     """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
-    (Task); without any, all of the suite's. A task that the suite does not have runs under every
-    method of ``methods``, or of the suite, that applies to it."""
+    (Task); by default all tasks of the suite. A task that the suite does not have is run with every
+    method of ``methods``, or of the suite, that applies to the task."""
     methods: tuple[str, ...] = ()
-    """Ids of methods; ``"optimum/*"`` stands for all that begin so. Without any, all of the
-    suite's. A method that the suite does not have runs on all tasks of the suite that it applies
-    to."""
+    """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite.
+    A method that the suite does not have is run on every task of the suite that it applies to."""
     method_files: _Files = ()
-    """Files with methods of your own."""
+    """Files with your own methods."""
     family_files: _Files = ()
-    """Files with families of your own."""
+    """Files with your own families."""
     runs: Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True), _plain] | None = None
-    """Runs of each cell; by default the suite's number."""
+    """Runs of each cell; by default the number of the suite."""
     trials: Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True), _plain] | None = None
-    """Trials of each run, for methods that have this parameter; by default the suite's number."""
+    """Trials of each run, for methods that have this parameter; by default the number of the
+    suite."""
     seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True), _plain] = 0
     """Seed of the suite."""
     time_limit_s: Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True), _plain] | None = (
         None
     )
-    """CPU time of a run, s; by default the suite's."""
+    """CPU time of a run, s; by default the limit of the suite."""
     trial_budget: Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True), _plain] | None = None
-    """Most physical trials of a run, of any method."""
+    """Most physical trials of a run, whatever its method."""
 
 
 def request_for(**options: Any) -> Request:
@@ -95,7 +94,7 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     Raises
     ------
     CoarticError
-        For anything unknown, out of bounds, or that does not go together.
+        A name is unknown, a number is out of bounds, or options contradict each other.
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):
@@ -109,110 +108,105 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     Raises CoarticError for unknown names, for a task whose name is taken, for parameters that a
     method does not take, for more than :data:`MOST_CELLS` cells, and if nothing is left to run.
     """
-    families = own_families(request.family_files)
-
-    def task_named(name: str) -> Task:
-        address = address_of(name)
-        if address is not None and address.family in families:
-            return instance_of(families[address.family], address)
-        return load_task(name)
-
     methods = [registered[m] for name in request.methods for m in methods_named(name, registered)]
-    names, own = asked_tasks(request.tasks, task_named)
-    in_suite = {name for block in suite.blocks for name in block.task_names(own)}
-    others = (name for name in names if name not in in_suite and address_of(name))
-    own |= {name: task_named(name) for name in others if name not in own}
-    suite = with_numbers(suite, request)
-    cells = list(itertools.islice(suite_cells(suite, registered, own, task_named), MOST_CELLS + 1))
-    if len(cells) > MOST_CELLS:
+    names, own, task_named = asked_tasks(suite, request)
+    of_suite = suite_jobs(suite, request, registered, own, task_named)
+    jobs = list(itertools.islice(of_suite, MOST_CELLS + 1))
+    if len(jobs) > MOST_CELLS:
         raise CoarticError(
             f"suite {suite.name!r} asks for more than {MOST_CELLS:_} combinations "
             "(tasks x moves x methods x grid)"
         )
-    cells += extra_cells(suite, own, methods, [cell for cell, _ in cells])
-    there = dict.fromkeys([*(cell.task.name for cell, _ in cells), *own])
+    jobs += extra_jobs(suite, request, own, methods, jobs)
+    there = dict.fromkeys([*(job.cell.task.name for job in jobs), *own])
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
         words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
         raise CoarticError("\n".join(words))
-    methods = methods or [*{cell.method.name: cell.method for cell, _ in cells}.values()]
+    methods = methods or [*{job.cell.method.name: job.cell.method for job in jobs}.values()]
     ids = {method.name for method in methods}
-    cells = [(cell, runs) for cell, runs in cells if not names or cell.task.name in names]
-    chosen = [(cell, runs) for cell, runs in cells if cell.method.name in ids]
-    busy = {cell.task.name for cell, _ in chosen}
+    jobs = [job for job in jobs if not names or job.cell.task.name in names]
+    chosen = [job for job in jobs if job.cell.method.name in ids]
+    busy = {job.cell.task.name for job in chosen}
     if not busy.issuperset(own) or not chosen:
         idle = [task for task in own.values() if task.name not in busy]
-        raise CoarticError(why_nothing_runs(suite, idle, methods, [cell for cell, _ in cells]))
-    return jobs_of(suite, request, chosen)
+        raise CoarticError(why_nothing_runs(suite, idle, methods, jobs))
+    return distinct_jobs(chosen)
 
 
 def asked_tasks(
-    asked: Iterable[Task | str], task_named: Callable[[str], Task]
-) -> tuple[dict[str, None], dict[str, Task]]:
-    """Return the names of the tasks that a request names, and its own tasks by name: files, and
-    tasks that are neither shipped nor an instance of a family.
+    suite: Suite, request: Request
+) -> tuple[dict[str, None], dict[str, Task], Callable[[str], Task]]:
+    """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
+    a function that gives a task by its name.
 
-    Raises CoarticError for a task whose name belongs to another task.
+    A request brings its task files, its tasks, and instances that the suite does not have. Raises
+    CoarticError for a task whose name belongs to another task.
     """
+    families = own_families(request.family_files)
     names, own = dict[str, None](), dict[str, Task]()
-    for each in asked:
+
+    def task_named(name: str) -> Task:
+        address = address_of(name)
+        if name in own:
+            return own[name]
+        if address is not None and address.family in families:
+            return instance_of(families[address.family], address)
+        return load_task(name)
+
+    for each in request.tasks:
         if isinstance(each, str) and not each.endswith(".toml"):
             names |= dict.fromkeys(named_by(each))
             continue
         task = load_task(each) if isinstance(each, str) else check_task(each)
         is_known = task.name in builtin_tasks() or address_of(task.name)
-        there = task_named(task.name) if is_known else own.setdefault(task.name, task)
-        if there != task:
+        if (task_named(task.name) if is_known else own.setdefault(task.name, task)) != task:
             whose = "a shipped task" if is_known else "another task"
             raise CoarticError(
                 f"{each}: name {task.name!r} is already taken by {whose}: give it another name"
             )
         names[task.name] = None
-    return names, own
+    of_suite = {name for block in suite.blocks for each in block.tasks for name in named_by(each)}
+    brought = (name for name in names if name not in of_suite and address_of(name))
+    return names, own | {name: task_named(name) for name in brought}, task_named
 
 
-def with_numbers(suite: Suite, request: Request) -> Suite:
-    """Return the suite with the numbers of runs and trials and the time limit of a request."""
-    asked = request.model_dump(include={"runs", "trials", "time_limit_s"}, exclude_none=True)
-    blocks = [
-        block.model_copy(update={"runs": request.runs or block.runs}) for block in suite.blocks
-    ]
-    return suite.model_copy(update=asked | {"blocks": tuple(blocks)})
-
-
-def suite_cells(
-    suite: Suite, registered: Registry, own: Mapping[str, Task], task_named: Callable[[str], Task]
-) -> Iterator[tuple[Cell, int]]:
-    """Yield the cells of a suite, each with its number of runs. A block for all tasks is for one's
-    own as well, but moves no goal of them.
+def suite_jobs(
+    suite: Suite,
+    request: Request,
+    registered: Registry,
+    own: Mapping[str, Task],
+    task_named: Callable[[str], Task],
+) -> Iterator[Job]:
+    """Yield the jobs of a suite; ``own`` are the tasks that the request brings, by name.
 
     Raises CoarticError for a method that is unknown or does not apply to a task, and for parameters
-    that it does not take.
+    that a method does not take.
     """
     for block in suite.blocks:
         ids = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
-        is_open = WILDCARD in "".join((*block.methods, *block.tasks))  # it is for all that applies
-        for name in block.task_names(own):
-            if name in own and block.move is not None and WILDCARD in block.tasks:
-                continue
-            task = own.get(name) or task_named(name)
-            if block.goals is not None and len(task.goals) not in block.goals:
-                continue
-            for changed, id_ in itertools.product(changed_tasks(task, suite, block), ids):
-                reason = registered[id_].why_not(changed, block.parameters)
+        is_open = WILDCARD in "".join((*block.methods, *block.tasks))  # skip what does not apply
+        for task in tasks_of(suite, block, own, task_named):
+            for method in map(registered.__getitem__, ids):
+                reason = method.why_not(task, block.parameters)
                 if reason is not None and not is_open:
                     raise CoarticError(f"suite {suite.name!r}: {reason}")
                 for values in itertools.product(*block.grid.values()) if reason is None else ():
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
-                    cell = cell_of(changed, registered[id_], parameters, suite.trials)
-                    yield cell, block.runs or suite.runs
+                    yield job_of(suite, request, task, method, parameters, block.runs)
 
 
-def extra_cells(
-    suite: Suite, own: Mapping[str, Task], methods: Iterable[MethodInfo], cells: Sequence[Cell]
-) -> Iterator[tuple[Cell, int]]:
-    """Yield the cells that a request adds to the cells of a suite: its methods that the suite does
-    not have on the suite's tasks, and its own tasks under its methods, or all of the suite."""
+def extra_jobs(
+    suite: Suite,
+    request: Request,
+    own: Mapping[str, Task],
+    methods: Sequence[MethodInfo],
+    jobs: Sequence[Job],
+) -> Iterator[Job]:
+    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: its methods that the
+    suite does not have on the tasks of the suite, and the tasks that it brings with its methods, or
+    with all methods of the suite."""
+    cells = [job.cell for job in jobs]
     of_suite = {cell.method.name: cell.method for cell in cells}
     tasks = {cell.task.name: cell.task for cell in cells if cell.task.name not in own}
     there = {(cell.task.name, cell.label) for cell in cells}
@@ -222,31 +216,48 @@ def extra_cells(
         *itertools.product(own.values(), methods or of_suite.values()),
     ):
         if (task.name, method.name) not in there and method.why_not(task) is None:
-            yield cell_of(task, method, {}, suite.trials), suite.runs
+            yield job_of(suite, request, task, method)
+
+
+def job_of(
+    suite: Suite,
+    request: Request,
+    task: Task,
+    method: MethodInfo,
+    parameters: Mapping[str, Any] | None = None,
+    runs: int | None = None,
+) -> Job:
+    """Return the job of a method with parameters on a task. Numbers of the request go before
+    ``runs``, the number of a block, and before the numbers of the suite."""
+    trials = request.trials or suite.trials
+    cell = cell_of(task, method, parameters or {}, trials, request.trial_budget)
+    numbers = range((request.runs or runs or suite.runs) if method.stochastic else 1)
+    limit_s = request.time_limit_s or suite.time_limit_s
+    return Job(cell, request.seed, numbers, limit_s, suite.name)
 
 
 def why_nothing_runs(
-    suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], cells: Sequence[Cell]
+    suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], jobs: Sequence[Job]
 ) -> str:
-    """Return a sentence on why methods have nothing to run: on the first of one's own tasks that
-    are ``idle``, or, if there is none, on the tasks of these cells."""
-    tasks = idle[:1] or list({cell.task.name: cell.task for cell in cells}.values())
+    """Return a sentence that says why methods have nothing to run: on the first task of ``idle``,
+    the tasks of the request without a job, or else on the tasks of ``jobs``."""
+    tasks = idle[:1] or list({job.cell.task.name: job.cell.task for job in jobs}.values())
     reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)
-    there_is = ", ".join(dict.fromkeys(cell.label for cell in cells)) or "nothing there"
+    there_is = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "nothing there"
     why = "; ".join(filter(None, reasons)) or f"suite {suite.name!r} has {there_is}"
     what = f"task {idle[0].name!r}" if idle else "what was asked for"
     return f"no method to run on {what}: {why}."
 
 
-def jobs_of(suite: Suite, request: Request, cells: Iterable[tuple[Cell, int]]) -> list[Job]:
-    """Return a job for each cell with its number of runs; a cell that is there twice has one.
+def distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
+    """Return the jobs, one for each cell.
 
-    Raises CoarticError for two tasks of one name, two numbers of runs, and too many trials.
+    Raises CoarticError for two tasks of one name, for two numbers of runs of a cell, and for too
+    many trials.
     """
-    tasks, jobs = dict[str, Task](), dict[str, Job]()
-    for each, runs in cells:
-        cell = replace(each, trial_budget=request.trial_budget)
-        where = f"{cell.task.name} x {cell.label}"
+    tasks, distinct = dict[str, Task](), dict[str, Job]()
+    for job in jobs:
+        cell, where = job.cell, f"{job.cell.task.name} x {job.cell.label}"
         if tasks.setdefault(cell.task.name, cell.task) != cell.task:  # names distinguish results
             raise CoarticError(
                 f"two different tasks are called {cell.task.name!r}: give one another name"
@@ -256,11 +267,9 @@ def jobs_of(suite: Suite, request: Request, cells: Iterable[tuple[Cell, int]]) -
                 f"{where}: {trials_in(cell.parameters):_} trials a run; at most {MOST_TRIALS:_} "
                 "are kept"
             )
-        numbers = range(runs if cell.method.stochastic else 1)
-        job = Job(cell, request.seed, numbers, suite.time_limit_s, suite.name)
-        if jobs.setdefault(cell.digest, job).numbers != numbers:
+        if (first := distinct.setdefault(cell.digest, job)).numbers != job.numbers:
             raise CoarticError(
-                f"{where}: the suite asks for {len(jobs[cell.digest].numbers)} runs of it, and "
-                f"then for {len(numbers)}; give one number"
+                f"{where}: the suite asks for {len(first.numbers)} runs of it, and then for "
+                f"{len(job.numbers)}; give one number"
             )
-    return list(jobs.values())
+    return list(distinct.values())

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
@@ -82,17 +83,6 @@ class Block(FileData):
             if len(set(values)) < len(values):
                 raise error_saying(f"{brief_value(name)} has the same value twice in the grid")
         return self
-
-    def task_names(self, user_tasks: Iterable[str]) -> list[str]:
-        """Names (or files) of the tasks; a block for all tasks is for the user's as well.
-
-        ``FAMILY/v1/i000..i039`` are instances of a family (:mod:`coartic.tasks.families`).
-        """
-        every = [*builtin_tasks(), *user_tasks]
-        names: dict[str, None] = {}
-        for name in dict.fromkeys(self.tasks):
-            names |= dict.fromkeys(every if name == WILDCARD else named_by(name))
-        return list(names)
 
 
 class Suite(FileData):
@@ -178,6 +168,22 @@ def read_suite(path: Path) -> Suite:
     except ValidationError as error:
         keys = [*Suite.model_fields, *Block.model_fields, *Move.model_fields]
         raise CoarticError(explain_file(str(path), error, keys)) from None
+
+
+def tasks_of(
+    suite: Suite, block: Block, own: Mapping[str, Task], task_named: Callable[[str], Task]
+) -> Iterator[Task]:
+    """Yield the tasks of a block as the block changes them. A block for all tasks is for ``own``,
+    the user's tasks by name, as well, and moves none of their goals."""
+    is_for_all = WILDCARD in block.tasks
+    every = [*builtin_tasks(), *own]
+    names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
+    for name in dict.fromkeys(itertools.chain(*names)):
+        if name in own and block.move is not None and is_for_all:
+            continue
+        task = own.get(name) or task_named(name)
+        if block.goals is None or len(task.goals) in block.goals:
+            yield from changed_tasks(task, suite, block)
 
 
 def changed_tasks(task: Task, suite: Suite, block: Block) -> list[Task]:
