@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, ValidationError
 
 from coartic import CoarticError, Task, builtin_tasks, load_task
 from coartic.benchmarks.registry import Registry, methods_named, registry
-from coartic.benchmarks.suites import WILDCARD, Suite, load_suite, tasks_of
+from coartic.benchmarks.suites import WILDCARD, Suite, check_kind, load_suite, tasks_of
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.internal.text import unknown
 from coartic.internal.validation import FileData, error_saying, explain_inline
@@ -143,6 +143,8 @@ def asked_tasks(
     A request brings its task files, its tasks, and instances that the suite does not have. Raises
     CoarticError for a task whose name belongs to another task.
     """
+    for path in request.family_files:
+        check_kind(str(path), "family")
     families = own_families(request.family_files)
     names, own = dict[str, None](), dict[str, Task]()
 

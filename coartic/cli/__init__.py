@@ -1,7 +1,8 @@
-"""The command line. It sits on top of the four packages; nothing imports it.
+"""The command line, on top of the four packages, which do not import it.
 
-Each command is a function in a file by what it does; it imports what it needs when
-it is called, so that help and completion are there at once.
+Each command is a function: of :mod:`~coartic.cli.run`, :mod:`~coartic.cli.read` or
+:mod:`~coartic.cli.draw`. A command imports other packages only when it is called, so that help and
+completion are fast.
 """
 
 from __future__ import annotations
@@ -49,10 +50,10 @@ def _options(
 
 
 class Command(TyperCommand):
-    """A command whose usage has no braces: they would look like a choice."""
+    """A command whose usage shows arguments without braces, which would look like a choice."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """The words after the command's name."""
+        """Return the words after the name of the command."""
         return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
 
 
@@ -70,14 +71,14 @@ COMMANDS = (
     (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
     (read.cite, "results/comparison --analysis"),
 )
-"""The commands as people need them, each with the arguments of the example in its help."""
+"""The commands in the order of the help, each with the arguments of its example."""
 for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
     app.command(name=name, cls=Command, epilog=f"Example: coartic {name} {example}")(command)
 
 
 def main() -> None:
-    """Run the command line; exit code 2 for errors that the user can put right."""
+    """Run the command line; an error that the user can correct exits with code 2."""
     gc.set_threshold(100_000, 50, 1_000)  # what is imported stays: do not look through it often
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # it is closed: its number would go to a file of ours

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have, and the names that may stand in them."""
+"""Arguments and options of several commands, and the names that users may write in them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,13 @@ if TYPE_CHECKING:
 
 
 def path(what: str, metavar: str, *names: str) -> Any:
-    """An option that is a file or a folder."""
+    """Return an option for a file or a folder."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
+
+
+def option(metavar: str, what: str, *names: str) -> Any:
+    """Return an option for text, or for files that are read later."""
+    return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
 Results = Annotated[
@@ -30,16 +35,13 @@ In = Annotated[Path, path("Where to look for the run.", "FOLDER", "--in")]
 Out = Annotated[Path | None, path("File to write.", "FILE")]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 MethodFiles = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--method-file", readable=False, metavar="FILE", help="Methods of your own (Python)."
-    ),
+    list[Path] | None, option("FILE", "Methods of your own (Python).", "--method-file")
 ]
 
 
 def within(option: str, what: str, least: float, most: float, unit: str = "N") -> Any:
-    """An option that is a number from ``least`` to ``most``, a whole one where ``least`` is an int.
-    Raises CoarticError for anything else when it is read."""
+    """Return an option for a number from ``least`` to ``most``, a whole number if ``least`` is an
+    int. Reading any other value raises CoarticError."""
 
     def read(text: str) -> Any:
         value: Any = text
@@ -56,14 +58,14 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
 
 
 def listed(text: str | None) -> list[str]:
-    """Return the names that an option has between commas."""
+    """Return the names in an option that are separated by commas."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def id_named(name: str, names: Mapping[str, str]) -> str:
-    """The id of what people call so, in small letters or large; ``name`` itself for none.
+    """Return the id of a name, whatever its case; an unknown name is returned unchanged.
 
-    ``names`` are people's names by id; an id goes before a name.
+    ``names`` holds the names that people use by id. If a name is also an id, the id counts.
     """
     called = {words.casefold(): each for each, words in names.items() if words}
     ids = {each.casefold(): each for each in names}
@@ -71,7 +73,7 @@ def id_named(name: str, names: Mapping[str, str]) -> str:
 
 
 def tasks_meant(names: Sequence[str]) -> list[str]:
-    """Tasks by their ids, where people's names for them may stand; other names as they are."""
+    """Return the ids of tasks from names that users write; other names are returned unchanged."""
     from coartic import builtin_tasks, load_task
 
     known = {name: load_task(name).label for name in builtin_tasks()}
@@ -79,7 +81,7 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
 
 
 def method_names(registered: Registry) -> Mapping[str, str]:
-    """People's names of methods by id, empty where they have none."""
+    """Return the names that people use for methods, by id; empty for a method without a name."""
     from coartic.analysis.methods import title_of
     from coartic.learner.conditions import ABLATIONS, CONDITIONS
 
@@ -89,7 +91,7 @@ def method_names(registered: Registry) -> Mapping[str, str]:
 
 
 def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
-    """Methods by their ids, where people's names for them and wildcards may stand.
+    """Return the ids of methods from names and wildcards that users write.
 
     Raises CoarticError for an unknown name.
     """
@@ -110,5 +112,5 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
 
 
 def file_name(method: str) -> str:
-    """The name of the file that ``coartic new`` writes for a method."""
+    """Return the name of the file that ``coartic new`` writes for a method."""
     return re.sub(r"\W", "_", method) + ".py"

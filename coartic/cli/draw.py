@@ -1,4 +1,4 @@
-"""Commands that draw."""
+"""Commands that draw: pictures of tasks, films of runs, and the page to play with."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from coartic.errors import CoarticError
 from coartic.internal.text import counted
 
 _PICTURED = 12
-"""Tasks of a picture, at most."""
+"""Most tasks of a picture."""
 
 
 def draw(

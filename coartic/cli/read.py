@@ -56,7 +56,8 @@ def report(
 
 
 def say_answers(study: Study, *more: tuple[str, str]) -> None:
-    """Print the answers of a folder, why runs failed if some did, and pairs of word and text."""
+    """Print the answers of a study, the reasons of failed runs, and further pairs of word and
+    text."""
     from coartic.analysis.report.about import answers, limits
 
     pairs = [(section.answer, " ".join(lines)) for section, lines in answers(study)]
@@ -68,7 +69,8 @@ def say_answers(study: Study, *more: tuple[str, str]) -> None:
 
 
 def exit_if_parts_failed(study: Study) -> None:
-    """Name the parts of the report that could not be made; with any, exit with code 1."""
+    """Print the parts of the report that could not be made, and exit with code 1 if there are
+    any."""
     from coartic.analysis.report.about import failures
 
     for part, reason in failures(study).items():

@@ -1,9 +1,10 @@
-"""Commands that run suites and single runs, list them, and begin a method of one's own."""
+"""Commands that run suites and single runs, list them, and begin your own method."""
 
 from __future__ import annotations
 
+import itertools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,6 +23,11 @@ from coartic.internal.threads import MOST_JOBS
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
     from coartic.benchmarks.registry import Registry
+    from coartic.benchmarks.suites import Suite
+    from coartic.runs.method_info import MethodInfo
+    from coartic.runs.plan import Job
+    from coartic.tasks.families import Family
+    from coartic.tasks.task import Task
 
 
 def run(
@@ -33,9 +39,7 @@ def run(
     ] = None,
     folder: Annotated[
         str | None,
-        typer.Option(
-            "--out", metavar="FOLDER", help="Folder for the results; results/SUITE if not given."
-        ),
+        given.option("FOLDER", "Folder for the results; results/SUITE if not given.", "--out"),
     ] = None,
     runs: Annotated[
         int | None, given.within("--runs", "Runs of each method on each task.", 1, MOST_RUNS)
@@ -47,17 +51,14 @@ def run(
         int | None, given.within("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
     ] = None,
     tasks: Annotated[
-        str | None,
-        typer.Option(metavar="A,B", help="Only these tasks, such as two-armed-1, or files (TOML)."),
+        str | None, given.option("A,B", "Only these tasks, such as two-armed-1, or files (TOML).")
     ] = None,
     methods: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y", help="Only these methods, such as EC4, CMA-ES or 'optimum/*'."),
+        str | None, given.option("X,Y", "Only these methods, such as EC4, CMA-ES or 'optimum/*'.")
     ] = None,
     method_file: given.MethodFiles = None,
     family_file: Annotated[
-        list[Path] | None,
-        typer.Option(readable=False, metavar="FILE", help="A family of your own (TOML)."),
+        list[Path] | None, given.option("FILE", "A family of your own (TOML).")
     ] = None,
     seed: Annotated[int, given.within("--seed", "Seed of the suite.", 0, MOST_SEED)] = 0,
     time_limit: Annotated[
@@ -69,69 +70,68 @@ def run(
         given.within("--trial-budget", "Most trials that a run may make.", 1, MOST_TRIALS),
     ] = None,
     scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead of this machine."),
+        str | None, given.option("ADDRESS", "Dask scheduler to use instead of this machine.")
     ] = None,
     include: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Include the runs of a folder, or of the 'shipped' results.",
-        ),
+        given.option("FOLDER", "Include the runs of a folder, or of the 'shipped' results."),
     ] = None,
 ) -> None:
-    """Run the missing part of a suite and say what came out.
+    """Run the missing part of a suite and print the findings.
 
     If it is interrupted, repeat the command: it resumes where it stopped, and repeats runs that
     crashed.
     """
-    from coartic.benchmarks.cluster import Dask
-    from coartic.benchmarks.include import include_folders
     from coartic.benchmarks.planning import plan, request_for
-    from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.runner import perform
-    from coartic.benchmarks.suites import check_kind, load_suite, suites
+    from coartic.benchmarks.suites import load_suite, suites
 
     if suite is None:
         raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
-    chosen = load_suite(suite)
-    out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    for file in family_file or ():
-        check_kind(str(file), "family")
-    registered = registry(method_file or ())
+    chosen, registered = load_suite(suite), registry(method_file or ())
     names = given.methods_meant(given.listed(methods), registered)
-    if include and not names:  # the user's own alone
+    if include and not names:  # the user's own methods alone
         names = [name for name, info in registered.items() if info.where.endswith(".py")]
     request = request_for(
         tasks=given.tasks_meant(given.listed(tasks)),
         methods=names,
         family_files=family_file or (),
-        runs=runs,
-        trials=trials,
-        seed=seed,
-        time_limit_s=time_limit,
-        trial_budget=trial_budget,
+        **{"runs": runs, "trials": trials, "seed": seed},
+        **{"time_limit_s": time_limit, "trial_budget": trial_budget},
     )
-    jobs_asked = plan(chosen, request, registered)
+    out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
+    perform_and_say(plan(chosen, request, registered), out, include or [], jobs, scheduler)
+
+
+def perform_and_say(
+    plan: Sequence[Job], out: Path, include: Sequence[str], jobs: int | None, scheduler: str | None
+) -> None:
+    """Perform the missing runs of a plan and print the findings; exit with code 1 if a run crashed.
+
+    ``include`` names folders whose runs are copied into folder ``out`` first. Runs are performed by
+    a Dask scheduler, or by this machine with ``jobs`` processes.
+    """
+    from coartic.analysis.study import load
+    from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.include import include_folders
+    from coartic.benchmarks.pool import Local
+    from coartic.benchmarks.runner import perform
+
     display = Display()
 
     def saved() -> str:
         done = counted(display.done, "finished run")
-        kept = f" To report {display.others} there, repeat the earlier command." * bool(
-            display.others
-        )
+        others = f" To report {display.others} there, repeat the earlier command."
+        kept = others if display.others else ""
         return one_line(f"Saved in {out}: {done}; repeat the command to resume.{kept}")
 
     with interruptible(saved), display:
         if include:
             display.line(f"Copying {' and '.join(include)}.")
-            jobs_asked = include_folders(jobs_asked, include, out)
+            plan = include_folders(plan, include, out)
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
-        progress = perform(jobs_asked, out, executor=executor, watch=display.update)
+        progress = perform(plan, out, executor=executor, watch=display.update)
     say(str(progress))
-    from coartic.analysis.study import load
-
     study = load(out)
     say_answers(study, ("Next", f"coartic report {out}"))
     exit_if_parts_failed(study)
@@ -153,7 +153,7 @@ def list_(
 
 
 def overview(registered: Registry) -> Iterator[tuple[str, str]]:
-    """Names of tasks, families, suites and methods, on one screen."""
+    """Yield the names of tasks, families, suites and methods, to fit one screen."""
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import suites
     from coartic.tasks.families import shipped_families
@@ -170,14 +170,12 @@ def overview(registered: Registry) -> Iterator[tuple[str, str]]:
     yield "More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"
 
 
-def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
-    """Properties of a task, a suite, a family or a method.
+def describe(name: str, registered: Registry) -> Iterable[tuple[str, str]]:
+    """Return the properties of a task, a suite, a family or a method, as pairs of word and text.
 
-    Raises CoarticError for another name.
+    Raises CoarticError for any other name.
     """
     from coartic import builtin_tasks, load_task
-    from coartic.analysis.methods import title_of
-    from coartic.analysis.words import number
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
@@ -185,51 +183,70 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     (name,) = given.tasks_meant([name])
     if name.endswith(".toml"):
         check_kind(name, "suite", "task")
-    if (kind := kind_of(name)) == "suite":
-        suite = load_suite(name)
-        yield "Suite", f"{name}: {suite.title}"
-        yield "", suite.description
-        runs = sorted({block.runs or suite.runs for block in suite.blocks})
-        counts = " or ".join(map(str, runs))
-        trials = number(suite.trials) if suite.trials else "no"
-        yield "Runs", f"{counts} of each method on each task, {trials} trials a run"
-        asked = [t for block in suite.blocks for t in block.tasks]
-        methods = [m for block in suite.blocks for m in block.methods]
-        tasks = [t for name in asked for t in (builtin_tasks() if name == "*" else [name])]
-        yield "Tasks", ", ".join(dict.fromkeys(tasks))
-        yield "Methods", ", ".join(dict.fromkeys(methods))
-        yield "Run it", f"coartic run {name}"
-    elif name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
-        task = load_task(name)
-        yield "Task", f"{name} ({task.label}): {task.description}"
-        yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
-        yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
-        yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
-        if name in builtin_tasks():
-            yield "Goals are", "reconstructed" if task.reconstructed else "published in the paper"
-    elif kind == "shipped family":
-        family = shipped_families().get(name) or shipped_families()[f"{name}/v1"]
-        yield "Family", f"{family.name}: {family.description}"
-        yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
-        yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
-    else:
-        try:
-            methods = given.methods_meant([name], registered)
-        except CoarticError as error:
-            if not str(error).startswith("unknown"):
-                raise
-            names = [*suites(), *builtin_tasks(), *shipped_families(), *registered]
-            raise CoarticError(unknown("task, suite, method or family", name, names)) from error
-        for info in map(registered.__getitem__, methods):
-            applies = (t for t in builtin_tasks() if info.why_not(load_task(t)) is None)
-            parameters = [f"{k}={v}" for k, v in info.defaults.items()]
-            yield "Method", f"{info.name}: {info.title}"
-            yield "Called", title_of(info.name)
-            yield "Information", ", ".join(info.information)
-            yield "Parameters", ", ".join(parameters) or "none"
-            yield "Tasks", ", ".join(applies) or "none of the four"
-            yield "Runs", "differ by seed" if info.stochastic else "are all the same"
-            yield "Cites", info.citation or "nothing"
+    kind, families = kind_of(name), shipped_families()
+    if kind == "suite":
+        return describe_suite(name, load_suite(name))
+    if name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
+        return describe_task(name, load_task(name))
+    if kind == "shipped family":
+        return describe_family(families.get(name) or families[f"{name}/v1"])
+    try:
+        ids = given.methods_meant([name], registered)
+    except CoarticError as error:
+        if not str(error).startswith("unknown"):
+            raise
+        names = [*suites(), *builtin_tasks(), *families, *registered]
+        raise CoarticError(unknown("task, suite, method or family", name, names)) from error
+    return itertools.chain(*(describe_method(registered[id_]) for id_ in ids))
+
+
+def describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
+    """Yield title, size, tasks and methods of a suite; ``name`` is its name or its file."""
+    from coartic import builtin_tasks
+    from coartic.analysis.words import number
+
+    yield "Suite", f"{name}: {suite.title}"
+    yield "", suite.description
+    runs = " or ".join(map(str, sorted({block.runs or suite.runs for block in suite.blocks})))
+    trials = number(suite.trials) if suite.trials else "no"
+    yield "Runs", f"{runs} of each method on each task, {trials} trials a run"
+    asked = [task for block in suite.blocks for task in block.tasks]
+    tasks = [task for each in asked for task in (builtin_tasks() if each == "*" else [each])]
+    yield "Tasks", ", ".join(dict.fromkeys(tasks))
+    yield "Methods", ", ".join(dict.fromkeys(m for block in suite.blocks for m in block.methods))
+    yield "Run it", f"coartic run {name}"
+
+
+def describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
+    """Yield goals, hands and base of a task; ``name`` is its name or its file."""
+    yield "Task", f"{name} ({task.label}): {task.description}"
+    yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
+    yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
+    yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
+    if task.name == name and task.family is None:  # a task of the paper
+        yield "Goals are", "reconstructed" if task.reconstructed else "published in the paper"
+
+
+def describe_family(family: Family) -> Iterator[tuple[str, str]]:
+    """Yield description and instances of a family."""
+    yield "Family", f"{family.name}: {family.description}"
+    yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
+    yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
+
+
+def describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
+    """Yield declaration, parameters and tasks of a method."""
+    from coartic import builtin_tasks, load_task
+    from coartic.analysis.methods import title_of
+
+    applies = (task for task in builtin_tasks() if info.why_not(load_task(task)) is None)
+    yield "Method", f"{info.name}: {info.title}"
+    yield "Called", title_of(info.name)
+    yield "Information", ", ".join(info.information)
+    yield "Parameters", ", ".join(f"{k}={v}" for k, v in info.defaults.items()) or "none"
+    yield "Tasks", ", ".join(applies) or "none of the four"
+    yield "Runs", "differ by seed" if info.stochastic else "are all the same"
+    yield "Cites", info.citation or "nothing"
 
 
 def reproduce(
@@ -237,7 +254,7 @@ def reproduce(
     folder: given.In = Path("results"),
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Perform a run again and say whether the result is identical."""
+    """Perform a run again and compare the results."""
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.benchmarks.registry import registry
@@ -309,7 +326,7 @@ def check(
 
 
 def show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print the findings; returns the number of broken laws."""
+    """Print the findings and return the number of broken laws."""
     for law in laws:
         first, *more = law.finding.splitlines() or [""]
         say(
@@ -326,7 +343,7 @@ def new(
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
-    """Write a method that works, to be changed into your own."""
+    """Write a working method, to be changed into your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.reader import check_declaration
     from coartic.benchmarks.registry import add_methods, registry

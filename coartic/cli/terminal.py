@@ -1,4 +1,4 @@
-"""The output of commands: sentences, pairs, tables and progress, all by :func:`say`."""
+"""Print the output of commands: sentences, pairs, tables and progress, all by :func:`say`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ READABLE = 24  # characters that a column of text needs
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print lines; whatever names are in them, each is one, and prints."""
+    """Print lines; characters that do not print, such as line breaks in names, are replaced."""
     print("\n".join(map(one_line, lines)), file=stream, end=end, flush=True)
 
 
@@ -31,7 +31,7 @@ def complain(kind: str, text: str) -> None:
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
-    """Print pairs of word and text below each other; long text is wrapped."""
+    """Print pairs of a word and a text, a pair a line; long texts are wrapped."""
     kept = list(pairs)
     indent = max((len(word) for word, _ in kept), default=0) + 2
     width = max(shutil.get_terminal_size().columns, indent + READABLE)
@@ -48,8 +48,8 @@ def show_frame(frame: pd.DataFrame) -> None:
 
 
 class Display:
-    """Runs done, failures and time left, on standard error: in one line that changes on a
-    terminal, and a line every half minute elsewhere."""
+    """Progress on standard error: runs done, failures and time left. On a terminal one line
+    changes; elsewhere a line is printed every half minute."""
 
     EVERY_S = 30.0
 
@@ -57,7 +57,7 @@ class Display:
         self.done = 0
         """Runs performed now."""
         self.others = ""
-        """Runs of earlier commands in the folder, in words; empty where there are none."""
+        """Number and seeds of the runs of earlier commands in the folder, in words."""
         self._is_live = sys.stderr.isatty()
         self._last = time.monotonic()
         self._end = ""
@@ -105,7 +105,7 @@ class Display:
             self.line(text.rstrip())
 
     def line(self, text: str) -> None:
-        """Print a line; the progress goes on below it."""
+        """Print a line; the progress continues below the line."""
         print(end=self._end, file=sys.stderr)
         self._end = ""
         say(text, stream=sys.stderr)

@@ -605,8 +605,8 @@ def has_tables(connection: sqlite3.Connection) -> bool:
         raise CoarticError("it was written by a later version of coartic: update coartic")
     if version < FORMAT:
         raise CoarticError(
-            "it was written by coartic 2.0.0 or earlier; version 2.0.0 reads it. With this version "
-            "run the suite again, with another --out"
+            "it was written by coartic 2.0.0 or earlier; version 2.0.0 reads it. Run the suite "
+            "again with another --out"
         )
     with closing(sqlite3.connect(":memory:")) as ours:
         ours.executescript(_SCHEMA)
