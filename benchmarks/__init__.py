@@ -1,4 +1,4 @@
-"""Suites, the runner, and the records it keeps. Imports ``coartic`` and ``baselines``.
+"""Plan, perform and record the runs of suites, on top of ``coartic`` and ``baselines``.
 
 ``coartic.benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`coartic.benchmarks.runner`).
 """
@@ -13,7 +13,7 @@ __all__ = ["Progress", "perform", "plan_suite", "run_suite"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name of the API when it is first used: workers need none of it."""
+    """Import a name of the API on first use; worker processes need no name of it."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from coartic.benchmarks import runner

@@ -1,4 +1,4 @@
-"""Runs on a Dask cluster: the extra ``coartic[cluster]``."""
+"""Perform runs on a Dask cluster, with the extra ``coartic[cluster]``."""
 
 from __future__ import annotations
 
@@ -45,9 +45,12 @@ class Dask:
         self.workers = 1  # it may have any number: batches are as large as methods take them
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Each job with its outcomes, as they come; another worker takes over the jobs of one that
-        dies. Raises CoarticError where there is no scheduler, it is lost, or it
-        has no workers of this version."""
+        """Yield each job with its outcomes, in the order in which jobs finish. If a worker dies,
+        another worker performs its jobs.
+
+        Raises CoarticError if the scheduler is missing or lost, or if its workers lack this version
+        of coartic.
+        """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed
 
@@ -105,11 +108,11 @@ class Dask:
 
 
 _kept = threading.local()
-"""The process of a thread of a Dask worker, with the method that it has run last."""
+"""Worker process of each thread of a Dask worker, kept for the next job of its method."""
 
 
 def _remote(job: Job) -> list[Outcome]:
-    """Perform a job on a worker's machine, in a process that ends with its limit."""
+    """Perform a job on the machine of a Dask worker, in a process that ends at its time limit."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.cell.method
     here = current_code(method.where, method.name)

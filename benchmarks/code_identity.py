@@ -1,7 +1,7 @@
-"""The code that a result comes from, as a hash of syntax trees.
+"""Hash the code that a result comes from, as syntax trees.
 
-It is that of the method's file, of the session and the execution of solutions, and of the modules
-that these import, from the method's folder or package and from this one. Comments, docstrings,
+The hash covers the file of the method, the session, the execution of solutions, and the modules
+that these import from the folder or package of the method and from coartic. Comments, docstrings,
 imports for type checkers, ``__version__``, the place of a file and the version of Python do not
 count: a changed number makes a result stale, a better sentence or a release does not.
 """
@@ -21,14 +21,16 @@ from coartic.benchmarks.syntax import statements_in, text_of
 from coartic.motion.compile import PACKAGE
 
 _API = PACKAGE / "__init__.py"
-"""It imports nothing before it is asked for: names count where they are at home."""
+"""Module that imports nothing before a name is used: a name counts in the module that defines
+it."""
 _EVERY_RUN = PACKAGE / "method.py", PACKAGE / "motion" / "solution.py"
 _AROUND = tuple(Path(__file__).with_name(name) for name in ("worker.py", "scoring.py"))
-"""Modules that perform and score a run. Of their imports, only the above change results."""
+"""Modules that perform and score a run. Of their imports, only the modules above change results."""
 
 
 def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
-    """Hash of the code of a method in a file, and of the data files that it reads.
+    """Return the hash of the code of a method in a file, and of the data files that the method
+    reads.
 
     Raises OSError or SyntaxError.
     """
@@ -39,7 +41,7 @@ def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
 
 
 def files_of(method: Path) -> set[Path]:
-    """The file of a method, and all others that its runs execute."""
+    """Return the file of a method and all other files that its runs execute."""
     root = next(folder for folder in method.parents if not (folder / "__init__.py").exists())
     within = root if "site-packages" not in root.parts else root / method.relative_to(root).parts[0]
     places = {(root, within)}
@@ -54,7 +56,8 @@ def files_of(method: Path) -> set[Path]:
 
 
 def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[Path]:
-    """The files that a module imports, each from below a root, within a folder."""
+    """Yield the files that a module imports; a pair of ``places`` is a root of imports and the
+    folder in which files count."""
     for level, module, names in syntax(path.read_bytes())[1]:
         for root, within in places:
             base = os.path.join(path.parents[level - 1] if level else root, *module.split("."))
@@ -66,8 +69,8 @@ def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[
 
 @cache
 def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
-    """The code of a module as text (:mod:`coartic.benchmarks.syntax`), and its imports: level,
-    module, names."""
+    """Return the code of a module as text (:mod:`coartic.benchmarks.syntax`), and its imports:
+    level, module and names."""
     tree, imports = ast.parse(content), []
     for node in statements_in(tree):
         of_api = list[str]()

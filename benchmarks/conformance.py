@@ -1,7 +1,7 @@
-"""Checks of a new method or task against the rules, for contributors.
+"""Check a new method or task against the rules, for contributors.
 
-A method is checked on runs with a limit of CPU time, in a process that performs them all, and in
-another one.
+The runs of a method are checked within a limit of CPU time, in one process for all of them and in
+another process.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _UNDECLARED = ("does not declare", "own compiled", "outside its session")  # wor
 
 
 class Law(NamedTuple):
-    """A law, whether it holds, and the finding in words."""
+    """A law, True if it holds, and the finding in words."""
 
     name: str
     passed: bool
@@ -45,7 +45,8 @@ class Law(NamedTuple):
 
 
 def law(name: str, problems: Iterable[str], finding: str) -> Law:
-    """A law that holds where there is no problem."""
+    """Return a law that holds if there are no problems; the finding of a broken law is its first
+    problem."""
     problem = next(iter(problems), None)
     return Law(name, problem is None, problem or finding)
 
@@ -53,8 +54,11 @@ def law(name: str, problems: Iterable[str], finding: str) -> Law:
 def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
-    """Return every law of a method, in order, on the shipped tasks or on others; ``verbose`` shows
-    what the method prints and logs, and where it crashes."""
+    """Check every law of a method, in order.
+
+    ``tasks`` are the shipped tasks by default. ``verbose`` shows what the method prints and logs,
+    and the tracebacks of its crashes.
+    """
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
@@ -86,7 +90,8 @@ def check_method(
 def laws_of_runs(
     info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
 ) -> Iterator[Law]:
-    """Yield the laws that the runs of a method keep or break; ``runs`` are by kind and task."""
+    """Yield the laws that the runs of a method keep or break; ``runs`` holds the runs by kind and
+    task."""
 
     def of_kind(kind: str) -> Iterator[tuple[str, Outcome]]:
         return ((task, run.outcome) for (each, task), run in runs.items() if each == kind)
@@ -155,8 +160,8 @@ def laws_of_runs(
 
 
 def laws_of_declaration(info: MethodInfo) -> list[Law]:
-    """Title and citation are there; the parameters survive JSON, are checked and cannot be
-    changed."""
+    """Check the declaration of a method: title and citation are there; parameters survive JSON, are
+    validated and cannot be changed."""
     empty = [name for name in ("title", "citation") if not getattr(info, name).strip()]
     parameters, config = info.complete({}), info.rules()["config"]
     again, problems = info.complete(parameters), []
@@ -178,7 +183,7 @@ def laws_of_declaration(info: MethodInfo) -> list[Law]:
 
 
 def hopeless_task(like: Task) -> Task:
-    """A task beyond reach, which validation would refuse, with the hands of another."""
+    """Return a task out of reach, which validation would refuse, for the hands of another task."""
     return like.model_copy(
         update={
             "name": "hopeless",
@@ -191,7 +196,7 @@ def hopeless_task(like: Task) -> Task:
 
 
 def check_task_file(path: Path, registered: Registry) -> list[Law]:
-    """Every law of a task file, in order; of one that is not valid the first alone."""
+    """Check every law of a task file, in order; for an invalid file the first law alone."""
     try:
         task = load_task(path)
     except TaskError as error:

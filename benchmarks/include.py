@@ -1,8 +1,9 @@
-"""Include runs of other folders: the shipped ones, another machine's, another person's.
+"""Include the runs of other folders: shipped results, or results of another machine or person.
 
-They go together where suite, seed, trial budget, the tasks of a name and the code of a method are
-the same. Versions of coartic and of libraries and machines may differ. Every solution of another
-folder is executed and scored again; that of the shipped ones is checked by the hash of their file.
+Folders go together if they have the same suite, seed and trial budget, the same task for each name
+and the same code for each method. Versions of coartic and of libraries, and machines, may differ.
+Every solution of another folder is executed and scored again; the hash of their file guards the
+shipped results.
 """
 
 from __future__ import annotations
@@ -30,19 +31,19 @@ _SCORED = (
     *(f"{prefix}{name}" for prefix in PREFIXES.values() for name in ("reward", "hands")),
     "solution_corrections",
 )
-"""Columns of ``results`` that follow from the solutions of a run."""
+"""Columns of table ``results`` that follow from the solutions of a run."""
 
 
 def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
-    """Return the plan with the runs that other folders hold, which are copied into ``out``.
+    """Copy the runs of other folders into ``out``, and return the plan of all these runs.
 
-    ``shipped`` names the shipped results. Performed in ``out``, the plan makes those of its own
-    runs that no folder has, and no others: of what it does not ask for, a folder gives what it has.
-    A warning names a folder that is not finished, and one that has fewer runs than are asked for.
+    ``shipped`` names the shipped results. To perform the returned plan in ``out`` makes only those
+    runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has.
+    A warning names an unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
-    Raises CoarticError where the folders do not go together, where a stored solution does not do
-    what is stored of it, and where two folders have different results of a run. Then nothing is
-    copied but shipped results.
+    Raises CoarticError if the folders do not go together, if a stored solution does not score as
+    stored, and if two folders have different results of a run. Then nothing is copied but shipped
+    results.
     """
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
@@ -69,9 +70,12 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
 
 
 def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
-    """Return the plan with the cells of the sources, each with the runs that the plan asks for and
-    the runs that follow in the sources without a gap. Raises CoarticError if sources contradict
-    each other, or the plan where it asks for runs that no source has."""
+    """Return the plan with the cells of the sources. A cell has the runs that the plan asks for,
+    and the runs that follow in the sources without a gap.
+
+    Raises CoarticError if sources contradict each other, or contradict the plan about runs that no
+    source has.
+    """
     plans = {name: source.plan() for name, source in sources.items()}
     held = {
         (plans[name][position].cell.digest, number)
@@ -104,8 +108,8 @@ def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
 def warn_of_gaps(
     plan: Sequence[Job], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of sources that are not finished, and of sources that have fewer runs of a cell than the
-    plan asks for of its own."""
+    """Warn of unfinished sources, and of sources that have fewer runs of a cell than the plan asks
+    for of its own cells."""
     most = max(len(job.numbers) for job in plan)
     own = {job.cell.digest for job in plan}
     for name, part in plans.items():
@@ -130,14 +134,18 @@ def warn_of_gaps(
 
 
 def named(jobs: Sequence[Job]) -> str:
-    """Name the cell of the first of some jobs, and count the others."""
+    """Name the cell of the first job, and count the other cells."""
     others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
 def check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]) -> None:
-    """Raises CoarticError if parts of a plan, by where they are from, say different things of one
-    thing; ``first`` has a job of each."""
+    """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin,
+    ``first`` one job of each part.
+
+    Raises CoarticError if two parts say different things about the suite, a task, a method or a
+    cell.
+    """
     first_said: dict[str, tuple[str, object]] = {}
 
     def agree(where: str, what: str, value: object, hint: str = "") -> None:
@@ -161,9 +169,12 @@ def check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]])
 
 
 def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
-    """Copy the runs that a source was asked for and the target lacks, each scored again; ``origin``
-    says where the runs are from that the target has. Raises CoarticError if a run does not do what
-    is stored of it, or the target has another result of it."""
+    """Copy the runs of a source's plan that the target lacks, each scored again. ``origin`` names
+    the folder of each run of the target by run id.
+
+    Raises CoarticError if a run does not score as stored, or if the target has another result of
+    the run.
+    """
     there = target.runs().set_index("run_id").result.to_dict()
     for _, cell in source.runs().groupby(["task", "method", "setting"], sort=False):
         results = dict(zip(cell.run_id, cell.result, strict=True))
@@ -183,10 +194,10 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
 
 
 def check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) -> None:
-    """Score runs of one cell again, side by side.
+    """Score stored runs of one cell again, side by side; ``results`` holds the stored hashes of
+    their results by run id.
 
-    Raises CoarticError if a run does not come to what is stored of it, or to the hash of its
-    result, which ``results`` has by id.
+    Raises CoarticError if a run does not come to its stored scores or to the hash of its result.
     """
     stated = [
         replace(run.outcome, parts={part: [*each.movements] for part, each in run.scores.items()})

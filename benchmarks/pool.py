@@ -1,14 +1,14 @@
-"""Processes on this machine in which methods run, with a limit of CPU time for each job.
+"""Perform jobs in worker processes on this machine, with a limit of CPU time for each job.
 
-A process performs jobs of one method, one after the other. It begins in a folder of its own and
-writes each answer into a file there, which is whole or not there: what a method does, breaks or
-prints is no matter of other methods. A process that ends costs the job that it was at; the others
-begin in a new one. What it has started ends with it unless it has left its group. Where the folder
-of all is removed or full, nobody knows what methods did: the suite ends.
+A process performs jobs of one method, one after the other. It works in its own folder and writes
+each answer into a file there, which is complete or missing: nothing that a method does, breaks or
+prints affects other methods. A process that ends loses its current job; a new process performs the
+other jobs. Processes that a worker has started end with the worker, unless they have left its
+group. If the common folder is removed or full, answers are lost, and the suite ends.
 
-The system counts a process's CPU time, in all its threads, and ends it where a job has used up its
-limit: other work on the machine changes no result. That of processes that a method starts is not
-counted. What waits for ever is ended by wall time, later.
+The system counts the CPU time of a process in all its threads, and ends the process when a job has
+used up its limit: other work on the machine changes no result. The CPU time of processes that a
+method starts is not counted. A job that waits forever is ended later, by wall time.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ _BEGUN, _SAID = "begun", "said"  # files beside the answers of a process
 
 
 class Local:
-    """Processes on this machine; ``jobs`` of them at once, or one a core.
+    """An executor: processes on this machine, ``jobs`` at once, by default one a core.
 
-    A job is ended after its limit of CPU time, a day where it has none; where it uses less, after
-    three times as much wall time and ``timeout_s``. With ``verbose``, what methods print and log,
-    and their tracebacks, are shown.
+    A job is ended after its limit of CPU time (a day without a limit), and in any case after three
+    times that in wall time plus ``timeout_s``. ``verbose`` shows what methods print and log, and
+    their tracebacks.
     """
 
     def __init__(self, jobs: int = -1, *, timeout_s: float = 60.0, verbose: bool = False) -> None:
@@ -71,18 +71,19 @@ class Local:
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Each job with its outcomes, as they come; by one process, those of a method in order.
+        """Yield each job with its outcomes, in the order in which jobs finish. One process performs
+        jobs of one method in order.
 
-        Raises CoarticError where one process after another ends before it begins a job, and where
-        their answers have no place.
+        Raises CoarticError if process after process ends before its first job, and if answers
+        cannot be written.
         """
         with closing(Workers(self)) as workers:
             yield from workers.perform(jobs)
 
 
 class Workers:
-    """Worker processes and the folder of their answers, until it is closed. If it ``stays``, a
-    process that is done waits for more jobs of its method."""
+    """Worker processes and the folder of their answers. If the worker ``stays``, it waits for
+    further jobs of its method."""
 
     def __init__(self, local: Local, *, stays: bool = False) -> None:
         self.local, self.stays = local, stays
@@ -90,13 +91,13 @@ class Workers:
         self._idle: Worker | None = None
 
     def close(self) -> None:
-        """End a process that waits, and remove the folder."""
+        """End the waiting worker, and remove the folder."""
         if self._idle is not None:
             self._idle.end()
         self.folder.cleanup()
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Each job with its outcomes, as in :meth:`Local.perform`."""
+        """Yield each job with its outcomes, as :meth:`Local.perform` does."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.cell.method.key].append(job)
@@ -155,7 +156,8 @@ class Workers:
                 worker.end()
 
     def worker_for(self, jobs: Sequence[Job]) -> Worker:
-        """The process that waits, if it has run their method; else a new one."""
+        """Return the waiting worker if it has performed the method of these jobs, and a new worker
+        otherwise."""
         method, waits = jobs[0].cell.method.key, self._idle
         self._idle = None
         if waits is not None and waits.method == method:
@@ -165,23 +167,23 @@ class Workers:
         return Worker(self.folder.name, method, self.local)
 
     def check_room(self) -> None:
-        """Raises OSError where the folder is gone or full: a process that ended may have ended
-        because of this."""
+        """Check that the folder of answers is there and has room: its loss can be the reason why a
+        process ended. Raises OSError."""
         place = Path(self.folder.name, "room")
         place.write_bytes(bytes(_ROOM))
         place.unlink()
 
 
 class Worker:
-    """A process that performs jobs of one method in their order."""
+    """A process that performs jobs of one method in order."""
 
     def __init__(self, folder: str, method: tuple[str, str, str], local: Local) -> None:
         self.method = method
         """:attr:`MethodInfo.key` of the method."""
         self.jobs = deque[Job]()
-        """Jobs that are not answered yet."""
+        """Jobs without an answer."""
         self.since_s = math.inf
-        """Clock when it began the first of these."""
+        """Clock at the beginning of the first of these jobs, s."""
         self._timeout_s = local.timeout_s
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
@@ -191,7 +193,8 @@ class Worker:
         self._theirs = theirs
 
     def give(self, jobs: Sequence[Job]) -> None:
-        """Let it perform jobs; where it cannot begin, it has ended."""
+        """Send jobs to the process, and start it if it is new; a process that cannot start has
+        ended."""
         self.jobs.extend(jobs)
         self.since_s = math.inf
         (self._folder / _BEGUN).unlink(missing_ok=True)
@@ -209,21 +212,22 @@ class Worker:
 
     @property
     def exit_code(self) -> int | None:
-        """Exit code, or minus the signal that ended it; None while it runs."""
+        """Exit code, or minus the number of the signal that ended the process; None while it
+        runs."""
         return 1 if self.process.pid is None else self.process.exitcode
 
     @property
     def is_late(self) -> bool:
-        """Whether its job takes too long."""
+        """True if the current job has exceeded its limit of wall time."""
         return time.monotonic() > self.since_s + self.wall_limit_s
 
     @property
     def wall_limit_s(self) -> float:
-        """Wall time after which its job is ended."""
+        """Limit of wall time for the current job, s."""
         return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
-        """The jobs that it has answered since, with their outcomes."""
+        """Yield the jobs that have been answered since the last call, with their outcomes."""
         if self.since_s == math.inf and (self._folder / _BEGUN).exists():
             self.since_s = time.monotonic()
         while self.jobs and (answer := self._folder / str(self._answered)).is_file():
@@ -235,7 +239,7 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """How it has ended, and the last lines that it has printed."""
+        """The end of the process in words, and the last lines that it printed."""
         text, code = b"", self.exit_code or 0
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
@@ -246,7 +250,7 @@ class Worker:
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None) -> list[Outcome]:
-        """The outcomes of the job that it has not answered: it is late, or has ended."""
+        """Return the outcomes of the current job of a process that has ended or is late."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded"
@@ -258,15 +262,15 @@ class Worker:
         return fail(job, "crashed", f"the worker process ended {self.last_output}")
 
     def end(self) -> None:
-        """End it, with the processes that it has started."""
+        """End the process and all processes that it has started."""
         if self.process.pid is not None:
             end_group(self.process.pid)
             self.process.join(_END_S)
 
 
 def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
-    """Perform the jobs that come through a pipe in this process, which answers in a folder of its
-    own."""
+    """Perform the jobs that come through a pipe, in this worker process, and write answers into
+    ``folder``."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:
@@ -306,7 +310,7 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
 
 
 def answer_to(job: Job, folder: Path) -> bytes:
-    """Perform a job within its limit of CPU time; return its answer."""
+    """Perform a job within its limit of CPU time, and return its answer."""
     with contextlib.suppress(OSError):  # there is none, or no longer
         os.truncate(folder / _SAID, 0)
     limit_cpu_time(job.time_limit_s or _LONGEST_S)
@@ -320,8 +324,8 @@ def answer_to(job: Job, folder: Path) -> bytes:
 
 
 def limit_cpu_time(limit_s: float) -> None:
-    """Let the system end this process when it has taken so much more CPU time, by SIGPROF, or
-    SIGXCPU where a method has turned that off; 0 lifts the limit."""
+    """Let the system end this process after ``limit_s`` more seconds of CPU time, by SIGPROF, or by
+    SIGXCPU if a method has turned SIGPROF off. A limit of 0 lifts the limit."""
     if not hasattr(signal, "setitimer"):
         return
     import resource
@@ -336,7 +340,8 @@ def limit_cpu_time(limit_s: float) -> None:
 
 
 def bound_resources(workers: int) -> None:
-    """Limit memory and size of files, so that a method gets an error before the machine swaps."""
+    """Limit memory and file size of this process, so that a method gets an error before the machine
+    swaps."""
     try:
         import resource
 
@@ -357,8 +362,8 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 
 
 def start_process(process: Any) -> None:
-    """Start a process of :data:`CONTEXT` with one thread for BLAS, in which the program that is
-    running is not run again. Raises OSError or EOFError where it does not start."""
+    """Start a process of :data:`CONTEXT` with one thread for BLAS, without running the main program
+    again in it. Raises OSError or EOFError if the process does not start."""
     # It would look for modules in the working folder first, whoever has filled it.
     safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     main = sys.modules["__main__"]

@@ -1,4 +1,4 @@
-"""The surroundings in which a result is made: versions, machine, commit, command."""
+"""Describe the surroundings of a result: versions, machine, commit and command."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ _LIBRARIES = (
     "pydantic",
     "scipy",
 )
-"""Libraries on which results may depend."""
+"""Libraries that results may depend on."""
 
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Versions, platform and commit of this process."""
+    """Return versions, platform and commit of this process."""
     processor = platform.processor()
     with contextlib.suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
@@ -59,19 +59,20 @@ def current_environment() -> dict[str, Any]:
 
 
 def now() -> str:
-    """Date and time, to the second."""
+    """Return date and time, UTC, to the second."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def command() -> list[str]:
-    """The command line of this process; that of a notebook's kernel says nothing."""
+    """Return the command line of this process, or ``a notebook``."""
     if "ipykernel" in sys.argv[0]:
         return ["a notebook"]
     return [plain(word) for word in (Path(sys.argv[0]).name, *sys.argv[1:])]
 
 
 def process_peak_mb() -> float | None:
-    """Most memory that this process has had so far, MiB; None where the system does not say."""
+    """Return the most memory that this process has had so far, MiB; None if the system does not
+    count it."""
     try:
         import resource
     except ImportError:  # Windows
@@ -81,7 +82,8 @@ def process_peak_mb() -> float | None:
 
 
 def commit_of_checkout() -> dict[str, Any] | None:
-    """Commit of the checkout the code runs from and whether it was changed since."""
+    """Return the commit of the checkout that the code runs from, with True if files were changed
+    since; None for an installed package."""
     # A GIT_DIR of the caller's (a hook's, say) must not stand in for our checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
 
@@ -100,9 +102,9 @@ def commit_of_checkout() -> dict[str, Any] | None:
 
 
 def arithmetic() -> str:
-    """Hash of the bits of eigenvectors and logarithms: where it is the same, NumPy and its linear
-    algebra round alike. They choose their instructions by the processor, whose name says little of
-    it on virtual machines."""
+    """Return a hash of the bits of eigenvectors and logarithms. Where the hash is the same, NumPy
+    and its linear algebra round alike; they choose their instructions by the processor, and the
+    processor's name says little on virtual machines."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     computed = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix))
     return hashlib.sha256(b"".join(each.tobytes() for each in computed)).hexdigest()[:8]

@@ -1,7 +1,7 @@
-"""A process that imports a method file and answers questions about its methods in plain data.
+"""Import a method file in its own process, which answers questions about the methods in plain data.
 
-What a file does when it is imported (another working folder, patches, limits, an end) is no matter
-of the process that runs suites.
+Nothing that a file does on import (another working folder, patches, limits, an exit) affects the
+process that runs suites.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ _LONGEST_ANSWER = 2**24  # bytes
 
 
 def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
-    """Begin a process that has imported a method file. It ends with this process, with all that it
-    has started.
+    """Start a process that imports a method file, and return a function that asks the process about
+    a method by its id.
 
-    Returns a function that gives the answer of a method by its id, and raises CoarticError where it
-    has none.
+    The function raises CoarticError if the process gives no answer. The process, with all processes
+    that it starts, ends with this process.
     """
     pipe, theirs = multiprocessing.Pipe()
     process = CONTEXT.Process(target=answer_questions, args=(theirs, str(path), shown), daemon=True)
@@ -97,7 +97,8 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
 def methods_of_module(
     module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
 ) -> Iterator[MethodInfo]:
-    """Methods of a module with their code. Raises CoarticError where there is none."""
+    """Yield the infos of a module's methods, with their code. Raises CoarticError if the module
+    defines no method."""
     methods = list(methods)
     for method in methods:
         check_declaration(method, origin)
@@ -129,7 +130,8 @@ def methods_of_module(
 
 
 def check_declaration(method: type[Method], origin: str) -> None:
-    """Raises CoarticError where a method lacks a declaration that every method needs."""
+    """Check the declaration of a method. Raises CoarticError if a required attribute is missing or
+    wrong."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)

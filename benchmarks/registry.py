@@ -1,6 +1,6 @@
-"""Methods by id: the built-in methods, and the methods of the user's files.
+"""List methods by id: the built-in methods, and the methods of the user's files.
 
-Processes of their own import method files (:mod:`coartic.benchmarks.reader`).
+Method files are imported in separate processes (:mod:`coartic.benchmarks.reader`).
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
 from coartic.runs.plan import SEARCH
 
 RESERVED = (METHOD_PREFIX, SEARCH)
-"""Ids that begin so have a meaning in every table: methods of this project alone have them."""
+"""Beginnings of ids that have a meaning in every table; they are reserved for built-in methods."""
 NAMES = ("CMA-ES", "learner", "optimum")
-"""Names of this project's methods that could be ids of others."""
+"""Names of built-in methods that an id of another method must not repeat."""
 MODULES = (
     "coartic.learner.method",
     "coartic.baselines.corrective_alone",
@@ -42,7 +42,7 @@ MODULES = (
     "coartic.baselines.receding_horizon",
     "coartic.baselines.optimum",
 )
-"""Where this project's methods are, each in its module's ``METHODS``."""
+"""Modules of the built-in methods, each with a list ``METHODS``."""
 
 
 Registry = Mapping[str, MethodInfo]
@@ -52,8 +52,8 @@ _INFOS = TypeAdapter(list[MethodInfo])
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     """Return every known method by id.
 
-    Raises CoarticError for a file that cannot be loaded, holds no method, or takes an id that is
-    reserved or already there.
+    Raises CoarticError for a file that cannot be loaded or holds no method, and for an id that is
+    reserved or taken.
     """
     infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
@@ -63,7 +63,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
 
 @cache
 def built_in() -> Mapping[str, MethodInfo]:
-    """This project's methods by id."""
+    """Return the built-in methods by id."""
     infos: dict[str, MethodInfo] = {}
     for name in MODULES:
         module = importlib.import_module(name)
@@ -78,7 +78,8 @@ _parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
 
 
 def current_code(where: str, name: str) -> str:
-    """Hash of the code of a method that is imported from ``where``; ``none`` where it has none."""
+    """Return the hash of the present code of a method that is imported from ``where``; ``none`` if
+    the method is gone."""
     with _parsing:
         if where.endswith(".py"):
             if where not in READERS:  # which reads the file anew whenever it is asked
@@ -89,8 +90,8 @@ def current_code(where: str, name: str) -> str:
 
 
 def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) -> None:
-    """Add methods by id. Raises CoarticError for an id that is reserved or taken, and for
-    one that differs from a name here in large and small letters alone."""
+    """Add methods by id. Raises CoarticError for an id that is reserved or taken, or that differs
+    from another name in case alone."""
     for info in infos:
         names = (*registered, *CONDITIONS, *ABLATIONS, *NAMES)
         why = ""
@@ -107,10 +108,10 @@ def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) 
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
-    """Return the ids of the methods that a name stands for.
+    """Return the ids of the methods that a name stands for: ``EC1`` for a condition of the learner,
+    ``optimum/*`` for all ids that match.
 
-    A condition of the learner goes by its own name as well; ``optimum/*`` names all that begin
-    so. Raises CoarticError if there is none.
+    Raises CoarticError for an unknown name.
     """
     name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | ABLATIONS else name
     named = [method for method in registered if fnmatchcase(method, name)]
@@ -120,8 +121,8 @@ def methods_named(name: str, registered: Registry) -> list[str]:
 
 
 def methods_of_file(path: Path) -> Iterator[MethodInfo]:
-    """The methods of a file, which a process of its own imports: what it does there changes
-    nothing here. Raises CoarticError where there is none that can be used."""
+    """Yield the methods of a file, which is imported in a separate process. Raises CoarticError for
+    a file that cannot be used."""
     shown = plain(str(path), LONGEST_LINE)
     check_file(path)
     if path.suffix != ".py":

@@ -1,4 +1,4 @@
-"""Perform stored runs again, and compare."""
+"""Perform stored runs again, and compare the results."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from coartic.trajectories import Trajectory, trajectory
 
 
 def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
-    """The one run whose id starts with ``prefix``, in a results folder or any below it, and that
-    folder.
+    """Find the run whose id begins with ``prefix`` in a results folder or any folder below it;
+    return its folder and the run.
 
-    Raises CoarticError where there is none, or more than one.
+    Raises CoarticError if there is no such run, or more than one.
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-"):
         raise CoarticError(
@@ -48,8 +48,8 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
 
 
 def trajectory_of(folder: Path, run: Run) -> Trajectory:
-    """The solution of a run of a folder tick by tick. Raises CoarticError where it has none, or
-    none that can be shown."""
+    """Return the solution of a run tick by tick. Raises CoarticError if the run has no solution, or
+    none that can be executed."""
     if "solution" not in run.scores:
         why = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
@@ -64,15 +64,15 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
 
 
 def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
-    """Runs of one method, each a job of one seed, in this order, in one process of their own."""
+    """Yield the runs of these jobs of one method, performed in order in one new process."""
     for job, outcomes in Local(1, verbose=verbose).perform(jobs):
         yield from score(job, outcomes)
 
 
 def perform_again(run: Run, registered: Registry) -> Run:
-    """Perform a stored run with the code that is here now.
+    """Perform a stored run again with the present code.
 
-    Raises CoarticError if its method is not here, or no longer takes its parameters.
+    Raises CoarticError if the method is unknown, or no longer takes the parameters of the run.
     """
     name = run.cell.method.name
     if name not in registered:
@@ -91,9 +91,12 @@ def perform_again(run: Run, registered: Registry) -> Run:
 def perform_some_again(
     folder: Path, count: int, registered: Registry
 ) -> Iterator[tuple[str, list[str]]]:
-    """Perform ``count`` runs of a folder again, spread over its cells, of methods whose code is the
-    same here; yield the id of each, and its differences to the stored run. Raises CoarticError if
-    there is none."""
+    """Perform ``count`` runs of a folder again, spread over its cells, and yield the id of each run
+    with its differences to the stored run.
+
+    Runs count whose methods still have the code of the run. Raises CoarticError if there is no such
+    run.
+    """
     with open_store(folder) as store:
         ids = [
             job.run_id(number)
@@ -111,7 +114,8 @@ def perform_some_again(
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:
-    """Return in words how the results of two runs differ, without times and surroundings."""
+    """Return the differences between the results of two runs, in words; times and environments do
+    not count."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     first, second = a.to_row(), b.to_row()

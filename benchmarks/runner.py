@@ -33,49 +33,49 @@ _EXECUTORS = {
     "jobs": "Local(jobs) of coartic.benchmarks.pool",
     "scheduler": "Dask(scheduler) of coartic.benchmarks.cluster",
 }
-"""Options of the command, and what stands in their place in Python."""
+"""Options of ``coartic run`` that are executors in Python."""
 LEAST_BATCH = 8
-"""Runs of a cell that are not divided among workers."""
+"""Most runs of a cell that are not divided among workers."""
 _SURE = frozenset({"ok", "infeasible"})  # whatever else is in the batch
 
 
 @dataclass(repr=False)
 class Progress:
-    """How far a plan is in a folder; shown as a sentence."""
+    """The progress of a plan in a folder; its representation is a sentence."""
 
     folder: Path
     total: int
-    """Runs that are asked for."""
+    """Runs of the plan."""
     present: int = 0
-    """Runs that were there before."""
+    """Runs of the plan that the folder had before."""
     stale: int = 0
-    """Runs that were there before, of other code."""
+    """Runs that the folder had before from another version of the code."""
     done: int = 0
-    """Runs performed now."""
+    """Runs performed by this call."""
     failed: int = 0
-    """Runs that are not ok, of all."""
+    """Runs of the plan that are not ok."""
     crashed: int = 0
-    """Runs that crashed, of all."""
+    """Runs of the plan that crashed."""
     others: Counter[int] = field(default_factory=Counter)
-    """Runs in the folder that earlier commands asked for and this one does not, by the seed of
-    their suite; they are kept, and nothing shows them."""
+    """Runs of earlier commands in the folder that the plan does not ask for, by the seed of their
+    suite. They are kept, and no report shows them."""
     wall_s: float = 0.0
-    """Seconds from the call until the last run was kept, or nothing found to do."""
+    """Seconds from the call until the last run was written."""
     waiting: Counter[str] = field(default_factory=Counter)
-    """Runs that are to come, by method."""
+    """Runs still to perform, by method."""
     took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-    """Wall time of the runs performed now, by method, s."""
+    """Wall time of the runs performed by this call, by method, s."""
     timed: Counter[str] = field(default_factory=Counter)
-    """Number of runs whose time is known, by method."""
+    """Number of runs with a known wall time, by method."""
     workers: int = 1
 
     def count(self, status: str) -> None:
-        """Count a run that is there by its status."""
+        """Count a run of the folder by its status."""
         self.failed += status != "ok"
         self.crashed += status == "crashed"
 
     def finish(self, run: Run) -> None:
-        """Count a run that is performed now."""
+        """Count a run that has just been performed."""
         method, seconds = run.cell.method.name, run.outcome.times.wall_s
         self.done += 1
         self.count(run.outcome.status)
@@ -86,8 +86,8 @@ class Progress:
 
     @property
     def time_left(self) -> float:
-        """Seconds that the runs to come take, by the mean of earlier runs of their methods, or of
-        all; NaN until a quarter is done."""
+        """Seconds that the missing runs will take, from the mean times of performed runs; NaN until
+        a quarter is done."""
         coming = +self.waiting
         if not self.timed or self.done < coming.total() / 3:
             return math.nan
@@ -96,7 +96,7 @@ class Progress:
         return sum(each.get(m, mean) * count for m, count in coming.items()) / self.workers
 
     def __repr__(self) -> str:
-        """How many runs were made in how long, how many failed, and where they are."""
+        """Say how many runs were made in which time, how many failed, and where the runs are."""
         minutes, seconds = divmod(self.wall_s, 60)
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
@@ -115,7 +115,7 @@ class Progress:
 
 
 Watcher = Callable[[Progress, Cell | None], None]
-"""Called before the first run, and after each run with its cell."""
+"""Function that is called before the first run, and after each run with its cell."""
 
 
 def run_suite(
@@ -227,11 +227,11 @@ def perform(
 
 
 def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the runs to perform, a job for each cell; count the runs that are there.
+    """Return the missing runs of the plan, a job for each cell, and count the runs that are there.
 
-    A run that crashed is performed again, and a run that took too long if it may now take longer,
-    unless the code of its method is not here. Raises CoarticError if that is so of a method whose
-    runs are missing.
+    A run that crashed is performed again, and so is a run that timed out under a lower time limit,
+    unless the code of the method is not here. Raises CoarticError if runs are missing whose method
+    has no code here.
     """
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
@@ -256,13 +256,14 @@ def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[
 
 
 def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Jobs divided for workers, in the order in which they begin; results do not depend on it.
+    """Divide jobs for workers, and return them in the order in which they begin; results do not
+    depend on the division.
 
-    A run among many takes a fraction of its time alone, so jobs are as large as methods take
-    them. Where there are few runs, each worker has its part; the last jobs are divided that
-    would not go round. Methods without a number of trials come first, as a planner's run can take
-    as long as thousands of trials, the others by their trials: no long job is alone at the end, and
-    the time left does not go up.
+    A run among many takes a fraction of its time alone, so a job is as large as its method allows.
+    With few runs each worker has a part; the last jobs that workers cannot share evenly are divided
+    further. Methods without a number of trials come first, as one run of a planner can take as long
+    as thousands of trials; other methods follow by their trials. So no long job is alone at the
+    end, and the time left does not rise.
     """
 
     def divide(job: Job, size: int) -> Iterator[Job]:

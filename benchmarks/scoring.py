@@ -1,5 +1,4 @@
-"""Execute and score the solutions that workers return, in a process that no method has been
-in."""
+"""Execute and score the solutions that workers return, in a process that imports no method file."""
 
 from __future__ import annotations
 
@@ -15,8 +14,8 @@ from coartic.tasks.task import Task, hands_of
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
-    """Return the runs of a job, also of one that failed. All their parts are executed side by side;
-    a run has the scores of its parts if it is ok."""
+    """Return the runs of a job from its outcomes, executing all parts side by side. A run that is
+    ok has a score for each of its parts."""
     task = job.cell.task
     executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
     runs = []
@@ -38,7 +37,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
 
 
 def score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
-    """Return the score of a part that was executed to its end."""
+    """Return the score of a part that completed the task."""
     assert isinstance(execution, Execution)
     result = Score(execution.reward, execution.hands, execution.movements)
     if part != "solution":
@@ -48,8 +47,8 @@ def score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
 
 
 def final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return the status of a run and its reason: the method's, unless a part cannot be executed,
-    does not complete the task, or is missing."""
+    """Return status and reason of a run: the outcome's, unless a part cannot be executed, misses a
+    goal, or is missing."""
     for execution in parts.values():
         if isinstance(execution, Exception):
             return "solver-failed", f"the solution cannot be executed: {execution}"

@@ -1,8 +1,9 @@
-"""Results that are shipped: ``shipped/SUITE.sqlite.xz``, each a results folder of one file.
+"""Pack and open the shipped results: ``shipped/SUITE.sqlite.xz``, each the file of a results
+folder.
 
-``python -m coartic.benchmarks.shipped FOLDER`` makes one of a results folder whose runs have the
-results that are shipped already. The rewards of trials are downsampled
-(:meth:`coartic.runs.record.Run.downsample`): 2 MB in place of 30.
+``python -m coartic.benchmarks.shipped FOLDER`` packs a results folder whose runs have the same
+results as the shipped runs. The rewards of trials are downsampled
+(:meth:`coartic.runs.record.Run.downsample`): 2 MB in place of 30 MB.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from coartic.internal.files import folder_named
 from coartic.runs.store import RUNS_FILE, Store, open_content, open_store, writing
 
 SHIPPED = "shipped"
-"""Stands for the shipped results in place of a folder."""
+"""Name of the shipped results, in place of a folder."""
 _FOLDER = Path(__file__).with_name("shipped")
 _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"
@@ -29,8 +30,8 @@ _SHOWN = 20  # differences of a folder
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
-    """The shipped results of a suite, unpacked in memory. Raises CoarticError where there are none,
-    or they were changed."""
+    """Open the shipped results of a suite, unpacked in memory. Raises CoarticError if the suite has
+    no shipped results, or if their file was changed."""
     path = _FOLDER / f"{suite}{_ENDING}"
     try:
         hashes = shipped_hashes()
@@ -48,15 +49,18 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
 
 
 def shipped_hashes() -> dict[str, str]:
-    """SHA-256 of the shipped results of each suite."""
+    """Return the SHA-256 of the shipped results of each suite."""
     lines = (_FOLDER / _HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
     return {name.removesuffix(_ENDING): digits for digits, name in pairs}
 
 
 def differences(folder: Path) -> Iterator[str]:
-    """Yield a sentence for each shipped run that a folder lacks or has another result of, whichever
-    code made it. Raises CoarticError where other code than this made the folder."""
+    """Yield a sentence for each shipped run that a folder lacks or that has another result there,
+    whatever the version of its code.
+
+    Raises CoarticError if another version of the code made the folder.
+    """
     from coartic.benchmarks.registry import built_in
     from coartic.benchmarks.reproduce import compare_runs
 
@@ -80,7 +84,7 @@ def differences(folder: Path) -> Iterator[str]:
 
 
 def pack(folder: Path, out: Path) -> None:
-    """Write the results of a folder, downsampled, and their hash to where they are shipped."""
+    """Write the downsampled results of a folder, and the hashes of all results, into ``out``."""
     with open_store(folder) as source, tempfile.TemporaryDirectory() as made:
         plan, made_with = source.plan(), source.made_with()
         ran, date = made_with.pop("command"), made_with.pop("date")
@@ -95,7 +99,7 @@ def pack(folder: Path, out: Path) -> None:
 
 
 def main() -> int:
-    """Pack the folders that the command names, unless a shipped result would change."""
+    """Pack the folders of the command line, unless a shipped result would change."""
     parser = argparse.ArgumentParser(prog="python -m coartic.benchmarks.shipped")
     parser.add_argument("--changed", action="store_true", help="pack results that have changed")
     parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")

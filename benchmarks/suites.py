@@ -1,4 +1,5 @@
-"""Suites: methods x tasks x parameters x runs. Data in ``benchmarks/suites``."""
+"""Read suites: tasks, methods, parameters and numbers of runs, from files such as those of
+``benchmarks/suites``."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ Scalar = bool | int | float | str
 
 
 def plain_scalar(value: Any) -> Scalar:
-    """The value of a parameter."""
+    """Return the value of a parameter. Raises an error for any other value."""
     is_finite = not isinstance(value, float) or math.isfinite(value)
     if isinstance(value, bool | int | float | str) and is_finite:
         return value
@@ -42,39 +43,41 @@ _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
 class Move(FileData):
-    """A family of tasks that differ in where one goal is."""
+    """A change that makes several tasks of a task, which differ in the place of one goal."""
 
     goal: Annotated[int, Field(ge=1, strict=True)]
-    """Which goal, from 1."""
+    """Number of the goal, from 1."""
     by: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1, max_length=MOST_CELLS)]
-    """Displacements in x and y, length unit; one task each."""
+    """Displacements of the goal in x and y, length unit; each makes a task."""
 
 
 class Block(FileData):
-    """Some methods on some tasks, under all combinations of some parameters."""
+    """Methods on tasks, under all combinations of some parameters."""
 
     tasks: _Names
-    """Names or files of tasks, or ranges of instances; ``["*"]`` for all tasks."""
+    """Names or files of tasks, or ranges of instances such as ``long/v1/i000..i039``; ``["*"]`` for
+    all tasks."""
     methods: _Names
-    """Names of methods; ``["*"]`` for all that apply to the tasks."""
+    """Ids of methods; ``["*"]`` for all methods that apply to the tasks."""
     move: Move | None = None
-    """Makes several tasks of each task, which differ in one goal: table ``move``."""
+    """Places of one goal, each of which makes a task: table ``move``."""
     free_base: Annotated[bool, Field(strict=True)] = False
-    """Whether the base moves in both directions, whatever the task locks."""
+    """True to free the base in x and y on every task."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
-    """Only the tasks with so many goals; all where it is not given."""
+    """Numbers of goals: the block has only tasks with so many; by default all."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
-    """Runs of each method on each task, where it is not the suite's number."""
+    """Runs of each method on each task; by default the number of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
     """Parameters of the methods, by name."""
     grid: dict[str, Annotated[tuple[_Value, ...], Field(min_length=1)]] = Field(
         default_factory=dict
     )
-    """Several values for some parameters; every combination is run."""
+    """Values of further parameters; every combination is run."""
 
     @model_validator(mode="after")
     def says_everything_once(self) -> Block:
-        """Refuses a parameter that is there twice, or has a value twice."""
+        """Refuse a parameter that stands in both tables, and a value that stands twice in the
+        grid."""
         for name, values in self.grid.items():
             if name in self.parameters:
                 raise error_saying(
@@ -86,22 +89,22 @@ class Block(FileData):
 
 
 class Suite(FileData):
-    """A suite as its file states it."""
+    """A suite, as its file states it."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
-    """Name of the suite; that of the file, without ``.toml``, if it is left out."""
+    """Name of the suite; by default the name of the file without ``.toml``."""
     title: Line
-    """For lists and reports."""
+    """Title in lists and reports."""
     description: Line
-    """A sentence for lists and reports."""
+    """Sentence in lists and reports."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)]
-    """Runs of each stochastic method on each task; the others are run once."""
+    """Runs of each stochastic method on each task; other methods are run once."""
     trials: Annotated[int, Field(gt=0, le=MOST_TRIALS, strict=True)] | None = None
-    """Trials per run, for methods that have this parameter."""
+    """Trials of a run, for methods that have this parameter."""
     time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
-    """CPU time of a run; the runs of a batch have it together."""
+    """CPU time of a job, s: of one run, or of runs that are performed side by side."""
     blocks: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
-    """What to run: tables ``[[blocks]]``."""
+    """Blocks of tasks and methods: tables ``[[blocks]]``."""
 
 
 TAKEN_BY = {
@@ -112,12 +115,12 @@ TAKEN_BY = {
     "method file": "coartic check METHOD --method-file {}",
     "shipped family": "coartic list {}",
 }
-"""The command that takes a thing, by its kind."""
+"""Command that takes a thing of each kind."""
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of a shipped suite or family, a file or a folder, of :data:`TAKEN_BY`; empty
-    for anything else."""
+    """Return the kind of a shipped suite or family, a file or a folder (:data:`TAKEN_BY`); empty
+    for any other name."""
     if name in suites():
         return "suite"
     if {name, f"{name}/v1"} & {*shipped_families()}:
@@ -132,21 +135,22 @@ def kind_of(name: str) -> str:
 
 
 def check_kind(name: str, *kinds: str) -> None:
-    """Raises CoarticError, which names the right command, for a thing of another kind."""
+    """Check that a name, if it is a thing at all, is of one of these kinds. Raises CoarticError,
+    which names the command for its kind."""
     kind = kind_of(name)
     if kind and kind not in kinds:
         raise CoarticError(f"{name} is a {kind}: {TAKEN_BY[kind].format(quote(name))}")
 
 
 def suites() -> dict[str, Suite]:
-    """The shipped suites by name."""
+    """Return the shipped suites by name."""
     return {path.stem: read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
 def load_suite(name: str) -> Suite:
-    """A shipped suite by name, or a suite file by path (``.toml``).
+    """Return a shipped suite by name, or read a suite file (``.toml``).
 
-    Raises CoarticError for an unknown name or a file that cannot be used.
+    Raises CoarticError for an unknown name or an unusable file.
     """
     shipped = suites()
     if name not in shipped:
@@ -159,7 +163,7 @@ def load_suite(name: str) -> Suite:
 
 
 def read_suite(path: Path) -> Suite:
-    """A suite from its file. Raises CoarticError with a line for each problem."""
+    """Read a suite file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
     if "cells" in content:
         raise CoarticError(f"{path}: tables [[cells]] are called [[blocks]]")
@@ -173,8 +177,11 @@ def read_suite(path: Path) -> Suite:
 def tasks_of(
     suite: Suite, block: Block, own: Mapping[str, Task], task_named: Callable[[str], Task]
 ) -> Iterator[Task]:
-    """Yield the tasks of a block as the block changes them. A block for all tasks is for ``own``,
-    the user's tasks by name, as well, and moves none of their goals."""
+    """Yield the tasks of a block, as the block changes them.
+
+    ``own`` holds the tasks of the user by name. A block for all tasks is for the user's tasks as
+    well, and moves none of their goals.
+    """
     is_for_all = WILDCARD in block.tasks
     every = [*builtin_tasks(), *own]
     names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
@@ -187,8 +194,8 @@ def tasks_of(
 
 
 def changed_tasks(task: Task, suite: Suite, block: Block) -> list[Task]:
-    """The task as a block has it: without its lock, or once for each place of the goal that it
-    moves."""
+    """Return the tasks that a block makes of a task: the task with a free base, or a task for each
+    place of the moved goal."""
     source = f"suite {suite.name!r}"
 
     def changed(name: str, difference: str, **changes: Any) -> Task:

@@ -1,7 +1,7 @@
-"""The part of a module's code that decides what it computes, as text.
+"""Write the code of a module that decides what it computes as text.
 
-The text is the same under every version of Python that can read the code: ``ast.dump`` writes one
-tree differently in 3.11, 3.12 and 3.13. It imports the standard library alone.
+The text is the same under every version of Python that can read the code; ``ast.dump`` writes one
+tree differently in 3.11, 3.12 and 3.13. This module imports the standard library alone.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def statements_in(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def fields_of(node: ast.AST) -> dict[str, Any]:
-    """Return the fields of a node that say something: no docstring, no ``__version__``, no code for
-    type checkers, and nothing that is empty, such as the type parameters since Python 3.12."""
+    """Return the fields of a node that can change a result: no docstring, no ``__version__``, no
+    code for type checkers, and no empty field, such as the type parameters since Python 3.12."""
     fields = {name: value for name, value in ast.iter_fields(node) if value not in (None, [])}
     match node:
         case ast.Expr(value=ast.Constant()):

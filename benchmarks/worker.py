@@ -1,8 +1,7 @@
 """Let a method solve a task in a worker process, and state the outcome as plain data.
 
-It may run code that nobody here has read, so its word is no more than that: it answers in plain
-data, and what it returns as a solution is executed and scored in the parent process, where
-method files are not imported.
+A method can run any code, so nothing that it states is trusted: the parent process, which imports
+no method file, executes and scores its solution.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ _log = logging.getLogger(__name__)  # which is heard where a method is checked
 
 
 def plain_movement(movement: Movement) -> Movement:
-    """A movement of plain numbers, texts and arrays."""
+    """Return a movement of plain numbers, texts and arrays."""
     target, waypoints = movement.target, movement.waypoints
     return Movement(
         int(movement.goal),
@@ -61,14 +60,14 @@ def fail(
     wall_s: float | None = None,
     cpu_s: float | None = None,
 ) -> list[Outcome]:
-    """The outcomes of a job whose worker gave none: ``timeout`` or ``crashed``."""
+    """Return the outcomes of a job whose worker gave no answer."""
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.numbers]
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
-    """Outcomes as JSON. Raises TypeError or ValueError where a method left other data."""
+    """Return outcomes as JSON. Raises TypeError or ValueError for data that JSON cannot hold."""
 
     def numbers(array: Any) -> Any:
         return None if array is None else array.tolist()
@@ -90,7 +89,8 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 
 
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
-    """The outcomes of a job from :func:`answer_of`, or that it crashed."""
+    """Return the outcomes of a job from its answer (:func:`answer_of`); crashed outcomes if the
+    answer cannot be read."""
     try:
         content = json.loads(answer)
         for each in content:
@@ -108,7 +108,7 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
 
 
 def perform_job(job: Job) -> list[Outcome]:
-    """Perform a job. Whatever the method does is an outcome, not an error."""
+    """Perform a job. An error of the method is an outcome."""
     cell, name = job.cell, job.cell.method.name
     sessions = [
         Session(
@@ -150,11 +150,12 @@ def perform_job(job: Job) -> list[Outcome]:
 
 
 _seen: set[str] = set()
-"""Methods that this process has run."""
+"""Ids of the methods that this process has run."""
 
 
 def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
-    """A result as plain data, or how the run failed."""
+    """Return the outcome of a run from the result of its method, or from the error that the method
+    raised."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
         "meter": session.meter,
@@ -178,8 +179,8 @@ def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) 
 
 
 def place_of(error: BaseException, method: MethodInfo) -> str:
-    """The line of a user's method in which it crashed, as ``mine.py, line 12: ``; empty where its
-    file had no part in it."""
+    """Return the line of a method file in which a run crashed, as ``mine.py, line 12: ``; empty for
+    an error elsewhere."""
     if method.is_ours:
         return ""
     module = sys.modules.get(method.where)
@@ -190,7 +191,8 @@ def place_of(error: BaseException, method: MethodInfo) -> str:
 
 
 def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
-    """A method's result as plain data. Raises SolutionError where it cannot be kept."""
+    """Return a method's result as plain data. Raises SolutionError for a result that cannot be
+    stored."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     if result.bound is not None and not method.startswith(SEARCH):
@@ -215,6 +217,6 @@ def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
 
 
 def plain_details(details: Any) -> dict[str, Any]:
-    """As plain data, which can be written down."""
+    """Return the details of a result as plain data."""
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
     return dict(json.loads(text.encode()))
