@@ -72,6 +72,13 @@ def margins() -> Iterator[str]:
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
 
 
+def columns() -> Iterator[str]:
+    """Yield the table of the columns of view ``runs``."""
+    from coartic.runs.record import COLUMNS
+
+    yield from table(("column", "meaning"), ((f"`{c.name}`", c.meaning) for c in COLUMNS))
+
+
 def play() -> Iterator[str]:
     """The figure to play with, its text and its styles; ``play.html`` is its page."""
     yield "```{raw} html"
