@@ -1,6 +1,6 @@
 """List methods by id: the built-in methods, and the methods of the user's files.
 
-Method files are imported in separate processes (:mod:`coartic.benchmarks.reader`).
+Method files are imported in separate processes (:mod:`coartic.benchmarks.method_files`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from coartic.benchmarks.code_identity import code_of
-from coartic.benchmarks.reader import begin_reader
+from coartic.benchmarks.method_files import begin_reader
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, plain, unknown
 from coartic.internal.toml_files import check_file

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
     from coartic.learner.conditions import ABLATIONS, CONDITIONS, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
-    from coartic.learner.run import LearningRun
+    from coartic.learner.learning_run import LearningRun
     from coartic.method import BudgetError, MethodError, UndeclaredError
     from coartic.model import PAPER, MotionModel
     from coartic.motion.movement import Correction, MoveResult, correct, move
@@ -81,7 +81,7 @@ _HOMES = {
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "ABLATIONS", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),
-    "learner.run": ("LearningRun",),
+    "learner.learning_run": ("LearningRun",),
     "method": ("BudgetError", "MethodError", "UndeclaredError"),
     "model": ("PAPER", "MotionModel"),
     "motion.movement": ("Correction", "MoveResult", "correct", "move"),

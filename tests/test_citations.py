@@ -16,7 +16,7 @@ from coartic.analysis.citations import (
     references,
 )
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.benchmarks.reader import METHOD_NAME
+from coartic.benchmarks.method_files import METHOD_NAME
 from coartic.benchmarks.registry import NAMES, built_in, registry
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.store import RUNS_FILE

@@ -291,7 +291,7 @@ def test_a_server_that_is_killed_while_a_file_is_read(tmp_path, monkeypatch):
     def killed(_):
         raise EOFError
 
-    monkeypatch.setattr("coartic.benchmarks.reader.start_process", killed)
+    monkeypatch.setattr("coartic.benchmarks.method_files.start_process", killed)
     with pytest.raises(CoarticError, match=r"mine.py: cannot be imported: no process .* begins"):
         entries(tmp_path, [("honest", "pass")])
 

@@ -345,7 +345,7 @@ def new(
 ) -> None:
     """Write a working method, to be changed into your own."""
     from coartic.benchmarks import template
-    from coartic.benchmarks.reader import check_declaration
+    from coartic.benchmarks.method_files import check_declaration
     from coartic.benchmarks.registry import add_methods, registry
     from coartic.internal.files import write_output
     from coartic.runs.method_info import method_info

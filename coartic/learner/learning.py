@@ -23,7 +23,7 @@ from coartic.learner.kernel import (
     learner_parameters,
     workspace_for,
 )
-from coartic.learner.run import LearningRun
+from coartic.learner.learning_run import LearningRun
 from coartic.method import Meter
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import SLOTS

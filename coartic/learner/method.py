@@ -23,7 +23,7 @@ from coartic.learner.conditions import (
     ExplorationCondition,
 )
 from coartic.learner.learning import TRIALS, learn_many
-from coartic.learner.run import CORRECTIONS
+from coartic.learner.learning_run import CORRECTIONS
 from coartic.method import (
     Information,
     Meter,

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field, InstanceOf
 
 from coartic.errors import SolutionError
-from coartic.learner.run import CORRECTIONS
+from coartic.learner.learning_run import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
