@@ -19,9 +19,9 @@ from coartic.internal.text import error_line
 from coartic.runs.plan import Job
 from coartic.runs.record import Outcome
 
-WORKERS_S = 600.0  # that runs wait while no worker is connected
-_PAUSE_S = 0.05  # between looks at what is done
-_RETURN_S = 2.0  # that a worker which begins anew is not connected
+WORKERS_S = 600.0  # longest wait for a worker
+_PAUSE_S = 0.05  # pause between looks for finished jobs
+_RETURN_S = 2.0  # time in which a restarted worker connects again
 _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
@@ -42,7 +42,7 @@ class Dask:
 
     def __init__(self, address: str, *, say: Callable[[str], None] = print) -> None:
         self.address, self.say = address, say
-        self.workers = 1  # it may have any number: batches are as large as methods take them
+        self.workers = 1  # their number can change: jobs are as large as methods allow
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with its outcomes, in the order in which jobs finish. If a worker dies,
@@ -54,7 +54,7 @@ class Dask:
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed
 
-        place = dict[Any, int]()  # jobs of a method follow each other: workers keep its process
+        place = dict[Any, int]()  # jobs of a method in a row keep a worker's process
         jobs = sorted(jobs, key=lambda job: place.setdefault(job.cell.method.key, len(place)))
         try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
@@ -79,7 +79,7 @@ class Dask:
             client.close(timeout=3)
 
     def _client(self) -> Any:
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported here
         try:
             from distributed import Client
             from distributed.comm.addressing import resolve_address
@@ -88,7 +88,7 @@ class Dask:
             return Client(self.address, set_as_default=False)
         except ImportError:
             raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
-        except Exception as error:  # Dask's, of many kinds: who finished may be anybody
+        except Exception as error:  # Dask raises errors of many kinds
             text = (
                 f"no Dask scheduler at {self.address} ({error_line(error)}). Give the address that "
             )
@@ -123,7 +123,7 @@ def _remote(job: Job) -> list[Outcome]:
         _kept.workers = Workers(Local(1), stays=True)
     try:
         ((_, outcomes),) = _kept.workers.perform([job])
-    except CoarticError:  # such as a folder that is gone
+    except CoarticError:  # such as a removed folder
         del _kept.workers
         raise
     return [replace(outcome, environment=current_environment()) for outcome in outcomes]

@@ -32,7 +32,7 @@ from coartic.tasks.task import check_task
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0
-BUDGET = 7  # trials of the runs that are to keep to it
+BUDGET = 7  # trial budget of the runs that check law ``limits``
 _UNDECLARED = ("does not declare", "own compiled", "outside its session")  # words of reasons
 
 
@@ -148,12 +148,12 @@ def laws_of_runs(
     yield law(
         "failure",
         (
-            f"on a task that nobody can complete it gives {each.status} {each.reason}; it should "
+            f"on a task out of reach it gives {each.status} {each.reason}; it should "
             "give infeasible, with a reason"
             for each in hopeless
             if each.status not in ("infeasible", "solver-failed")
         ),
-        f"a task that nobody can complete gives {hopeless[0].status}: {hopeless[0].reason}"
+        f"a task out of reach gives {hopeless[0].status}: {hopeless[0].reason}"
         if hopeless
         else "says beforehand that it does not apply to a task without a solution",
     )

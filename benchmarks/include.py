@@ -64,7 +64,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
             target.replace_plan(whole, current_environment(), command(), now())
             origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
-                if not (begun and name == SHIPPED):  # whose runs are all here
+                if not (begun and name == SHIPPED):  # it is a copy of them
                     copy_runs(name, source, target, origin)
     return whole
 
@@ -83,7 +83,7 @@ def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         for position, number, *_ in source.present()
     }
     own = {job.cell.digest: job for job in plan}
-    # What a source has is not performed here, where the code of its method may be another.
+    # Runs of a source are not performed here: their method may have other code here.
     missing = [
         job for digest, job in own.items() if not held.issuperset((digest, n) for n in job.numbers)
     ]
@@ -182,12 +182,14 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
             if results[run_id] == there[run_id]:
                 continue
             run = source.run(run_id)
-            if changes := compare_runs(target.run(run_id), run):  # beyond trials not kept
+            if changes := compare_runs(
+                target.run(run_id), run
+            ):  # beyond trials whose rewards are not kept
                 which = f"run {run.number} of {run.cell.method.name} on {run.cell.task.name}"
                 where = f"{origin[run_id]} and {name} ({run_id})"
                 raise CoarticError(f"{which} differs in {where}: {changes[0]}")
         runs = [source.run(run_id) for run_id in results if run_id not in there]
-        if runs and name != SHIPPED:  # whose file is checked by its hash
+        if runs and name != SHIPPED:  # their file has a hash
             check_scores(name, runs, results)
         target.write(runs)
         origin |= {run.id: name for run in runs}

@@ -25,8 +25,8 @@ from coartic.internal.threads import begin_worker, end_group
 from coartic.method import Information, Method
 from coartic.runs.method_info import MethodInfo, answer, load_file, method_info, methods_in
 
-_LIMIT_S = 300.0  # of an answer: libraries may take long to import
-_LONGEST_ANSWER = 2**24  # bytes
+_LIMIT_S = 300.0  # longest wait for an answer: libraries can take long to import
+_LONGEST_ANSWER = 2**24  # bytes of an answer
 
 
 def begin_reader(path: Path, shown: str) -> Callable[..., Any]:

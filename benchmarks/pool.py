@@ -41,20 +41,24 @@ from coartic.learner.learning import warm_up
 from coartic.runs.plan import Job
 from coartic.runs.record import Outcome
 
-_POLL_S = 0.2  # between looks for answers and at limits
+_POLL_S = 0.2  # pause between looks for answers and at limits
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
-_LEAST_MEMORY = 2**30  # bytes of a process, four times what this project's methods take
-_LARGEST_FILE = 2**28  # bytes of an answer, or of what a job prints
-_ROOM = 2**20  # bytes that are free where answers are kept
-_LAST_LINES = 3  # lines of what a process that died has printed
-_PRINTED = 4000  # bytes that are read of it
-_STARTS = 5  # processes in a row that may end before they begin a job
+_LEAST_MEMORY = 2**30  # bytes of a process, four times the need of the built-in methods
+_LARGEST_FILE = 2**28  # bytes of an answer, and of a job's output
+_ROOM = 2**20  # bytes that must be free for answers
+_LAST_LINES = 3  # last lines of a dead process's output in a reason
+_PRINTED = 4000  # bytes of the output that are read
+_STARTS = 5  # processes in a row that end before their first job: then the suite ends
 _UNKEPT = 74  # exit code of a process that could not write its answer
-_REPEATED = (-9, 255, _UNKEPT)  # also of one that somebody has killed, or whose server
-_IDLE_S = 60.0  # that a process waits for more jobs
-_END_S = 1.0  # that a process which is killed has to end
+_REPEATED = (
+    -9,
+    255,
+    _UNKEPT,
+)  # exit codes after which a job is repeated once: killed, or without its server
+_IDLE_S = 60.0  # longest wait of a process for jobs
+_END_S = 1.0  # time for a killed process to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
-_BEGUN, _SAID = "begun", "said"  # files beside the answers of a process
+_BEGUN, _SAID = "begun", "said"  # files among the answers of a process
 
 
 class Local:
@@ -103,7 +107,7 @@ class Workers:
             by_method[job.cell.method.key].append(job)
         most = self.local.workers
         waiting = deque(
-            of_method[first::most]  # each has some of every cell
+            of_method[first::most]  # every part has runs of every cell
             for of_method in by_method.values()
             for first in range(min(most, len(of_method)))
         )
@@ -116,7 +120,7 @@ class Workers:
                 sentinels = [w.process.sentinel for w in workers if w.process.pid is not None]
                 connection.wait(sentinels, _POLL_S)
                 for worker in tuple(workers):
-                    exit_code = worker.exit_code  # first: after the end comes no answer
+                    exit_code = worker.exit_code  # before its answers, which end with it
                     yield from worker.answers()
                     if exit_code is None and worker.jobs and not worker.is_late:
                         continue
@@ -136,13 +140,13 @@ class Workers:
                             f"processes cannot begin {worker.last_output}; finished runs are kept"
                         )
                     if lost:
-                        time.sleep(_POLL_S)  # a server that was killed may yet be there
+                        time.sleep(_POLL_S)  # a killed server may not have ended yet
                     elif exit_code in _REPEATED and id(job) not in repeated:
                         repeated.add(id(job))
                     else:
                         yield job, worker.failure(exit_code)
                         worker.jobs.popleft()
-                    rest = list(worker.jobs)  # what is repeated is so alone: answers may be lost
+                    rest = list(worker.jobs)  # a job is repeated alone: answers may be lost
                     alone = 1 if rest and id(rest[0]) in repeated else 0
                     waiting.extendleft(part for part in (rest[alone:], rest[:alone]) if part)
         except OSError as error:
@@ -206,8 +210,8 @@ class Worker:
         except (OSError, EOFError) as error:
             (self._folder / _SAID).write_text(error_line(error), encoding="utf-8")
             return
-        # While it compiles kernels: what it returns is executed here.
-        with contextlib.suppress(Exception):  # the process says the same
+        # This process executes solutions: it compiles kernels meanwhile.
+        with contextlib.suppress(Exception):  # the worker reports the same error
             warm_up(self.jobs[0].cell.task, "trials")
 
     @property
@@ -286,9 +290,9 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
     while pipe.poll(_IDLE_S):
         try:
             jobs = pipe.recv()
-        except EOFError:  # nobody has more
+        except EOFError:  # there are no more jobs
             return
-        for job in jobs:  # kernels are compiled, or loaded, on no run's clock
+        for job in jobs:  # compile or load kernels before the clock of a run starts
             learns = job.cell.method.name.startswith(METHOD_PREFIX)
             warm_up(job.cell.task, "learner" if learns else "motion", "trials")
         if not number:
@@ -299,19 +303,19 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
         (folder / _BEGUN).touch()
         for job in jobs:
             text = answer_to(job, folder)
-            if os.getpid() != process:  # a method has forked it
+            if os.getpid() != process:  # a child that a method has forked
                 os._exit(1)
             try:
                 write_atomically(folder / str(number), text)
             except OSError:
                 os._exit(_UNKEPT)
             number += 1
-    end_group(process)  # nobody has asked for long
+    end_group(process)  # no job came in time
 
 
 def answer_to(job: Job, folder: Path) -> bytes:
     """Perform a job within its limit of CPU time, and return its answer."""
-    with contextlib.suppress(OSError):  # there is none, or no longer
+    with contextlib.suppress(OSError):  # the file is missing
         os.truncate(folder / _SAID, 0)
     limit_cpu_time(job.time_limit_s or _LONGEST_S)
     outcomes = perform_job(job)
@@ -330,7 +334,7 @@ def limit_cpu_time(limit_s: float) -> None:
         return
     import resource
 
-    for number in (signal.SIGPROF, signal.SIGXCPU):  # whatever a method before has set
+    for number in (signal.SIGPROF, signal.SIGXCPU):  # an earlier method may have changed them
         signal.signal(number, signal.SIG_DFL)
     _, most = resource.getrlimit(resource.RLIMIT_CPU)
     with contextlib.suppress(ValueError):  # a limit from outside is lower
@@ -354,8 +358,8 @@ def bound_resources(workers: int) -> None:
             resource.setrlimit(what, (most, most))
 
 
-# Processes are forked from a server that has imported what they need, where there is such a thing
-# and the path of its socket is not too long: the system takes 103 characters, and some are to come.
+# Processes are forked from a server that has imported their modules, if the system has such servers
+# and the path of its socket is short: the system takes 103 characters, and Python adds some.
 _HAS_SERVER = "forkserver" in multiprocessing.get_all_start_methods()
 _START = "forkserver" if _HAS_SERVER and len(tempfile.gettempdir()) <= 70 else "spawn"
 CONTEXT: Any = multiprocessing.get_context(_START)
@@ -364,7 +368,7 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 def start_process(process: Any) -> None:
     """Start a process of :data:`CONTEXT` with one thread for BLAS, without running the main program
     again in it. Raises OSError or EOFError if the process does not start."""
-    # It would look for modules in the working folder first, whoever has filled it.
+    # Without PYTHONSAFEPATH Python imports from the working folder first, whoever wrote it.
     safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     main = sys.modules["__main__"]
     with environment(ONE_THREAD | safe):
@@ -372,10 +376,10 @@ def start_process(process: Any) -> None:
             from multiprocessing import resource_tracker
 
             multiprocessing.set_forkserver_preload([__name__, "coartic.benchmarks.preload"])
-            resource_tracker.ensure_running()  # first: it lets signals through again
+            resource_tracker.ensure_running()  # before signals are blocked: it unblocks them
         sys.modules["__main__"] = ModuleType("__main__")
         try:
-            with blocked_signals():  # Ctrl-C tells all that a terminal has
+            with blocked_signals():  # Ctrl-C reaches every process of a terminal
                 process.start()
         finally:
             sys.modules["__main__"] = main

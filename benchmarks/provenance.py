@@ -84,7 +84,7 @@ def process_peak_mb() -> float | None:
 def commit_of_checkout() -> dict[str, Any] | None:
     """Return the commit of the checkout that the code runs from, with True if files were changed
     since; None for an installed package."""
-    # A GIT_DIR of the caller's (a hook's, say) must not stand in for our checkout.
+    # A GIT_DIR of the caller, such as a hook, must not replace this checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
 
     def git(*arguments: str) -> str:
@@ -94,7 +94,7 @@ def commit_of_checkout() -> dict[str, Any] | None:
 
     try:
         if Path(git("rev-parse", "--show-toplevel")).resolve() != PACKAGE.parent.resolve():
-            return None  # installed inside somebody else's repository
+            return None  # installed inside another repository
         changed = git("status", "--porcelain", "--untracked-files=no")
         return {"id": git("rev-parse", "HEAD"), "dirty": bool(changed)}
     except (OSError, subprocess.SubprocessError):

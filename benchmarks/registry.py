@@ -82,7 +82,7 @@ def current_code(where: str, name: str) -> str:
     the method is gone."""
     with _parsing:
         if where.endswith(".py"):
-            if where not in READERS:  # which reads the file anew whenever it is asked
+            if where not in READERS:  # a reader imports the file again for every question
                 list(methods_of_file(Path(where)))
             infos = READERS[where]("", "methods")
             return next((info["code"] for info in infos if info["name"] == name), "none")

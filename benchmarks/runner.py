@@ -36,7 +36,7 @@ _EXECUTORS = {
 """Options of ``coartic run`` that are executors in Python."""
 LEAST_BATCH = 8
 """Most runs of a cell that are not divided among workers."""
-_SURE = frozenset({"ok", "infeasible"})  # whatever else is in the batch
+_SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
 @dataclass(repr=False)
@@ -126,7 +126,7 @@ def run_suite(
     watch: Watcher | None = None,
     **options: Any,
 ) -> Progress:
-    """Run what a folder lacks of a suite: :func:`plan_suite`, then :func:`perform`.
+    """Run the runs of a suite that a folder lacks: :func:`plan_suite`, then :func:`perform`.
 
     Parameters
     ----------
@@ -165,22 +165,22 @@ def perform(
     executor: Local | Dask | None = None,
     watch: Watcher | None = None,
 ) -> Progress:
-    """Perform what a results folder lacks of a plan.
+    """Perform the runs of a plan that a results folder lacks.
 
-    Whatever interrupts it, finished runs are kept. Called again, it goes on from there.
+    An interruption keeps finished runs; the next call performs the missing runs.
 
     Parameters
     ----------
     plan : sequence of Job
-        The runs that are asked for, as :func:`plan_suite` returns them.
+        Jobs from :func:`plan_suite`.
     folder : str or Path
-        Results folder, made where there is none.
+        Results folder, which is made if it is missing.
     executor : Local or Dask, optional
-        Where methods run; by default this machine, in a process for every core:
-        :class:`coartic.benchmarks.pool.Local`. A Dask cluster is a
-        :class:`coartic.benchmarks.cluster.Dask`.
+        Place where methods run: this machine (:class:`coartic.benchmarks.pool.Local`, by default
+        with a process for every core) or a Dask cluster
+        (:class:`coartic.benchmarks.cluster.Dask`).
     watch : callable, optional
-        Called before the first run and after each.
+        Function that is called before the first run and after each run (:data:`Watcher`).
 
     Returns
     -------
@@ -190,8 +190,7 @@ def perform(
     Raises
     ------
     CoarticError
-        Something else is in the way in the folder, another process is at work in it, or it cannot
-        be written.
+        The folder holds something else or cannot be written, or another process writes into it.
     """
     folder, clock = folder_named(folder), time.perf_counter()
     watch = watch or (lambda progress, cell: None)
@@ -211,10 +210,10 @@ def perform(
         jobs = divided(missing, executor.workers)
         while jobs:
             alone: list[Job] = []
-            with closing(executor.perform(jobs)) as answers:  # workers end, whatever happens here
+            with closing(executor.perform(jobs)) as answers:  # ends workers after an error here
                 for job, outcomes in answers:
                     runs = score(job, outcomes)
-                    if len(runs) > 1:  # a run that failed may have failed because of the others
+                    if len(runs) > 1:  # a failure may come from other runs of the job
                         alone += [run.job for run in runs if run.outcome.status not in _SURE]
                         runs = [run for run in runs if run.outcome.status in _SURE]
                     store.write(runs)

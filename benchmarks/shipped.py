@@ -26,7 +26,7 @@ SHIPPED = "shipped"
 _FOLDER = Path(__file__).with_name("shipped")
 _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"
-_SHOWN = 20  # differences of a folder
+_SHOWN = 20  # differences of a folder that are printed
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:

@@ -60,7 +60,7 @@ class Block(FileData):
     methods: _Names
     """Ids of methods; ``["*"]`` for all methods that apply to the tasks."""
     move: Move | None = None
-    """Places of one goal, each of which makes a task: table ``move``."""
+    """Places of one goal; each place makes a task: table ``move``."""
     free_base: Annotated[bool, Field(strict=True)] = False
     """True to free the base in x and y on every task."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
@@ -130,7 +130,7 @@ def kind_of(name: str) -> str:
     if not name.endswith(".toml"):
         return "results folder" if (Path(name) / RUNS_FILE).is_file() else ""
     content = read_toml(Path(name))
-    keys = {"blocks": "suite", "region": "family", "goals": "task"}  # of which each has one
+    keys = {"blocks": "suite", "region": "family", "goals": "task"}  # a key that only this kind has
     return next((kind for key, kind in keys.items() if key in content), "")
 
 
@@ -220,7 +220,7 @@ def changed_tasks(task: Task, suite: Suite, block: Block) -> list[Task]:
         raise CoarticError(f"{source}: task {task.name!r} has no goal {number} to move")
     moved = []
     for x, y in block.move.by:
-        # In few digits, or in all of them where few would name another number.
+        # In six digits, or in all digits if six would name another number.
         dx, dy = (f"{d:g}" if float(f"{d:g}") == d else repr(d) for d in (x, y))
         goals = [list(goal) for goal in task.goals]
         goals[number - 1] = [goals[number - 1][0] + x, goals[number - 1][1] + y]

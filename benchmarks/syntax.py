@@ -16,7 +16,7 @@ def text_of(node: Any) -> str:
     if isinstance(node, list):
         return f"[{' '.join(map(text_of, node))}]"
     if not isinstance(node, ast.AST):
-        return ascii(node)  # as which characters print depends on the version
+        return ascii(node)  # the version decides which characters print
     text = type(node).__name__
     for name, value in fields_of(node).items():
         text += f" {name}={text_of(value)}"
@@ -44,7 +44,7 @@ def fields_of(node: ast.AST) -> dict[str, Any]:
         case ast.If(test=ast.Name(id="TYPE_CHECKING") | ast.Attribute(attr="TYPE_CHECKING")):
             del fields["body"]
         case ast.Constant():
-            fields.pop("kind", None)  # of u"text", which is "text"
+            fields.pop("kind", None)  # u"text" is "text"
         case ast.JoinedStr(values=values):
             fields["values"] = joined(values)
     return fields

@@ -35,7 +35,7 @@ from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import SEARCH, Job
 from coartic.runs.record import PARTS, Outcome, Times
 
-_log = logging.getLogger(__name__)  # which is heard where a method is checked
+_log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 def plain_movement(movement: Movement) -> Movement:
@@ -114,7 +114,7 @@ def perform_job(job: Job) -> list[Outcome]:
         Session(
             cell.task,
             job.run_seed(number),
-            # as declared, whatever became of the class since
+            # as declared: a method could change its class
             map(Information, cell.method.information),
             trial_budget=cell.trial_budget,
             trusted=cell.method.is_ours,

@@ -79,9 +79,9 @@ for command, example in COMMANDS:
 
 def main() -> None:
     """Run the command line; an error that the user can correct exits with code 2."""
-    gc.set_threshold(100_000, 50, 1_000)  # what is imported stays: do not look through it often
+    gc.set_threshold(100_000, 50, 1_000)  # imported modules stay: collect garbage rarely
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:  # it is closed: its number would go to a file of ours
+        if getattr(sys, name) is None:  # closed: one of our files would get its number
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
             os.set_inheritable(getattr(sys, name).fileno(), True)
     for stream in (sys.stdout, sys.stderr):
@@ -90,8 +90,8 @@ def main() -> None:
     warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
     logging.getLogger("coartic").setLevel(logging.INFO)
     logging.getLogger("coartic").addHandler(logging.StreamHandler())
-    os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
-    if os.path.lexists("matplotlibrc"):  # its settings name programs to run: it may be a stranger's
+    os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
+    if os.path.lexists("matplotlibrc"):  # it can name programs to run: do not trust it
         with contextlib.chdir(os.path.dirname(__file__)):
             import matplotlib  # noqa: F401
     try:
@@ -99,7 +99,7 @@ def main() -> None:
     except CoarticError as error:
         complain("Error", str(error))
         sys.exit(2)
-    except BrokenPipeError:  # whoever read, such as head, has enough: typer ends quietly
+    except BrokenPipeError:  # the reader, such as head, has ended: typer ends quietly
         raise
     except OSError as error:
         place = f": {error.filename}" if error.filename else ""

@@ -103,7 +103,7 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
         try:
             meant += methods_named(id_named(name, ids), registered)
         except CoarticError:
-            check_kind(name)  # or it is nothing else
+            check_kind(name)  # a thing of another kind has its own sentence
             if Path(file := file_name(name)).is_file():
                 words = f"method {name!r} is not known: add --method-file {file}"
                 raise CoarticError(f"{words}, if it is defined there") from None

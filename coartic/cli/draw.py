@@ -36,7 +36,7 @@ def draw(
     meant = given.tasks_meant(tasks or builtin_tasks())
     names = [name for text in meant for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
-    from coartic.analysis.figures.plot import FORMATS, picture  # slow, after quick errors
+    from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
     from coartic.analysis.sections.tasks import picture_of_tasks
 
     drawing = picture_of_tasks(chosen[:_PICTURED])
@@ -56,16 +56,16 @@ def animate(
     run: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
     out: Annotated[Path, given.path("Film to write: .gif or .mp4.", "FILE")] = Path("film.gif"),
     other: Annotated[
-        str | None, typer.Argument(metavar="OTHER", help="Another run to show beside it.")
+        str | None, typer.Argument(metavar="OTHER", help="Another run to show next to it.")
     ] = None,
     folder: given.In = Path("results"),
     initial: Annotated[
-        bool, typer.Option("--initial", help="Show the initial solution beside it.")
+        bool, typer.Option("--initial", help="Show the initial solution next to it.")
     ] = False,
     width: Annotated[int, given.within("--width", "Width in pixels.", 200, 3840)] = 800,
     replace: given.Replace = False,
 ) -> None:
-    """Make a film of a run, alone or beside another one."""
+    """Make a film of a run, alone or next to another run."""
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
@@ -73,7 +73,7 @@ def animate(
 
     check_film(out, replace=replace)
     if initial and other is not None:
-        raise CoarticError("--initial shows one run beside its initial solution: give one run.")
+        raise CoarticError("--initial shows one run next to its initial solution: give one run.")
     movements = []
     for run_id in (run,) if other is None else (run, other):
         place, found = find_run(run_id, folder)

@@ -145,7 +145,7 @@ def verify(
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 
-    with open_store(folder), explain_errors(folder):  # which say what is the matter
+    with open_store(folder), explain_errors(folder):  # these explain an error
         report = check_runs(folder)
     say(
         f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",

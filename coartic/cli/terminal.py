@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from coartic.benchmarks.runner import Progress
     from coartic.runs.plan import Cell
 
-READABLE = 24  # characters that a column of text needs
+READABLE = 24  # least width of a column of text, characters
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
@@ -36,7 +36,7 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
     indent = max((len(word) for word, _ in kept), default=0) + 2
     width = max(shutil.get_terminal_size().columns, indent + READABLE)
     for word, text in kept:
-        together = text.replace(" %", "\xa0%")  # on one line
+        together = text.replace(" %", "\xa0%")  # a number and its % stay on one line
         lines = textwrap.wrap(together, width - indent, break_on_hyphens=False) or [""]
         for number, line in enumerate(lines):
             say(f"{'' if number else word:{indent}}{line}".replace("\xa0", " ").rstrip())
@@ -49,7 +49,7 @@ def show_frame(frame: pd.DataFrame) -> None:
 
 class Display:
     """Progress on standard error: runs done, failures and time left. On a terminal one line
-    changes; elsewhere a line is printed every half minute."""
+    changes; elsewhere a line appears every half minute."""
 
     EVERY_S = 30.0
 
@@ -88,7 +88,7 @@ class Display:
         if progress.present == total:
             return
         there, seconds, left = progress.present + progress.done, progress.time_left, ""
-        if seconds > 0:  # which NaN is not
+        if seconds > 0:  # False for NaN
             left = f"about {seconds / 60:.0f} min left" if seconds > 99 else f"{seconds:.0f} s left"
         text = f"{there:{len(str(total))}}/{total}  {progress.failed:3} failed  {left:18}"
         if self._is_live:

@@ -94,7 +94,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: its job, its outcome and the scores of its parts."""
+    """A run: its job, its outcome and the scores of its parts."""
 
     job: Job
     """A job of this run alone."""
@@ -175,7 +175,7 @@ class Run:
 
     def downsample(self) -> Run:
         """Return the run with the rewards of its best trial and of the trials that were better than
-        all earlier trials; the other rewards are None. The run then takes a tenth of the space."""
+        all earlier trials; other rewards are None. The run then takes a tenth of the space."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best
@@ -389,7 +389,9 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
-    if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
+    if (
+        len({np.shape(corner) for corner in corners}) == 1
+    ):  # otherwise the solution breaks the rules
         steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / PAPER.step
         if steps > MOST_STEPS:
             return SolutionError(

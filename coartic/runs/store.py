@@ -60,7 +60,7 @@ _DTYPES: dict[str, Any] = {
 """Types of the columns of views in data frames; all have room for missing values."""
 _CELL, _JOB = TypeAdapter(Cell), TypeAdapter(Job)
 _JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
-_OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # a journal ends so that names another
+_OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # end of a journal that names another file
 _STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
 _SHOWN = ", ".join(f'"{column.name}"' for column in COLUMNS)
 _SCHEMA = f"""
@@ -105,7 +105,7 @@ _SURROUNDINGS: dict[str, Any] = {
     **{"command": list, "packages": dict, "cores": int, "commit": str},
 }
 """Types of the facts about the surroundings of a suite that reports show."""
-_LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # how the names of errors begin
+_LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
 WAIT_S = 1.0  # wait for another program
 
 
@@ -116,7 +116,7 @@ class Store:
         self.folder = folder
         self._db = connection
 
-    # What was asked for.
+    # The plan.
 
     def begin_as(self, other: Store) -> bool:
         """Become a copy of another store if this store has no run; return True if it has become
@@ -211,7 +211,7 @@ class Store:
             if self._db.in_transaction:
                 self._db.rollback()
 
-    # Which runs there are.
+    # Ids and counts of runs.
 
     def present(self) -> list[tuple[int, int, str, float | None]]:
         """Return the runs of the plan that the folder has: for each run the position of its job in
@@ -242,7 +242,7 @@ class Store:
         with explain_errors(self.folder):
             return [run_id for (run_id,) in self._db.execute(query, (len(prefix), prefix))]
 
-    # Runs, in and out.
+    # Writing and reading runs.
 
     def write(self, runs: Iterable[Run]) -> None:
         """Write finished runs, all of them or none, in place of earlier runs with their ids.
@@ -328,7 +328,7 @@ class Store:
                 stored = unpack(blob, trials)
                 yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
 
-    # Inside.
+    # Rows.
 
     def _write_run(self, run: Run) -> None:
         """Write a run into the tables, in place of an earlier run with its id."""
@@ -410,7 +410,7 @@ class Store:
         rows = self._db.execute(f"SELECT * FROM {view}")
         names = [column[0] for column in rows.description]
         frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
-        with np.errstate(invalid="ignore"):  # of numbers that are too large, which it refuses
+        with np.errstate(invalid="ignore"):  # astype refuses numbers that are too large
             return frame.astype({name: _DTYPES.get(name, "float64") for name in names})  # joints
 
     def _wait_for(self, statement: str) -> None:
@@ -475,10 +475,10 @@ def open_store(folder: Path) -> Iterator[Store]:
     with closing(connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)) as connection:
         with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
-            connection.execute("BEGIN")  # whatever is read in this block is of one state
+            connection.execute("BEGIN")  # all reads of this block see one state
             if not has_tables(connection):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
-            with lock(folder, shared=True):  # or somebody is writing
+            with lock(folder, shared=True):  # refused while a process writes
                 pass
         yield Store(folder, connection)
 
@@ -511,8 +511,8 @@ def writing(folder: Path) -> Iterator[Store]:
         check_files(folder)
         with closing(connect(str(folder / RUNS_FILE), WAIT_S)) as connection:
             with explain_errors(folder):
-                is_there = has_tables(connection)  # or the file is left as it is
-                # No write-ahead log: it is unsafe on network disks, and a second file.
+                is_there = has_tables(connection)  # raises before anything is written
+                # No write-ahead log, which is unsafe on network disks and adds a file.
                 connection.execute("PRAGMA journal_mode = DELETE")
                 if not is_there:
                     connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
@@ -533,7 +533,7 @@ def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
     except (ImportError, OSError):
         yield
         return
-    end = time.monotonic() + (0 if shared else WAIT_S)  # somebody may just be looking
+    end = time.monotonic() + (0 if shared else WAIT_S)  # a reader holds the lock for a moment
     try:
         while True:
             try:
@@ -575,7 +575,7 @@ def check_files(folder: Path) -> None:
             raise CoarticError(
                 f"{path} is no file of its own, as a link is none: name the folder that holds it"
             )
-        # After it has rolled back, SQLite deletes the journal of several files that this one names.
+        # After a rollback SQLite deletes the file that such a journal names.
         if ending == "-journal" and path.exists() and path.stat().st_size >= len(_OF_SEVERAL):
             with path.open("rb") as file:
                 file.seek(-len(_OF_SEVERAL), os.SEEK_END)
@@ -659,7 +659,7 @@ def explain(path: Path, error: Exception) -> str:
         if kind == "SQLITE_READONLY_DBMOVED":
             return (
                 f"{path.parent} was removed, renamed or replaced while the suite ran: put it back, "
-                "or repeat the command to begin anew"
+                "or repeat the command to start again"
             )
         if kind.startswith(_LOCKED):
             return f"another program has {path} open; close it there, or wait for it"
@@ -704,7 +704,7 @@ def check_runs(runs: pd.DataFrame) -> pd.DataFrame:
         if "NOT NULL" in kind:
             rules[f"lack of {name}"] = runs[name].notna()
         if kind.startswith(("INTEGER", "REAL")):
-            is_reward = name.endswith("reward") or name == "proven_bound"  # minus a count
+            is_reward = name.endswith("reward") or name == "proven_bound"  # minus a count of ticks
             size = runs[name].fillna(0) * (-1 if is_reward else 1)
             rules[f"size of {name}"] = (size >= 0) & (size < np.inf)
     for name, holds in rules.items():
