@@ -182,9 +182,7 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
             if results[run_id] == there[run_id]:
                 continue
             run = source.run(run_id)
-            if changes := compare_runs(
-                target.run(run_id), run
-            ):  # beyond trials whose rewards are not kept
+            if changes := compare_runs(target.run(run_id), run):  # of what both runs keep
                 which = f"run {run.number} of {run.cell.method.name} on {run.cell.task.name}"
                 where = f"{origin[run_id]} and {name} ({run_id})"
                 raise CoarticError(f"{which} differs in {where}: {changes[0]}")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +13,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, ValidationError
 
 from coartic import CoarticError, Task, builtin_tasks, load_task
 from coartic.benchmarks.registry import Registry, methods_named, registry
-from coartic.benchmarks.suites import WILDCARD, Suite, check_kind, load_suite, tasks_of
+from coartic.benchmarks.suites import WILDCARD, Suite, TaskNamed, check_kind, load_suite, tasks_of
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.internal.text import unknown
 from coartic.internal.validation import FileData, error_saying, explain_inline
@@ -34,6 +35,8 @@ def number_of_python(value: Any) -> Any:
     return value.item() if isinstance(value, np.number) else value
 
 
+JobOf = Callable[..., Job]
+"""Function :func:`job_of` for a suite and a request."""
 _Tasks = tuple[Annotated[Any, PlainValidator(task_or_name)], ...]
 _Files = tuple[Path, ...]
 _plain = BeforeValidator(number_of_python)
@@ -110,24 +113,25 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     """
     methods = [registered[m] for name in request.methods for m in methods_named(name, registered)]
     names, own, task_named = asked_tasks(suite, request)
-    of_suite = suite_jobs(suite, request, registered, own, task_named)
+    job = partial(job_of, suite, request)
+    of_suite = suite_jobs(suite, registered, own, task_named, job)
     jobs = list(itertools.islice(of_suite, MOST_CELLS + 1))
     if len(jobs) > MOST_CELLS:
         raise CoarticError(
             f"suite {suite.name!r} asks for more than {MOST_CELLS:_} combinations "
             "(tasks x moves x methods x grid)"
         )
-    jobs += extra_jobs(suite, request, own, methods, jobs)
-    there = dict.fromkeys([*(job.cell.task.name for job in jobs), *own])
+    jobs += extra_jobs(jobs, own, methods, job)
+    there = dict.fromkeys([*(each.cell.task.name for each in jobs), *own])
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
         words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
         raise CoarticError("\n".join(words))
-    methods = methods or [*{job.cell.method.name: job.cell.method for job in jobs}.values()]
+    methods = methods or [*{each.cell.method.name: each.cell.method for each in jobs}.values()]
     ids = {method.name for method in methods}
-    jobs = [job for job in jobs if not names or job.cell.task.name in names]
-    chosen = [job for job in jobs if job.cell.method.name in ids]
-    busy = {job.cell.task.name for job in chosen}
+    jobs = [each for each in jobs if not names or each.cell.task.name in names]
+    chosen = [each for each in jobs if each.cell.method.name in ids]
+    busy = {each.cell.task.name for each in chosen}
     if not busy.issuperset(own) or not chosen:
         idle = [task for task in own.values() if task.name not in busy]
         raise CoarticError(why_nothing_runs(suite, idle, methods, jobs))
@@ -136,7 +140,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 
 def asked_tasks(
     suite: Suite, request: Request
-) -> tuple[dict[str, None], dict[str, Task], Callable[[str], Task]]:
+) -> tuple[dict[str, None], dict[str, Task], TaskNamed]:
     """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
     a function that gives a task by its name.
 
@@ -170,17 +174,14 @@ def asked_tasks(
         names[task.name] = None
     of_suite = {name for block in suite.blocks for each in block.tasks for name in named_by(each)}
     brought = (name for name in names if name not in of_suite and address_of(name))
-    return names, own | {name: task_named(name) for name in brought}, task_named
+    own |= {name: task_named(name) for name in brought}
+    return names, own, task_named
 
 
 def suite_jobs(
-    suite: Suite,
-    request: Request,
-    registered: Registry,
-    own: Mapping[str, Task],
-    task_named: Callable[[str], Task],
+    suite: Suite, registered: Registry, own: Collection[str], task_named: TaskNamed, job: JobOf
 ) -> Iterator[Job]:
-    """Yield the jobs of a suite; ``own`` are the tasks that the request brings, by name.
+    """Yield the jobs of a suite; ``own`` names the tasks that the request brings.
 
     Raises CoarticError for a method that is unknown or does not apply to a task, and for parameters
     that a method does not take.
@@ -195,20 +196,16 @@ def suite_jobs(
                     raise CoarticError(f"suite {suite.name!r}: {reason}")
                 for values in itertools.product(*block.grid.values()) if reason is None else ():
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
-                    yield job_of(suite, request, task, method, parameters, block.runs)
+                    yield job(task, method, parameters, block.runs)
 
 
 def extra_jobs(
-    suite: Suite,
-    request: Request,
-    own: Mapping[str, Task],
-    methods: Sequence[MethodInfo],
-    jobs: Sequence[Job],
+    jobs: Sequence[Job], own: Mapping[str, Task], methods: Sequence[MethodInfo], job: JobOf
 ) -> Iterator[Job]:
     """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: its methods that the
     suite does not have on the tasks of the suite, and the tasks that it brings with its methods, or
     with all methods of the suite."""
-    cells = [job.cell for job in jobs]
+    cells = [each.cell for each in jobs]
     of_suite = {cell.method.name: cell.method for cell in cells}
     tasks = {cell.task.name: cell.task for cell in cells if cell.task.name not in own}
     there = {(cell.task.name, cell.label) for cell in cells}
@@ -218,7 +215,7 @@ def extra_jobs(
         *itertools.product(own.values(), methods or of_suite.values()),
     ):
         if (task.name, method.name) not in there and method.why_not(task) is None:
-            yield job_of(suite, request, task, method)
+            yield job(task, method)
 
 
 def job_of(

@@ -50,11 +50,7 @@ _LAST_LINES = 3  # last lines of a dead process's output in a reason
 _PRINTED = 4000  # bytes of the output that are read
 _STARTS = 5  # processes in a row that end before their first job: then the suite ends
 _UNKEPT = 74  # exit code of a process that could not write its answer
-_REPEATED = (
-    -9,
-    255,
-    _UNKEPT,
-)  # exit codes after which a job is repeated once: killed, or without its server
+_REPEATED = (-9, 255, _UNKEPT)  # exit codes (killed, lost server) that repeat a job once
 _IDLE_S = 60.0  # longest wait of a process for jobs
 _END_S = 1.0  # time for a killed process to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")

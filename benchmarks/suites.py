@@ -6,7 +6,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
@@ -27,6 +27,8 @@ from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
 Scalar = bool | int | float | str
+TaskNamed = Callable[[str], Task]
+"""A function that returns the task of a name or of a file."""
 
 
 def plain_scalar(value: Any) -> Scalar:
@@ -175,20 +177,19 @@ def read_suite(path: Path) -> Suite:
 
 
 def tasks_of(
-    suite: Suite, block: Block, own: Mapping[str, Task], task_named: Callable[[str], Task]
+    suite: Suite, block: Block, own: Collection[str], task_named: TaskNamed
 ) -> Iterator[Task]:
     """Yield the tasks of a block, as the block changes them.
 
-    ``own`` holds the tasks of the user by name. A block for all tasks is for the user's tasks as
-    well, and moves none of their goals.
+    ``own`` names the tasks of the user. A block for all tasks is for these tasks as well, and moves
+    none of their goals.
     """
-    is_for_all = WILDCARD in block.tasks
     every = [*builtin_tasks(), *own]
     names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):
-        if name in own and block.move is not None and is_for_all:
+        if name in own and block.move is not None and WILDCARD in block.tasks:
             continue
-        task = own.get(name) or task_named(name)
+        task = task_named(name)
         if block.goals is None or len(task.goals) in block.goals:
             yield from changed_tasks(task, suite, block)
 
