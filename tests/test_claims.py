@@ -28,7 +28,7 @@ from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.estimates import Estimate
-from tests.support.made_up import plan_for, row, runs_of, study_of, study_of_solutions
+from tests.support.made_up import row, runs_of, study_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED
 from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
 
@@ -41,7 +41,7 @@ COUNTED = Path(__file__).parent.parent / "docs" / "stored" / "reconstruction" / 
 
 def nothing():
     """A study of a folder without runs."""
-    return Study(Path("none"), plan_for([]), {}, pd.DataFrame())
+    return Study(Path("none"), [], {}, pd.DataFrame())
 
 
 def found(holds, *p, against=None, n=20):

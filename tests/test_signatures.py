@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -464,9 +463,8 @@ def beside_corrective(method, posture_difference, *, stochastic, runs):
         )
         for name, shift in zip(("ascending", "descending"), shifts, strict=True)
     ]  # fmt: skip
-    study = study_of_solutions(cells)
+    study = study_of_solutions(cells, deterministic=[] if stochastic else [method])
     study.runs["trials"] = 0
-    study.declared[method] = replace(study.declared[method], stochastic=stochastic)
     return study
 
 

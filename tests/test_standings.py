@@ -3,7 +3,6 @@
 import itertools
 import math
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -100,9 +99,7 @@ def test_two_methods_differ_by_the_difference_of_their_gaps():
     """With the interval of the one that varies, where the other is exact."""
     plan = {(task, "my-plan"): [reward] for task, reward in
             (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
-    seen = study(TEN | plan)
-    declared = replace(seen.declared["my-plan"], stochastic=False)
-    seen.declared["my-plan"] = declared
+    seen = study(TEN | plan, deterministic=["my-plan"])
     rows = standings.main_gaps(seen).set_index("method")
     both = "dual-process (EC1, EC4)"
     found = ranking.difference_of_gaps(seen, both, "my-plan")
@@ -196,15 +193,12 @@ def test_crossings_by_brute_force():
 def test_a_failed_run_reaches_nothing():
     """Of four runs the first is cold, so that its time is not known, and two fail."""
     learner, other = "dual-process/EC1", "posture-based/two-goals"
-    seen = study({("ascending", learner): [-300] * 4, ("ascending", other): [-305] * 4})
-    failed = (seen.runs.method == other) & (seen.runs.run > 1)
-    runs = seen.runs.assign(status=np.where(failed, "timeout", "ok"))
-    runs["reward"] = runs.reward.mask(failed)
-    again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
-    assert standings.main_gaps(again).method.tolist() == [learner]
-    assert TABLES["against-learner"](again).empty
-    assert TABLES["runtimes"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
-    times = costs.times_of(again, again.cells["ascending", other], "solve_s")
+    rewards = {learner: [-300] * 4, other: [-305, -305, None, None]}
+    seen = study({("ascending", method): of for method, of in rewards.items()})
+    assert standings.main_gaps(seen).method.tolist() == [learner]
+    assert TABLES["against-learner"](seen).empty
+    assert TABLES["runtimes"](seen).reached[other] == pytest.approx(2 / 4 * 10 / 20)
+    times = costs.times_of(seen, seen.cells["ascending", other], "solve_s")
     assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
 
 
@@ -251,16 +245,13 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     few = {key: rewards[:runs] for key, rewards in TEN.items()}
     plan = {(task, "my-plan"): [reward] for task, reward in
             (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
-    seen = study(few | plan)
-    declared = replace(seen.declared["my-plan"], stochastic=False)
-    seen.declared["my-plan"] = declared
+    seen = study(few | plan, deterministic=["my-plan"])
     rows = TABLES["against-learner"](seen)
     assert rows.least_p["ascending my-plan"] == pytest.approx(2 / 2**runs)
     row_of = TABLES["ranking"](seen).loc["my-plan"]
     both = "dual-process (EC1, EC4)"
-    test = standings.paired_difference(
-        seen, "my-plan", both, standings.common_tasks(seen)
-    )  # with every run
+    # With every run of the learner.
+    test = standings.paired_difference(seen, "my-plan", both, standings.common_tasks(seen))
     assert test.least_p == pytest.approx(max(2 / 4**runs, 2 / (1 + RESAMPLES)))
     expected = (2, 0) if runs == 10 else (math.nan, math.nan)
     assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
@@ -360,12 +351,8 @@ def test_a_method_that_ran_on_all_is_said_beside_the_learner():
 
 
 def test_a_failed_run_leaves_its_task_out():
-    seen = study(LEARNER | {(task, "mine"): [-490, -491] for task in ("ascending", "two-armed-1")})
-    failed = (seen.runs.method == "mine") & (seen.runs.task == "ascending") & (seen.runs.run == 1)
-    runs = seen.runs.assign(status=np.where(failed, "timeout", "ok"))
-    runs["reward"] = runs.reward.mask(failed)
-    again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
-    first, *_, last = own.own_in_words(again).split("\n")
+    mine = {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
+    first, *_, last = own.own_in_words(study(LEARNER | mine)).split("\n")
     assert first.startswith("mine ran on 1 of 2 tasks: gap of 5.5 % there; the learner 3.5 %")
     assert last == "1 of 4 runs of mine failed, and these tasks do not count."
 
@@ -378,8 +365,8 @@ def test_runs_without_spread_are_tested_by_their_number(runs, better, words):
     """A plan that is run once, and the learner's runs all alike, 3 ticks behind it."""
     tasks = ("ascending", "dual-process/EC1", -303), ("two-armed-1", "dual-process/EC4", -485)
     learned = {(task, learner): [reward] * runs for task, learner, reward in tasks}
-    seen = study(learned | {(task, "mine"): [reward + 3] for task, _, reward in tasks})
-    seen.declared["mine"] = replace(seen.declared["mine"], stochastic=False)
+    planned = {(task, "mine"): [reward + 3] for task, _, reward in tasks}
+    seen = study(learned | planned, deterministic=["mine"])
     row_of = TABLES["ranking"](seen).loc["mine"]
     assert row_of.better == pytest.approx(better, nan_ok=True)
     assert words in own.own_in_words(seen)

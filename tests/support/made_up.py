@@ -69,39 +69,32 @@ def runs_of(task, method, rewards, **more):
     ]  # fmt: skip
 
 
-def declared(method):
-    """What a made-up method declares; planners are not stochastic."""
-    stochastic = not method.startswith(("trajectory-optimisation", "corrective-alone"))
+def declared(method, deterministic=()):
+    """What a made-up method declares; planners and ``deterministic`` methods draw nothing."""
+    planners = "trajectory-optimisation", "corrective-alone"
+    stochastic = not method.startswith((*planners, *deterministic))
     origin = BUILT_IN if method in KNOWN_METHODS else "file.py"
     return MethodInfo(method, method, "", (), stochastic, {}, origin, "")
 
 
-def plan_for(tasks, runs=None):
-    """A plan with these tasks and the cells that the rows of runs are of."""
-    keys = ["task", "method", "setting"]
-    rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
-    by_name = {task.name: task for task in tasks}
-    plan = []
-    for each in rows:
-        parameters = dict(item.split("=") for item in each["setting"].split(", ") if item)
-        cell = Cell(by_name[each["task"]], declared(each["method"]), parameters)
-        plan.append(Job(cell, 0, range(3), suite="paper"))
-    return plan
-
-
-def study_of(rows, tasks=(), **parts):
+def study_of(rows, tasks=(), *, deterministic=(), **parts):
     """A study of rows of runs, with parts made up; tasks that are not given are loaded by name."""
     runs = pd.DataFrame(rows).reset_index(drop=True)
     runs = runs.astype({"reward": "Int64", "proven_bound": "Int64"})
-    given = {task.name: task for task in tasks}
-    tasks = [given.get(name) or load_task(name) for name in runs.task.unique()]
-    return MadeUp(Study(Path("made-up"), plan_for(tasks, runs), MADE_WITH, runs), **parts)
+    by_name, plan = {task.name: task for task in tasks}, []
+    for name, method, setting in runs.groupby(["task", "method", "setting"], sort=False).groups:
+        parameters = dict(item.split("=") for item in setting.split(", ") if item)
+        task = by_name.get(name) or load_task(name)
+        cell = Cell(task, declared(method, deterministic), parameters)
+        plan.append(Job(cell, 0, range(3), suite="paper"))
+    return MadeUp(Study(Path("made-up"), plan, MADE_WITH, runs), **parts)
 
 
-def study_of_rewards(rewards, **more):
-    """A study of ``{(task, method): rewards}`` with proven optima of the paper's tasks."""
-    rows = [run for cell, of in rewards.items() for run in runs_of(*cell, of, **more)]
-    return study_of(rows, optima=made_up_optima(*{task for task, _ in rewards}))
+def study_of_rewards(rewards, **parts):
+    """A study of ``{(task, method): rewards}``, None for a failed run; optima are proven."""
+    rows = [run for cell, of in rewards.items() for run in runs_of(*cell, of)]
+    optima = made_up_optima(*{task for task, _ in rewards})
+    return study_of(rows, **{"optima": optima, "rewards": lambda: iter(()), **parts})
 
 
 def study_of_trials(trials, plans, **more):
