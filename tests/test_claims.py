@@ -268,10 +268,7 @@ def seven(replays):
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (
-            on_2("EC3", WORSE, "RLRR", trials=3000),
-            "Not judged: the paper's runs have 10000 trials",
-        ),
+        (on_2("EC3", WORSE, "RLRR", trials=3000), "Not judged: the paper's runs have 10000 trials"),
         (on_2("EC3", WORSE[:2], "RLRR"), "fewer than 3 runs"),
         (
             on_2("EC3", WORSE, "RLRR")[:-1] + on_2("EC3", WORSE, "RLRR", status="crashed")[-1:],

@@ -4,11 +4,7 @@ import pytest
 
 from coartic import PAPER, Robot, corrective_trial, hand_sequences, load_task
 from coartic.analysis.claims.judgements import CLAIMS
-from coartic.analysis.published import (
-    ENTRIES,
-    RUNS,
-    published_cell,
-)
+from coartic.analysis.published import ENTRIES, RUNS, published_cell
 from coartic.learner import learning
 from coartic.learner.conditions import CONDITIONS
 from coartic.tasks.catalogue import builtin_tasks

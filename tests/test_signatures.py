@@ -97,11 +97,7 @@ def test_more_than_another_by_brute_force():
             parts[0][1], parts[1][1]
         )
 
-    observed, count, total = (
-        distance_of_means(*method) - distance_of_means(*other),
-        0,
-        0,
-    )
+    observed, count, total = (distance_of_means(*method) - distance_of_means(*other), 0, 0)
     for one in itertools.combinations(range(5), 3):
         for two in itertools.combinations(range(4), 2):
             rest = [set(range(5)) - set(one), set(range(4)) - set(two)]
