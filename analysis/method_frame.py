@@ -47,7 +47,7 @@ def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) ->
     by_label: dict[str, list[CellRuns]] = {}
     for cell in cells:
         by_label.setdefault(cell.label, []).append(cell)
-    rows = {label: row_of(of_label, declared, by_label) for label, of_label in by_label.items()}
+    rows = {label: method_row(of_label, declared, by_label) for label, of_label in by_label.items()}
     rows |= joined_conditions(by_label, rows)
     for label, look in looks_of(rows):
         rows[label]["look"] = look
@@ -61,7 +61,7 @@ def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) ->
     return frame.rename_axis("method")
 
 
-def row_of(
+def method_row(
     cells: Sequence[CellRuns], declared: Mapping[str, MethodInfo], labels: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return the row of a method from its cells; ``labels`` has all methods of the study."""

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 NONE = "–"
 """Text of a missing value."""
+MOST_NAMED = 3
+"""Most methods, or tasks, that a sentence names."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 RECONSTRUCTED = "† The paper does not publish the goals of this task; ours are a reconstruction."
 _LATEX = str.maketrans(

@@ -13,13 +13,11 @@ from coartic.analysis.methods import most_exploring
 from coartic.analysis.sections import ranking
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import listed, marked, number, p_value, percent
+from coartic.analysis.words import MOST_NAMED, listed, marked, number, p_value, percent
 from coartic.estimates import standard_deviation
 from coartic.internal.text import counted
 
-MOST_NAMED = 3
-"""Most methods, and tasks, that a sentence names."""
-UNTESTED = " (the runs are too few, or too alike, for a test)"
+NO_TEST = " (the runs are too few, or too alike, for a test)"
 
 
 def own_methods(study: Study) -> list[str]:
@@ -128,11 +126,11 @@ def details(study: Study, method: str) -> str:
     if len(tests) == 1:
         reward, learner, p = tests[["reward", "learner", "p_holm"]].iloc[0]
         text = f"Its mean reward is {number(reward, 1)}, the learner's {number(learner, 1)}"
-        sentences.append(text + (UNTESTED if untested else f" ({p_value(p)})"))
+        sentences.append(text + (NO_TEST if untested else f" ({p_value(p)})"))
     elif len(tests) and untested:
         higher = int((tests.reward > tests.learner).sum())
         text = f"Its mean reward is higher than the learner's on {higher} of {len(tests)} tasks"
-        sentences.append(text + UNTESTED)
+        sentences.append(text + NO_TEST)
     elif len(tests):
         text = (
             f"It is significantly better than the learner on {counted(int(row['better']), 'task')}"

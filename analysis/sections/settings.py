@@ -13,12 +13,10 @@ from coartic.analysis.methods import setting_in_words, title_of
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import CellRuns, Study
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import capital, interval, listed, p_value, percent
+from coartic.analysis.words import MOST_NAMED, capital, interval, listed, p_value, percent
 from coartic.estimates import LEVEL
 from coartic.internal.text import counted
 
-MOST_NAMED = 3
-"""Most methods whose settings sentences name."""
 BEST, IDENTICAL, LARGER = "smallest gap", "identical in every run", "larger gap"
 UNSURE, UNTESTED = "no significant difference", "the runs are too few, or too alike, to tell"
 FAILED = "some runs failed"
