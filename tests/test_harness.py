@@ -17,7 +17,7 @@ from coartic import (
     execute,
     load_task,
 )
-from coartic.analysis.sections.rewards import beside_paper
+from coartic.analysis.sections.rewards import published_and_ours
 from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
@@ -211,7 +211,7 @@ def test_cells_are_distinguished_by_their_parameters(tmp_path):
     study = run_and_write(tmp_path / "out", asked, runs=3, trials=30)
     assert study.runs.run_id.is_unique
     assert set(study.runs.groupby(["task", "setting"]).size()) == {3}
-    compared = {(row["cell"].task, row["cell"].label) for row in beside_paper(study)}
+    compared = {(row["cell"].task, row["cell"].label) for row in published_and_ours(study)}
     assert ("ascending", "dual-process/EC1") in compared
 
 

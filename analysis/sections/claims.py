@@ -10,7 +10,7 @@ import pandas as pd
 
 from coartic.analysis.claims.judgements import CLAIMS, judgements
 from coartic.analysis.claims.judging import Verdict
-from coartic.analysis.sections.rewards import beside_paper
+from coartic.analysis.sections.rewards import published_and_ours
 from coartic.analysis.standings import failed_runs
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, table
@@ -28,7 +28,7 @@ def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:
 def papers_claims(study: Study) -> pd.DataFrame:
     """Return the judged claims; no rows if the folder has no runs for claims."""
     judged = judgements(study)
-    return judged if beside_paper(study) or judged.run_ids.any() else judged[:0]
+    return judged if published_and_ours(study) or judged.run_ids.any() else judged[:0]
 
 
 @table(

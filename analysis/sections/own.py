@@ -103,7 +103,7 @@ def card(study: Study, method: str) -> str:
         on_the_same = f"; {nearest} on the same {same}" * bool(nearest)
         return f"{title} ran on {covered}: {text} there{on_the_same}."
     if not math.isnan(row["better"]):
-        tasks = counted(len(beside_learner(study, method)), "task")
+        tasks = counted(len(against_learner(study, method)), "task")
         text += f", better than the learner on {row['better']:.0f} of {tasks}"
     elif nearest:
         text += f" ({nearest})"
@@ -113,7 +113,7 @@ def card(study: Study, method: str) -> str:
 def details(study: Study, method: str) -> str:
     """Say the gap of a method from a file with its interval, gaps of other methods on the same
     tasks, its number of trials if the learner made another number, and tests."""
-    row, tests = standing(study, method), beside_learner(study, method)
+    row, tests = standing(study, method), against_learner(study, method)
     tasks = standings.solved_tasks(study, method)
     is_partial = bool(standings.coverage(study, method))
     gap = f"Gap of {study.methods.title[method]} to the {standings.reference(study, tasks)}"
@@ -122,7 +122,7 @@ def details(study: Study, method: str) -> str:
     gap += f": {ranking.gap_in_words(row)}"
     for other, gap_of_other in nearest_others(study, method).items():
         gap += f"; of {other}{' there' * is_partial}: {percent(gap_of_other)}"
-    sentences, untested = [gap, trials_beside(study, method)], math.isnan(row["better"])
+    sentences, untested = [gap, trials_made(study, method)], math.isnan(row["better"])
     if len(tests) == 1:
         reward, learner, p = tests[["reward", "learner", "p_holm"]].iloc[0]
         text = f"Its mean reward is {number(reward, 1)}, the learner's {number(learner, 1)}"
@@ -140,13 +140,13 @@ def details(study: Study, method: str) -> str:
     return ". ".join(filter(None, sentences)) + "."
 
 
-def beside_learner(study: Study, method: str) -> pd.DataFrame:
+def against_learner(study: Study, method: str) -> pd.DataFrame:
     """Return the rows of a method in table ``against-learner``."""
     rows = ranking.list_against_learner(study)
     return rows[rows.method == method]
 
 
-def trials_beside(study: Study, method: str) -> str:
+def trials_made(study: Study, method: str) -> str:
     """Say how many trials a method that learns from trials, and the learner, made at most.
 
     Empty if the numbers are equal, or one of them made no trials.

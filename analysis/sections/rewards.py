@@ -28,7 +28,7 @@ _MARKS = {
 
 
 @cached
-def beside_paper(study: Study) -> list[dict[str, Any]]:
+def published_and_ours(study: Study) -> list[dict[str, Any]]:
     """Every cell that the paper has too, in the order of the plan, and its hand sequences.
 
     Sequences follow their cell where the paper or our runs tell several apart: those that the paper
@@ -86,7 +86,7 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
 )
 def list_published(study: Study) -> Rows:
     """List published and our learned rewards of the paper's cells, and their equivalence."""
-    for row in beside_paper(study):
+    for row in published_and_ours(study):
         cell = row["cell"]
         if not row["hands"]:
             published = published_alone(cell.task, "initial hands")
@@ -103,7 +103,7 @@ def list_published(study: Study) -> Rows:
 )
 def list_hands(study: Study) -> Rows:
     """List learned rewards by hand sequence, published and ours, for cells with several."""
-    for row in beside_paper(study):
+    for row in published_and_ours(study):
         good = row["cell"].good
         if row["hands"]:
             ids = " ".join(map(str, good.run_id[good.hands == row["hands"]]))
@@ -123,7 +123,7 @@ def list_hands(study: Study) -> Rows:
 def draw_published(study: Study) -> Parts | None:
     """Draw the differences of mean rewards to published rewards, with intervals and margins."""
     shown = []
-    for pair in beside_paper(study):
+    for pair in published_and_ours(study):
         cell = pair["cell"]
         comparable = len(cell.good) and (cell.good.trials == TRIALS).all()
         if comparable and pair["published"] is not None and (pair["several"] or not pair["hands"]):
@@ -169,7 +169,7 @@ def draw_published(study: Study) -> Parts | None:
 
 def rewards_reproduced(study: Study) -> str:
     """Say how many of our rewards agree with published rewards, and which undecided ones differ."""
-    rows = [row for row in beside_paper(study) if not row["hands"] and row["verdict"]]
+    rows = [row for row in published_and_ours(study) if not row["hands"] and row["verdict"]]
     if not rows:
         return ""
     verdicts = [row["verdict"] for row in rows]
