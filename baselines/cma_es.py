@@ -58,7 +58,7 @@ class Strategy:
         self.trials = 1
         self._rng = session.rng
         self._attempts = attempts
-        self._mask = attempts.explored(hands)
+        self._mask = attempts.explored
         first = attempts.by_correction(hands)
         self.reward = float(first.rewards[0])
         """Best reward so far; -inf where **A** did not complete the sequence."""

@@ -10,7 +10,6 @@ does, with ε for each goal around the best sequence known. The SD and ε are th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Method, Result, Session
@@ -39,7 +38,7 @@ class HillClimbing(Method):
         first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
         attempts = Attempts(session, self.parameters)
         most, ahead = len(letters) ** session.goals_count, 1
-        masks: dict[str, NDArray[np.bool_]] = {}  # explored joints, (G, dof)
+        explored = attempts.explored
         centres: dict[str, Array] = {}  # their values, (G, dof); NaN for the other joints
         rewards: dict[str, float] = {}  # a trial with more moves the centre
         hopeless: set[str] = set()  # A alone does not complete them, ever
@@ -64,13 +63,12 @@ class HillClimbing(Method):
                     if hands not in centres:
                         break
                     drawn.append(hands)
-                    noise.append(rng.standard_normal(masks[hands].sum()))
+                    noise.append(rng.standard_normal(explored.sum()))
                     states.append(rng.bit_generator.state)
                 if drawn:
                     than = np.array([rewards[hands] for hands in drawn])
                     targets = np.array([centres[hands] for hands in drawn])
-                    explored = np.array([masks[hands] for hands in drawn])
-                    targets[explored] += self.parameters.sigma * np.concatenate(noise)
+                    targets[:, explored] += self.parameters.sigma * np.array(noise)
                     attempt = attempts.by_targets(drawn, targets, until=than)
                     tried = len(attempt.rewards)
                     rng.bit_generator.state = states[tried]
@@ -78,12 +76,12 @@ class HillClimbing(Method):
                     if attempt.rewards[-1] > rewards[hands]:
                         ahead = tried
                 else:
-                    masks[hands], rewards[hands] = attempts.explored(hands), -np.inf
+                    rewards[hands] = -np.inf
                     attempt = attempts.by_correction(hands)
                     if attempt.rewards[-1] == -np.inf:
                         hopeless.add(hands)
                 if attempt.rewards[-1] > rewards[hands]:
-                    centres[hands] = np.where(masks[hands], attempt.reached[-1], np.nan)
+                    centres[hands] = np.where(explored, attempt.reached[-1], np.nan)
                     rewards[hands] = float(attempt.rewards[-1])
         return attempts.result(sequences=len(centres))
 

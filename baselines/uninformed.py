@@ -36,6 +36,8 @@ class Attempts:
 
     def __init__(self, session: Session, parameters: UninformedParameters) -> None:
         self._session = session
+        self.explored = np.tile(explored_joints(session), (session.goals_count, 1))
+        """Joints that are explored at each goal, shape ``(G, dof)``."""
         left = session.trials_left
         self.left = parameters.trials if left is None else min(parameters.trials, left)
         """Trials left."""
@@ -46,10 +48,6 @@ class Attempts:
         """Hand sequence of the best trial, empty before the first success."""
         self._best_trial = -1
         self._targets: Array = np.empty(0)
-
-    def explored(self, hands: str) -> NDArray[np.bool_]:
-        """Joints that a hand sequence explores, shape ``(G, dof)``."""
-        return explored_joints(self._session, hands)
 
     def by_correction(self, hands: str) -> Trials:
         """Make one trial by **A** alone."""

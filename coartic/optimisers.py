@@ -45,7 +45,7 @@ from coartic.robot import HANDS, Array, Configs, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.families import instance_names
 from coartic.tasks.optima import KnownOptimum, best_shipped
-from coartic.tasks.task import Task, hands_of, letters_of
+from coartic.tasks.task import Task, letters_of
 
 if TYPE_CHECKING:  # workers do without pandas
     import pandas as pd
@@ -67,18 +67,16 @@ NO_COPIES = (
 )
 
 
-def explored_joints(session: Session, hands: str) -> NDArray[np.bool_]:
-    """Joints that are worth exploring with a hand sequence, shape ``(G, dof)``.
+def explored_joints(session: Session) -> NDArray[np.bool_]:
+    """Find the joints that methods explore at every goal, shape ``(dof,)``.
 
-    Never a locked base coordinate, nor an arm that hits neither this goal nor a later one: moving
-    it can only cost.
+    The joints are those that the learner explores under EC1 with one arm and under EC4 with two:
+    the coordinates of the base that are not locked, and both arms, whichever hand hits the goal.
     """
-    names = hands_of(hands)
-    mask = np.zeros((len(names), session.dof), dtype=np.bool_)
-    mask[:, :2] = [coordinate not in session.locked_base for coordinate in "xy"]
-    for goal in range(len(names)):
-        for hand in HANDS:
-            mask[goal, session.joints(hand)] = hand in names[goal:]
+    mask = np.zeros(session.dof, dtype=np.bool_)
+    mask[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
+    for hand in session.hands:
+        mask[session.joints(hand)] = True
     return mask
 
 
@@ -96,8 +94,8 @@ def sequences_of(session: Session) -> list[str]:
 class Objective:
     """The cost of a trial, its ticks, a function of its target configurations.
 
-    A point holds the targets of all joints that are worth moving (:func:`explored_joints`), goal
-    by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
+    A point holds the targets of all joints that the learner explores (:func:`explored_joints`),
+    goal by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
     ``FAILED`` where the trial fails. Goals that a movement misses are corrected, and paid for.
     A point with an entry beyond 100,000 is a trial that fails.
 
@@ -147,7 +145,7 @@ class Objective:
                 reason += f"; with {sequences[best]}, {alone_again.reason}"
             raise MethodError("infeasible", reason)
         self._hands = sequences[best]
-        self.joints = explored_joints(session, self.hands)
+        self.joints = np.tile(explored_joints(session), (session.goals_count, 1))
         """Joints that have a target in a point, shape ``(G, dof)``."""
         self.configurations: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""

@@ -67,9 +67,9 @@ def cases(name):
     noise = rng.choice([0.03, LIMITS[name][1]], (20, 1, 1))
     hands, targets = sample(task, 20, noise, seed=1)
     session = Session(task, 0, OPTIMISER_INFORMATION)
-    for n, sequence in enumerate(hands):
+    for n in range(len(hands)):
         if n % 2 == 0:
-            targets[n][~explored_joints(session, sequence)] = np.nan
+            targets[n][:, ~explored_joints(session)] = np.nan
         else:
             targets[n][rng.random(targets[n].shape) < 0.2] = np.nan
         if n % 4 > 1:

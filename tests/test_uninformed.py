@@ -123,7 +123,7 @@ def one_by_one(task, seed, parameters):
         return drawn() if chosen in failed else chosen
 
     while attempts.left > 0:
-        mask = attempts.explored(hands)
+        mask = attempts.explored
         if hands in centres:
             centre, reward = centres[hands]
             values = centre + parameters.sigma * rng.standard_normal(len(centre))
@@ -159,13 +159,10 @@ def test_sequences_that_cannot_be_completed_are_left(method):
 class HalfOfAPlain:
     """A quadratic reward around (1, 1, 1); beyond 0.5 in the first joint trials fail."""
 
-    left = 10**6
+    left, explored = 10**6, np.ones((1, 3), dtype=bool)
 
     def __init__(self):
         self.sizes = []
-
-    def explored(self, hands):
-        return np.ones((1, 3), dtype=bool)
 
     def by_correction(self, hands):
         return SimpleNamespace(rewards=np.array([-300.0]), reached=np.zeros((1, 1, 3)))

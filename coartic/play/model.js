@@ -560,13 +560,13 @@ class RandomSearch {
     Object.assign(this, { problem, rng: new Generator(seed), hands: best_hands(problem) });
     this.trials = hand_sequences(problem).length; // to find the hands
     this.best = corrective_trial(problem, this.hands);
-    this.explored = this.hands.map((_, goal) => movable(problem, this.hands.slice(goal)));
+    this.explored = movable(problem, problem.hands);
     this.box = this.best.reached.map((posture) => posture.map((value) => [value - half_width, value + half_width]));
   }
 
   step() {
     const value = ([low, high]) => low + (high - low) * this.rng.random();
-    const targets = this.explored.map((explored, goal) => explored.map((moves, j) => (moves ? value(this.box[goal][j]) : NaN)));
+    const targets = this.box.map((box) => this.explored.map((moves, j) => (moves ? value(box[j]) : NaN)));
     const trial = make_trial(this.problem, this.hands, targets);
     this.trials += 1;
     if (trial.reward > this.best.reward) this.best = trial;
