@@ -15,6 +15,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 import pandas as pd
 from scipy import stats
 
@@ -22,6 +23,7 @@ from coartic.analysis import fill_page, mean_beyond
 from coartic.analysis.claims.judgements import CLAIMS
 from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.methods import title_of
+from coartic.tasks.optima import BEST_KNOWN
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
@@ -113,6 +115,27 @@ def p_above(values: pd.Series, bound: float) -> float:
     return mean_beyond("{}", values, bound).p
 
 
+def known_optima() -> pd.DataFrame:
+    """Count, by family, instances with best known rewards, and how near their bounds are.
+
+    Columns ``instances``, ``proven``, ``near`` (bound within 1 % of the reward), ``bounded``, and
+    ``median``: the median distance of a bound from the reward, per cent of the reward, for which an
+    instance without a bound counts as infinitely far.
+    """
+    known = pd.read_csv(BEST_KNOWN)
+    known["distance"] = 100 * (known.bound - known.reward) / -known.reward
+    by_family = known.groupby(known.instance.str.partition("/")[0])
+    return pd.DataFrame(
+        {
+            "instances": by_family.size(),
+            "proven": by_family.distance.agg(lambda column: (column == 0).sum()),
+            "near": by_family.distance.agg(lambda column: (column <= 1).sum()),
+            "bounded": by_family.bound.count(),
+            "median": by_family.distance.agg(lambda column: column.fillna(np.inf).median()),
+        }
+    )
+
+
 def filled_pages() -> dict[str, str]:
     """Every page that is made from a template, by its path below ``docs``.
 
@@ -121,7 +144,8 @@ def filled_pages() -> dict[str, str]:
     published = ANALYSIS / "published.toml"
     values = {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "seen": seen,
-        "title_of": title_of, "p_of_shares": p_of_shares, "p_above": p_above,
+        "title_of": title_of, "known_optima": known_optima,
+        "p_of_shares": p_of_shares, "p_above": p_above,
         "published": tomllib.loads(published.read_text("utf-8"))["general"],
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
         "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),

@@ -38,6 +38,9 @@ PINNED = {
     "long/v1/i017": "0c274c3863f2febc",
     "long/v1/d003": "1e66e6a44e109d4d",
     "long/v1/2027-041": "66be010eeaecdab3",
+    "many-goals/v1/i017": "a859464be3d91ac3",
+    "many-goals/v1/d003": "fa2fc4e7805f4e67",
+    "many-goals/v1/2027-041": "6e2182e4e9f4af3e",
     "one-armed/v1/i017": "d045540cec694356",
     "one-armed/v1/d003": "15287e3c04086d4e",
     "one-armed/v1/2027-041": "db6b68237c741b36",
@@ -51,6 +54,7 @@ PINNED = {
 RELEASED = {
     "aligned/v1": "1acc695728233543",
     "long/v1": "bc600910c824b195",
+    "many-goals/v1": "f8753279ead72058",
     "one-armed/v1": "b8ab1125c46640e1",
     "redundancy/v1": "29dd33d58da81c12",
     "two-armed/v1": "421fe30fedfb532a",

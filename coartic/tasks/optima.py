@@ -22,8 +22,8 @@ BASE = "task"
 """Base locked as the task has it: the case that rewards compare with."""
 DATA = Path(__file__).with_name("optima.json")
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
-"""Columns ``instance``, ``reward``, ``bound`` (empty where nothing is proven), ``hands`` and
-``essence``."""
+"""Columns ``instance``, ``reward``, ``bound`` (empty where nothing is proven), ``nodes`` (of the
+search that proved the bound), ``hands`` and ``essence``."""
 
 KEPT = ("start", "radius", "hands", "locked_base", "robot")
 """What makes a task beside its goals."""
