@@ -1,13 +1,22 @@
 """Comparisons with random search, which selects the best of many random targets.
 
 Selection by reward alone produces signatures of coarticulation, so the signatures of a method that
-selects its solution from trials have to exceed the signatures of random search. A folder may have
-several settings of random search; the setting with the largest signature counts.
+selects its solution from trials have to exceed the signatures of random search. Like is compared
+with like:
+
+- runs with the same hand sequence;
+- of both, the runs that *improved*: that take fewer ticks than the corrective process alone with
+  the same hands, which is trial 0 of random search. Random search in a wide box mostly returns
+  trial 0, whose signatures are 0, and such runs would hide what the others show;
+- with as many trials.
+
+Of several widths of its box the width counts that shows most.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from statistics import fmean
 
 import numpy as np
@@ -15,30 +24,99 @@ import numpy as np
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study
+from coartic.estimates import FEWEST
 from coartic.robot import Array
 
-
-def random_search_on(study: Study, task: str) -> list[str]:
-    """Return the labels of the settings of random search that solved a task."""
-    labels = study.methods.index[study.methods.algorithm == "random search"]
-    cells = {label: study.cells.get((task, label)) for label in labels}
-    return [label for label, cell in cells.items() if cell is not None and len(cell.good)]
+LEAST_SHARE = 0.1
+"""Share of a method's runs that a hand sequence has at least where it is compared."""
 
 
-def most_of_random_search(study: Study, signature: str, task: str) -> Array:
-    """Return a signature of random search on a task, shape ``(n,)``; empty without it.
+def random_search_on(study: Study, task: str, trials: float = 0) -> list[str]:
+    """Return the labels of the settings of random search that solved a task.
 
-    Of the setting with the largest mean of this signature, on the task or, for an instance of a
-    family, over the instances.
+    Of those that made at least so many ``trials``, the ones that made fewest.
     """
-    family, shown = study.tasks[task].family, dict[str, dict[str, Array]]()
-    for each, other in study.tasks.items():
-        if each == task or (family is not None and other.family == family):
-            for label in random_search_on(study, each):
-                if len(values := study.signature_of(signature, each, label)):
-                    shown.setdefault(label, {})[each] = values
-    most = max(shown.values(), key=lambda of: fmean(map(np.mean, of.values())), default={})
-    return most.get(task, np.empty(0))
+    labels = study.methods.index[study.methods.algorithm == "random search"]
+    made = {
+        label: trials_of(study, task, label)
+        for label in labels
+        if (task, label) in study.cells and len(study.cells[task, label].good)
+    }
+    enough = [each for each in made.values() if each >= trials]
+    return [label for label in made if made[label] == min(enough)] if enough and trials else [*made]
+
+
+def trials_of(study: Study, task: str, label: str) -> float:
+    """Return the most trials that a run of a method made on a task."""
+    return float(study.cells[task, label].runs.trials.fillna(0).max())
+
+
+def beside_random_search(
+    study: Study, signature: str, task: str, label: str
+) -> dict[str, tuple[Array, Array]]:
+    """Return a signature of a method and of random search by hand sequence.
+
+    For each sequence with which at least a tenth of the method's improved runs end: the values of
+    the method, and those of the random search that shows most of the signature with the same hands
+    and as many trials, shape ``(n,)``; empty where no such random search has three runs.
+    """
+    of_method = study.signature_by_hands(signature, task, label)
+    total = sum(map(len, of_method.values()))
+    trials = trials_of(study, task, label)
+    return {
+        hands: (values, most_of_random_search(study, signature, task, hands, trials))
+        for hands, values in of_method.items()
+        if len(values) >= LEAST_SHARE * total
+    }
+
+
+def most_of_random_search(
+    study: Study,
+    signature: str,
+    task: str,
+    hands: str,
+    trials: float,
+    *,
+    every: bool = False,
+) -> Array:
+    """Return a signature of the random search that shows most of it with some hands.
+
+    Shape ``(n,)``; empty where no setting with so many trials has three such runs.
+    ``every``: as in :meth:`.Study.signature_by_hands`.
+    """
+    of_settings = (
+        study.signature_by_hands(signature, task, label, every=every).get(hands, np.empty(0))
+        for label in random_search_on(study, task, trials)
+    )
+    enough = [values for values in of_settings if len(values) >= FEWEST]
+    return max(enough, key=np.mean, default=np.empty(0))
+
+
+def most_in_family(study: Study, signature: str, family: str, trials: float) -> str:
+    """Return the setting of random search that shows most of a signature in the mean over the
+    instances of a family; empty where none shows it."""
+    shown: dict[str, list[float]] = {}
+    for task, each in study.tasks.items():
+        if each.family == family:
+            for label in random_search_on(study, task, trials):
+                if len(values := [*study.signature_by_hands(signature, task, label).values()]):
+                    shown.setdefault(label, []).append(float(np.concatenate(values).mean()))
+    return max(shown, key=lambda label: fmean(shown[label]), default="")
+
+
+def excess_on_instance(study: Study, signature: str, task: str, label: str) -> float:
+    """Return the excess of a method's signature over random search on an instance of a family.
+
+    The mean over the runs of the method with whose hands random search has a run; NaN without any.
+    """
+    trials = trials_of(study, task, label)
+    most = most_in_family(study, signature, str(study.tasks[task].family), trials)
+    if (task, most) not in study.cells:
+        return math.nan
+    other = study.signature_by_hands(signature, task, most)
+    both: Mapping[str, Array] = study.signature_by_hands(signature, task, label)
+    excess = [both[hands] - other[hands].mean() for hands in both if hands in other]
+    return float(np.concatenate(excess).mean()) if excess else math.nan
 
 
 def selects(study: Study, label: str) -> bool:
@@ -58,19 +136,16 @@ def random_search_for(study: Study, contexts: TwoContexts) -> TwoContexts | None
 
 
 def every_random_search_for(study: Study, contexts: TwoContexts) -> list[TwoContexts]:
-    """Return the settings of random search in the same contexts, with as many trials or more."""
+    """Return the improved runs of random search, by setting, in the same two contexts with as many
+    trials as the method, where each context has three of them."""
     names, pairs = [task.name for task in contexts.tasks], []
-
-    def trials(label: str) -> Array:
-        made = [study.cells[name, label].runs.trials.fillna(0).max() for name in names]
-        return np.array(made, dtype=np.float64)
-
-    on_first, on_second = (random_search_on(study, name) for name in names)
-    for label in (each for each in on_first if each in on_second):
-        if (trials(label) >= trials(contexts.method)).all():
-            first, second = (study.executed(name, label) for name in names)
-            pairs.append(TwoContexts(first, second, contexts.goal, contexts.hand))
-    return [pair for pair in pairs if pair.in_both]
+    first, second = (
+        random_search_on(study, name, trials_of(study, name, contexts.method)) for name in names
+    )
+    for label in (each for each in first if each in second):
+        runs, others = (study.executed(name, label).improved() for name in names)
+        pairs.append(TwoContexts(runs, others, contexts.goal, contexts.hand))
+    return [pair for pair in pairs if min(map(len, pair.configurations)) >= FEWEST]
 
 
 def context_beyond_p(study: Study, contexts: TwoContexts) -> float:

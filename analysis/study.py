@@ -387,6 +387,25 @@ class Study:
         return SIGNATURES[name].of(self.executed(task, method, replay=replay))
 
     @cached
+    def signature_by_hands(
+        self, name: str, task: str, method: str, *, every: bool = False
+    ) -> dict[str, Array]:
+        """Return a signature of the runs of a method on a task that improved, by hand sequence.
+
+        A run improved if it takes fewer ticks than the corrective process alone with the same
+        hands; ``every``: of all runs. Arrays have shape ``(n,)``; runs without the signature are
+        left out. Signature ``hand``, the choice of hands itself, is of all hand sequences together.
+        """
+        from coartic.analysis.signatures.measures import SIGNATURES
+
+        executed = self.executed(task, method)
+        executed = executed if every else executed.improved()
+        values = SIGNATURES[name].each(executed)
+        hands = np.array(["" if name == "hand" else run.hands for run in executed.runs])
+        there = np.isfinite(values)
+        return {str(each): values[there & (hands == each)] for each in np.unique(hands[there])}
+
+    @cached
     def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` of executed runs, by run id."""
         with open_store(self.folder) as store:

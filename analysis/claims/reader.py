@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -12,7 +13,11 @@ import pandas as pd
 from coartic import Execution, Task
 from coartic.analysis.methods import CONDITION_OF, RANDOM_SEARCH, title_of
 from coartic.analysis.published import Summary, published_alone, published_cell
-from coartic.analysis.random_search import most_of_random_search, random_search_on
+from coartic.analysis.random_search import (
+    beside_random_search,
+    excess_on_instance,
+    random_search_on,
+)
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.study import CellKey, Study
@@ -164,12 +169,44 @@ class Reader:
         values = self.study.signature_of(name, task, label, replay=replay)
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
-    def signature_of_random_search(self, name: str, task: str) -> Measurement:
-        """Return a signature of random search (:func:`.most_of_random_search`)."""
-        for label in self.random_search(task):
-            self.runs(task, label)
-        values = most_of_random_search(self.study, name, task)
-        return self.shown(name, task, RANDOM_SEARCH, values)
+    def beside_random_search(
+        self, name: str, task: str, label: str
+    ) -> list[tuple[Measurement, Measurement]]:
+        """Return a signature of a method and of random search, for each hand sequence.
+
+        The rule is that of :mod:`coartic.analysis.random_search`: equal hands, runs that improved,
+        as many trials, and the width of the box that shows most.
+        """
+        for each in (label, *self.random_search(task)):
+            self.runs(task, each)
+        pairs = []
+        one_handed = len(self.task(task).hands) == 1
+        for hands, both in beside_random_search(self.study, name, task, label).items():
+            words = "" if one_handed else f"with hands {hands}, "
+            if not len(both[1]):
+                raise MissingError(
+                    f"fewer than {FEWEST} runs of {RANDOM_SEARCH} on {task} with hands {hands} "
+                    "improved on the corrective process alone"
+                )
+            first, second = (
+                self.shown(name, task, who, values, words)
+                for who, values in zip((label, RANDOM_SEARCH), both, strict=True)
+            )
+            pairs.append((first, second))
+        if not pairs:
+            raise MissingError(
+                f"no run of {who_is(label)} on {task} improved on the corrective process alone"
+            )
+        return pairs
+
+    def excess_over_random_search(self, name: str, task: str, label: str) -> Measurement:
+        """Return the excess of a method's signature over random search on an instance of a family,
+        a single number, by the same rule."""
+        self.runs(task, label)
+        excess = excess_on_instance(self.study, name, task, label)
+        if math.isnan(excess):
+            raise MissingError(f"no random search on {task} has the hands of {who_is(label)}")
+        return self.shown(name, task, label, np.array([excess]))
 
     def shown(
         self, name: str, task: str, label: str, values: Array, words: str = ""
@@ -180,8 +217,9 @@ class Reader:
         return Measurement(self.title(task), who_is(label), values, words + SIGNATURES[name].words)
 
     def random_search(self, task: str) -> list[str]:
-        """Return the labels of the settings of random search that solved a task."""
-        return random_search_on(self.study, task) or [RANDOM_SEARCH]
+        """Return the labels of the settings of random search that solved a task in 10,000
+        trials."""
+        return random_search_on(self.study, task, TRIALS) or [RANDOM_SEARCH]
 
     def initial_execution(self, task: str) -> Execution:
         """Return the initial solution of a task."""

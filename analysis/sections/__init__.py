@@ -13,6 +13,7 @@ from coartic.analysis.sections import (
     learning,
     methods,
     own,
+    random_search,
     random_tasks,
     ranking,
     rewards,
@@ -180,6 +181,18 @@ SECTIONS = (
         note="Ticks are compared with those of the corrective process with the same hands. A first "
         "movement that gets slower while the whole task gets faster is sacrificed for it. Idle "
         "hand nearer: share of the path to its next goal that a hand covers while idle.",
+        folded=True,
+    ),
+    Section(
+        "random-search",
+        "Random search",
+        "Is it more than selection alone?",
+        table=random_search.list_beside_random_search,
+        caption="Signatures beside random search with the same hands (ticks; idle arm: share)",
+        note="Random search learns nothing: it selects the best of many targets, drawn in a box "
+        "around the corrective process's postures. Runs improved if they take fewer ticks than the "
+        "corrective process alone with the same hands; other runs show nothing. Of several widths "
+        "of the box the one that shows most counts, in each column. p is one-tailed, uncorrected.",
         folded=True,
     ),
     Section(
