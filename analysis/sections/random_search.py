@@ -56,9 +56,7 @@ def list_beside_random_search(study: Study) -> Rows:
                         "improved": mean_of(improved),
                         "p": bootstrap_test(values, improved).p if enough else np.nan,
                         "every": mean_of(most_of_random_search(study, *there, trials, every=True)),
-                        "more_trials": mean_of(
-                            most_of_random_search(study, *there, MORE * trials)
-                        ),
+                        "more_trials": mean_of(most_of_random_search(study, *there, MORE * trials)),
                     }
                     yield f"{signature} {task} {label} {hands}", row | runs_of(cell)
 
