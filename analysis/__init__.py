@@ -23,6 +23,8 @@ _MODULES = {
     "means": "analysis.frames",
     "other_tasks": "analysis.statistics.instances",
     "ranking": "analysis.frames",
+    "separation": "analysis.frames",
+    "shares": "analysis.frames",
     "runtimes": "analysis.sections.costs",
     "write_study": "analysis.pages",
 }

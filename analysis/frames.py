@@ -1,13 +1,15 @@
-"""Gaps, rankings and running times of plain frames of results, including frames of your own.
+"""Gaps, shares of the possible gain, rankings and running times of plain frames of results.
 
-A frame has a row for each run, with columns ``method``, ``task``, ``reward`` (ticks, NaN for a
-failed run) and ``best_known``, the best known reward of the task; ``load(folder).runs`` is such a
-frame. Rewards are negative ticks; the costs of an ``Objective`` are their negatives. Frames with
-other contents raise CoarticError.
+A frame, also one of your own, has a row for each run, with columns ``method``, ``task``, ``reward``
+(ticks, NaN for a failed run) and ``best_known``, the best known reward of the task;
+``load(folder).runs`` is such a frame. Shares need ``corrective_best``, too: the reward of the
+corrective process alone with its best hands. Rewards are negative ticks; the costs of an
+``Objective`` are their negatives. Frames with other contents raise CoarticError.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from contextlib import suppress
 
@@ -15,6 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
+from scipy.stats import mannwhitneyu
 
 from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics import running_times
@@ -22,9 +25,14 @@ from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
+from coartic.robot import Array
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
+ZERO = "corrective_best"
+"""Column of the reward at which the share of the possible gain is 0."""
+CEILING, FLOOR = 0.95, 0.05
+"""Shares of the possible gain from which, and up to which, a task separates little."""
 
 
 def checked(
@@ -89,14 +97,16 @@ def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
 
 
 def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Return a user's frame of methods on tasks, checked, with the ``gap`` of each row.
+    """Return a user's frame of methods on tasks, checked, with the ``gap`` of each row, and its
+    ``share`` where the frame has ``corrective_best``.
 
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is a
     number. ``more``: other columns of numbers. Raises CoarticError as :func:`checked` and
     :func:`with_gaps` do, and for a task with several best known rewards.
     """
-    columns = checked(frame, names=("method", "task"), numbers=(*SCORES, *more))
-    columns = with_gaps(columns)
+    has_zero = isinstance(frame, pd.DataFrame) and ZERO in frame.columns
+    columns = checked(frame, names=("method", "task"), numbers=(*SCORES, *[ZERO] * has_zero, *more))
+    columns = with_shares(columns) if has_zero else with_gaps(columns)
     number, tasks = pd.factorize(columns.task)
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     several = columns.best_known.groupby(task).transform("nunique") > 1
@@ -138,6 +148,48 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     [0.038, 0.0]
     """
     return with_gaps(checked(frame, numbers=SCORES)).gap
+
+
+def shares(frame: pd.DataFrame) -> pd.Series:
+    """Share of the possible gain of each run: 0 is the corrective process, 1 the best known.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        With columns ``reward``, ``best_known`` and ``corrective_best``, negative ticks: the last is
+        the reward of the corrective process alone with its best hands, or with the task's initial
+        hands where there are over 4,096 hand sequences.
+
+    Returns
+    -------
+    Series
+        (reward - corrective_best) / (best_known - corrective_best) of each row; negative where the
+        corrective process does better. NaN where nothing can be gained, and where a reward is NaN.
+
+    Raises
+    ------
+    CoarticError
+        As :func:`gaps` does, and for a ``corrective_best`` above the best known reward.
+
+    Examples
+    --------
+    >>> frame = pd.DataFrame(
+    ...     {"reward": [-319, -300], "best_known": -292, "corrective_best": -319}
+    ... )
+    >>> shares(frame).round(2).tolist()
+    [0.0, 0.7]
+    """
+    return with_shares(checked(frame, numbers=(*SCORES, ZERO))).share
+
+
+def with_shares(columns: pd.DataFrame) -> pd.DataFrame:
+    """Return checked columns with the ``gap`` and, of frames with :data:`ZERO`, the ``share`` of
+    each row."""
+    columns = with_gaps(columns)
+    possible = columns.best_known - columns[ZERO]
+    known = "it is above best_known, which is to be the highest reward of the task"
+    refuse_rows(columns, ZERO, possible < 0, known)
+    return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
 
 
 def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
@@ -190,8 +242,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     ----------
     frame : DataFrame
         With columns ``method``, ``task`` (names, numbers or tuples), ``reward`` and ``best_known``
-        (negative ticks). With a column ``setting``, a method with several settings has a row for
-        each setting, ``"cma-es/bandit noise=0.1"``.
+        (negative ticks); for shares also ``corrective_best``. With a column ``setting``, a method
+        with several settings has a row for each setting, ``"cma-es/bandit noise=0.1"``.
 
     Returns
     -------
@@ -200,7 +252,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         solved runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same
         tasks (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of
         solved ``tasks``, of ``runs`` and of ``failed`` runs. A method that did not solve every task
-        of the frame has no gap and is last.
+        of the frame has no gap and is last. With ``corrective_best`` also the ``share`` of the
+        possible gain (:func:`shares`) with ``share_low`` and ``share_high``, a mean over the tasks
+        on which something can be gained, and ``without_gain``, the number of other tasks.
 
     Raises
     ------
@@ -226,14 +280,87 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         solved = of_method[of_method.gap.notna()]
         by_task = dict([*solved.groupby("task").gap])
         solved_all = by_task and by_task.keys() == every
+        row = (task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap")
+        if "share" in frame.columns:
+            of_task = dict([*solved.dropna(subset="share").groupby("task").share])
+            estimated = task_mean(of_task.values()) if solved_all and of_task else Estimate(np.nan)
+            row |= {**estimated.columns("share"), "without_gain": len(by_task) - len(of_task)}
         rows.append({
-            **(task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap"),
+            **row,
             "tasks": len(by_task),
             "runs": len(of_method),
             "failed": int(of_method.reward.isna().sum()),
         })  # fmt: skip
     methods = pd.Index(frame.method.unique(), name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
+
+
+def separation(frame: pd.DataFrame) -> pd.DataFrame:
+    """How well each task separates methods.
+
+    Two methods are separated where their rewards differ by a two-tailed Mann-Whitney test,
+    corrected for the pairs of the task (Bonferroni); a single run, such as that of a planner, where
+    at most 2.5 % of the other method's runs are on its wrong side or level with it.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        With columns ``method``, ``task``, ``reward``, ``best_known`` and ``corrective_best``, as in
+        :func:`ranking`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each task, by its name: ``methods`` that solved all of their runs, ``pairs`` of
+        them, ``separated`` pairs, and the number of methods ``at_ceiling`` and ``at_floor``: with
+        more than 95 % and with less than 5 % of the possible gain in the mean; -1 where nothing can
+        be gained.
+
+    Raises
+    ------
+    CoarticError
+        As :func:`ranking` does.
+
+    Examples
+    --------
+    >>> frame = pd.DataFrame(
+    ...     {"method": ["a", "b", "c"], "task": "ascending", "reward": [-292, -300, -300],
+    ...      "best_known": -292, "corrective_best": -319}
+    ... )
+    >>> separation(frame)
+               methods  pairs  separated  at_ceiling  at_floor
+    task
+    ascending        3      3          2           1         0
+    """
+    checked(frame, numbers=[ZERO])
+    columns, rows = scored(frame).assign(name=frame.task), {}
+    for _, of_task in columns.groupby("task"):
+        runs = {
+            method: cell.reward.to_numpy(np.float64)
+            for method, cell in of_task.groupby("method", sort=False)
+            if cell.reward.notna().all()
+        }
+        share = of_task[of_task.method.isin(runs)].groupby("method").share.mean()
+        pairs = [*itertools.combinations(runs.values(), 2)]
+        gain = bool(share.notna().any())
+        rows[of_task["name"].iloc[0]] = {
+            "methods": len(runs),
+            "pairs": len(pairs),
+            "separated": sum(are_separated(*pair, 0.05 / len(pairs)) for pair in pairs),
+            "at_ceiling": int((share > CEILING).sum()) if gain else -1,
+            "at_floor": int((share < FLOOR).sum()) if gain else -1,
+        }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("task")
+
+
+def are_separated(first: Array, second: Array, level: float) -> bool:
+    """Return whether rewards of two methods differ, ``(n,)`` and ``(m,)``; see
+    :func:`separation`."""
+    few, many = sorted((first, second), key=len)
+    if len(few) > 1:
+        return bool(mannwhitneyu(few, many, alternative="two-sided").pvalue < level)
+    most = 0.025 * len(many)
+    return bool(min((many >= few[0]).sum(), (many <= few[0]).sum()) <= most)
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:

@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from coartic import Task
+from coartic import NotApplicableError, Task, hand_sequences
 from coartic.analysis.methods import SEARCHES
 from coartic.analysis.solutions import initial_solution
+from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
@@ -98,6 +99,20 @@ def initial_reward(task: Task) -> float:
     """Return the reward of the initial solution of a task; NaN without an initial solution."""
     solution = initial_solution(task)
     return math.nan if solution is None else float(-solution.ticks)
+
+
+def corrective_best(task: Task) -> float:
+    """Return the reward of the corrective process alone with its best hands.
+
+    With the task's initial hands where there are over 4,096 hand sequences; NaN where it completes
+    the task with none.
+    """
+    try:
+        sequences = hand_sequences(task)
+    except NotApplicableError:
+        return initial_reward(task)
+    rewards = [trial.reward for _, trial in ranked_sequences(task, sequences)]
+    return float(max((each for each in rewards if each is not None), default=math.nan))
 
 
 def from_runs(runs: pd.DataFrame) -> KnownOptimum:

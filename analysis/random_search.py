@@ -42,8 +42,10 @@ def random_search_on(study: Study, task: str, trials: float = 0) -> list[str]:
         for label in labels
         if (task, label) in study.cells and len(study.cells[task, label].good)
     }
-    enough = [each for each in made.values() if each >= trials]
-    return [label for label in made if made[label] == min(enough)] if enough and trials else [*made]
+    if not trials:
+        return [*made]
+    fewest = min((each for each in made.values() if each >= trials), default=None)
+    return [label for label in made if made[label] == fewest]
 
 
 def trials_of(study: Study, task: str, label: str) -> float:

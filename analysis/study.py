@@ -19,7 +19,13 @@ import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.method_frame import methods_of
-from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
+from coartic.analysis.optima import (
+    BestKnown,
+    best_known,
+    corrective_best,
+    gap_share,
+    restrictions,
+)
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
@@ -167,6 +173,7 @@ def tidy(
             "family": tasks[name].family,
             "split": tasks[name].split,
             "goals": len(tasks[name].goals),
+            "arms": len(tasks[name].hands),
         }
         for name, text in zip(runs.task, runs.parameters, strict=True)
     ]
@@ -174,6 +181,7 @@ def tidy(
     runs = runs.join(more[[name for name in more if name not in runs]])
     as_it_is = restrictions(runs).base == BASE  # other runs solve another task
     runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
+    runs["corrective_best"] = runs.task.map({name: corrective_best(tasks[name]) for name in best})
     rewards = runs[["reward", "best_known"]].astype("Float64")
     runs["gap"] = gap_share(*rewards.to_numpy(np.float64, na_value=np.nan).T)
     runs.attrs["units"] = UNITS
@@ -222,8 +230,10 @@ class Study:
     def runs(self) -> pd.DataFrame:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
-        Further columns: ``family``, ``split``, number of ``goals`` and ``best_known`` reward of the
-        task; parameters by name; ``gap``, a share of the best known reward.
+        Further columns: ``family``, ``split``, number of ``goals``, of ``arms`` (1 or 2),
+        ``best_known`` reward of the task and ``corrective_best``, the reward of the corrective
+        process alone with its best hands; parameters by name; ``gap``, a share of the best known
+        reward.
         """
         return tidy(self.stored, self.tasks, self.optima)
 

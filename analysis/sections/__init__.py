@@ -17,6 +17,7 @@ from coartic.analysis.sections import (
     random_tasks,
     ranking,
     rewards,
+    scores,
     settings,
     tasks,
 )
@@ -124,6 +125,32 @@ SECTIONS = (
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
         "against-learner). Empty: the runs are too few, or too alike, to tell.",
+    ),
+    Section(
+        "scores",
+        "Share of the gain",
+        "How much of the possible gain?",
+        table=scores.list_scores,
+        caption="Share of the possible gain, over all tasks, by arms, and after 1000 trials",
+        note="0 % is the corrective process alone with its best hands (with the task's initial "
+        "hands where there are over 4096 hand sequences), 100 % the best known reward. A task on "
+        "which both are equal has no share and is counted. The gap alone weighs tasks by how bad "
+        "the corrective process is on them. Methods that make no trials have their result after "
+        "any number of trials.",
+        single=False,
+        folded=True,
+    ),
+    Section(
+        "separation",
+        "What separates",
+        "Which tasks separate methods?",
+        table=scores.list_separation,
+        caption="Pairs of methods whose rewards differ; methods at the ceiling and at the floor",
+        note="Two-tailed Mann-Whitney tests, corrected for the pairs of a task (Bonferroni); a "
+        "single run is separated where at most 2.5 % of the other method's runs are on its wrong "
+        "side or level with it. Settings and ablations are not among the methods.",
+        single=False,
+        folded=True,
     ),
     Section(
         "settings",

@@ -11,7 +11,6 @@ from coartic.analysis.random_search import (
     selects,
     trials_of,
 )
-from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
