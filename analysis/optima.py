@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from coartic import NotApplicableError, Task, hand_sequences
 from coartic.analysis.methods import SEARCHES
 from coartic.analysis.solutions import initial_solution
-from coartic.motion.initial import ranked_sequences
+from coartic.motion.trial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
@@ -111,8 +111,8 @@ def corrective_best(task: Task) -> float:
         sequences = hand_sequences(task)
     except NotApplicableError:
         return initial_reward(task)
-    rewards = [trial.reward for _, trial in ranked_sequences(task, sequences)]
-    return float(max((each for each in rewards if each is not None), default=math.nan))
+    (_, reward, *_), *_ = ranked_sequences(task, sequences)
+    return math.nan if reward is None else float(reward)
 
 
 def from_runs(runs: pd.DataFrame) -> KnownOptimum:

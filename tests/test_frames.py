@@ -264,3 +264,41 @@ def test_runs_are_tidy(tmp_path):
         coartic.CoarticError, match="unknown signature 'frist'; did you mean 'first'"
     ):
         study.signature("frist")
+
+
+def planted_scores():
+    """Rewards of three methods on three tasks, of which the last leaves nothing to gain."""
+    zero_and_best = {"near": (-320, -300), "far": (-600, -500), "nothing": (-40, -40)}
+    rewards = {
+        "best": {"near": [-300] * 6, "far": [-500] * 6, "nothing": [-40] * 6},
+        "middle": {"near": range(-313, -307), "far": range(-553, -547), "nothing": [-42] * 6},
+        "planner": {"near": [-320], "far": [-630], "nothing": [-40]},
+    }
+    return pd.DataFrame([
+        {"method": method, "task": task, "reward": reward,
+         "corrective_best": zero_and_best[task][0], "best_known": zero_and_best[task][1]}
+        for method, of_tasks in rewards.items() for task, of in of_tasks.items() for reward in of
+    ])  # fmt: skip
+
+
+def test_the_share_of_the_possible_gain_by_hand():
+    ranked = frames.ranking(planted_scores())
+    assert list(ranked.index) == ["best", "middle", "planner"]
+    assert ranked.share.tolist() == pytest.approx([1.0, 0.485, -0.15])  # of two tasks
+    assert ranked.without_gain.tolist() == [1, 1, 1]
+    assert ranked.share_low["middle"] < 0.485 < ranked.share_high["middle"]
+    assert ranked.gap["middle"] == pytest.approx((10.5 / 300 + 50.5 / 500 + 2 / 40) / 3, abs=1e-3)
+    planted = planted_scores()
+    assert frames.shares(planted)[planted.task == "nothing"].isna().all()
+    with pytest.raises(coartic.CoarticError, match="corrective_best has -290.* above best_known"):
+        frames.shares(planted.assign(corrective_best=-290))
+
+
+def test_which_tasks_separate_methods():
+    separated = frames.separation(planted_scores())
+    assert separated.pairs.tolist() == [3, 3, 3]
+    assert separated.separated.to_dict() == {"near": 3, "far": 3, "nothing": 2}
+    assert separated.at_ceiling.to_dict() == {"near": 1, "far": 1, "nothing": -1}
+    assert separated.at_floor.to_dict() == {"near": 1, "far": 1, "nothing": -1}
+    few = planted_scores().groupby(["method", "task"]).head(3)  # no test of 3 + 3 runs is so sure
+    assert frames.separation(few).separated.to_dict() == {"near": 2, "far": 2, "nothing": 1}

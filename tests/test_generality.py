@@ -116,7 +116,13 @@ def with_signatures(study, **values):
     by_cell = made_up_signatures(study, **values)
     signatures = {(name, *cell): of_cell.get(name, np.empty(0))
                   for cell, of_cell in by_cell.items() for name in SIGNATURES}  # fmt: skip
-    return MadeUp(study, **vars(study), signature_of=made(signatures))
+    with_hands = {cell: {"R": values} for cell, values in signatures.items() if len(values)}
+
+    def by_hands(*cell, every=False):
+        return with_hands.get(cell, {})
+
+    parts = {"signature_of": made(signatures), "signature_by_hands": by_hands}
+    return MadeUp(study, **vars(study), **parts)
 
 
 def test_claims_of_generality(monkeypatch):
@@ -157,7 +163,11 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
                 return study.signature_of(name, task, label)
             return np.array([0.4, 0.6]) + (more + 0.01 * int(task[-1])) * (label == EC4)
 
-        seen = MadeUp(study, **vars(study) | {"signature_of": signature_of})
+        def by_hands(*cell, every=False):
+            return {"": values} if len(values := signature_of(*cell)) else {}
+
+        parts = {"signature_of": signature_of, "signature_by_hands": by_hands}
+        seen = MadeUp(study, **vars(study) | parts)
         return judge_claims(seen, [CLAIMS["hand-coarticulation-in-general"]]).verdict.iloc[0]
 
     assert [verdict(more) for more in (0.1, -0.2, -0.02)] == [

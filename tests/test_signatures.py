@@ -10,7 +10,7 @@ from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task
 from coartic.analysis import random_search
-from coartic.analysis.methods import EC1, RANDOM_SEARCH
+from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.signatures import context_tests, measures
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
@@ -23,7 +23,7 @@ from coartic.analysis.signatures.two_contexts import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.robot import HANDS
-from tests.support.made_up import study_of_solutions
+from tests.support.made_up import runs_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
 
 
@@ -47,11 +47,11 @@ def planned(*targets, hands):
     ]
 
 
-def posed(task, method, q, ticks=(0, 0, 0)):
-    """Runs that hit all goals with the right hand in one posture each, ``q`` (runs, dof)."""
+def posed(task, method, q, ticks=(0, 0, 0), hands="RRR"):
+    """Runs that hit all goals in one posture each, ``q`` (runs, dof)."""
     configurations = np.repeat(np.asarray(q)[:, None], len(task.goals), axis=1)
     runs = (
-        SimpleNamespace(configurations=each, hands="RRR", ticks_by_goal=lambda: ticks)
+        SimpleNamespace(configurations=each, hands=hands, ticks_by_goal=lambda: ticks)
         for each in configurations
     )
     return Solutions(task, method, tuple(runs))
@@ -388,36 +388,74 @@ def test_a_method_that_selects_has_to_exceed_random_search(made_up, answer):
         assert math.isnan(random_search.context_beyond_p(study, compared))
 
 
+def shifted(task, label, first, *, others=-20, shift=0.0, hands="RRR"):
+    """Three runs whose first movement takes so many ticks more than the corrective process's."""
+    first = [first] * 3 if np.ndim(first) == 0 else first
+    alone, runs = corrective_trial(task, hands).ticks_by_goal(), []
+    for each, noise in zip(first, (0.0, 0.1, 0.2), strict=True):
+        ticks = np.add(alone, [each, others, *[0] * (len(alone) - 2)])
+        runs += posed(task, label, [posture(shift + noise)], ticks, hands).runs
+    return Solutions(task, label, tuple(runs))
+
+
 def test_the_random_search_that_shows_most_of_a_signature_counts():
     tasks, drawn = [load_task("ascending"), load_task("descending")], "random-search/hands"
-    alone = {task.name: corrective_trial(task, "RRR").ticks_by_goal() for task in tasks}
-    study = study_of_solutions([
-        posed(task, label, [posture(shift * number + noise) for noise in (0.0, 0.1, 0.2)],
-              np.add(alone[task.name], [slower, 0, 0]))
+    cells = [
+        shifted(task, label, slower, shift=shift * number)
         for label, shift, slower in ((EC1, 1.0, 5), (RANDOM_SEARCH, 0.8, 1), (drawn, 0.3, 2))
         for number, task in enumerate(tasks)
-    ])  # fmt: skip
+    ]
+    study = study_of_solutions(cells)
     assert random_search.random_search_on(study, "ascending") == [RANDOM_SEARCH, drawn]
     assert (
         random_search.random_search_for(study, coarticulation.shared_goal(study)).method
         == RANDOM_SEARCH
     )
-    assert list(random_search.most_of_random_search(study, "first", "ascending")) == [2, 2, 2]
+    (beside,) = random_search.beside_random_search(study, "first", "ascending", EC1).items()
+    assert beside[0] == "RRR"
+    assert [values.tolist() for values in beside[1]] == [[5, 5, 5], [2, 2, 2]]
     assert not random_search.selects(study, drawn)
 
 
+def test_random_search_is_compared_at_equal_hands_where_it_improved():
+    """Runs that are no faster than the corrective process alone do not count, nor other hands, nor
+    other numbers of trials."""
+    task = load_task("two-armed-2")
+    learned = [shifted(task, EC4, 5, hands="RRRR"), shifted(task, EC4, 9, hands="RLRR")]
+    cells = [replace(learned[0], runs=learned[0].runs + learned[1].runs)]
+    rows = runs_of(task.name, EC4, [-300] * 6)
+    # The wide box has two runs that improved.
+    for setting, first, trials in (
+        ("", [2, 3, 4], 10), ("half_width=0.5", [7, 8, 50], 10), ("trials=100", [9, 9, 9], 100)
+    ):  # fmt: skip
+        label = f"{RANDOM_SEARCH} {setting}".strip()
+        cells.append(shifted(task, label, first, hands="RRRR"))
+        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 3, setting=setting, trials=trials)
+    study = study_of_solutions(cells, rows)
+    beside = random_search.beside_random_search(study, "first", task.name, EC4)
+    assert {each: [v.tolist() for v in pair] for each, pair in beside.items()} == {
+        "RRRR": [[5, 5, 5], [2, 3, 4]],
+        "RLRR": [[9, 9, 9], []],
+    }
+    every = random_search.most_of_random_search(study, "first", task.name, "RRRR", 10, every=True)
+    assert every.tolist() == [7, 8, 50]
+    more = random_search.most_of_random_search(study, "first", task.name, "RRRR", 100)
+    assert more.tolist() == [9, 9, 9]
+    assert len(random_search.most_of_random_search(study, "first", task.name, "RRRR", 1000)) == 0
+
+
 def test_of_a_family_one_width_counts():
-    """That of the highest mean: 3 ticks and 3 against 9 and -7, though 9 is the most of one."""
+    """The width with the highest mean: 3 ticks and 3 against 9 and -7, though 9 is the most of
+    one."""
     drawn = "random-search/hands"
     cells = [
-        posed(task, label, [posture()], np.add(corrective_trial(task, "RRR").ticks_by_goal(), more))
+        shifted(task, label, slower[number])
         for number, task in enumerate(map(load_task, ("one-armed/v1/i001", "one-armed/v1/i002")))
-        for label, slower in ((RANDOM_SEARCH, (9, -7)), (drawn, (3, 3)))
-        for more in [[slower[number]] + [0] * (len(task.goals) - 1)]
+        for label, slower in ((RANDOM_SEARCH, (9, -7)), (drawn, (3, 3)), (EC1, (5, 4)))
     ]
     study = study_of_solutions(cells)
-    for name in study.tasks:
-        assert random_search.most_of_random_search(study, "first", name).tolist() == [3]
+    excess = [random_search.excess_on_instance(study, "first", name, EC1) for name in study.tasks]
+    assert excess == [2, 1]
 
 
 def test_p_of_shared_goals_is_corrected_by_method():
