@@ -21,7 +21,7 @@ from threading import RLock
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
@@ -30,8 +30,6 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import Correction, correct
 from coartic.motion.solution import Execution, Movement, check_targets, execute_many
 from coartic.motion.trial import (
-    COUNTED,
-    ITERATIONS,
     NO_REWARD,
     Accounts,
     CompiledTask,
@@ -402,9 +400,14 @@ class Session:
                 (execution,) = execute_many(self._compiled, [solution])
             if isinstance(execution, Exception):
                 raise execution
-            spent = execution.ticks, execution.evaluations, execution.iterations
-            failed = not execution.completed
-            self._count(pack_rewards([execution.reward]), *spent, execution.corrections, failed)
+            self._count(
+                pack_rewards([execution.reward]).tobytes(),
+                execution.ticks,
+                execution.evaluations,
+                execution.iterations,
+                execution.corrections,
+                not execution.completed,
+            )
         if Information.CORRECTIVE_PROCESS in self._information:
             return execution
         return replace(
@@ -479,7 +482,7 @@ class Session:
             if better.any():
                 made = int(better.argmax()) + 1
                 accounts = Accounts._make(each[:made] for each in accounts)
-        self._count(accounts.rewards, *np.add.reduce(accounts.counts).tolist())
+        self._count(accounts.rewards.tobytes(), *np.add.reduce(accounts.counts).tolist())
         return accounts
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
@@ -495,13 +498,25 @@ class Session:
         self._meter.add(**spent)
         return chosen
 
-    def _count(self, rewards: NDArray[np.int64] | array[int], *counts: int) -> None:
-        """Count trials by their rewards, and what they took in all, by ``COUNTED``."""
+    def _count(
+        self,
+        rewards: bytes,
+        ticks: int,
+        evaluations: int,
+        iterations: int,
+        corrections: int,
+        failed: int,
+    ) -> None:
+        """Count trials by their rewards, 8 bytes each, and what they took in all."""
         before, meter = len(self._rewards), self._meter
-        self._rewards.frombytes(bytes(rewards))
+        self._rewards.frombytes(rewards)
         meter.trials += len(self._rewards) - before
-        meter.add(**dict(zip(COUNTED, counts, strict=True)))
-        meter.jacobians += counts[ITERATIONS]
+        meter.movement_ticks += ticks
+        meter.forward_kinematics += evaluations
+        meter.corrective_iterations += iterations
+        meter.jacobians += iterations
+        meter.corrections += corrections
+        meter.failed_trials += failed
 
     @property
     def trials_left(self) -> int | None:

@@ -124,12 +124,12 @@ class Robot:
         }
         return short_repr(self, left_links=self.left_links, right_links=self.right_links, **others)
 
-    @property
+    @cached_property
     def dof(self) -> int:
         """Number of degrees of freedom, the length of ``q``."""
         return BASE_DOF + len(self.left_links) + len(self.right_links)
 
-    @property
+    @cached_property
     def most_links(self) -> int:
         """Number of links of the longer arm."""
         return max(len(self.left_links), len(self.right_links))

@@ -255,7 +255,7 @@ def make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Outcome
     if not plans:
         return []
     given = [[with_targets(movements) for movements in plan] for plan in plans]
-    most = max(len(each) for of_plan in given for each in of_plan)
+    most = max([len(of_goal) for of_plan in given for of_goal in of_plan])
     hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
     targets = np.empty((*hands.shape, most, compiled.starts.shape[1]))
     stops = np.empty(targets.shape[:3], dtype=np.bool_)
@@ -281,8 +281,7 @@ def movements_in(
     """
     names = ("hand", "hit", "ticks", "corrections", "moved")
     columns = [accounts[name].tolist() for name in names]
-    q, targets, corrected = (accounts[name][..., :dof] for name in ("q", "target", "corrected"))
-    trials = []
+    targets, trials = accounts["target"][..., :dof], []
     for n, of_trial in enumerate(kinds):
         movements: list[Movement] = []
         of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
@@ -293,11 +292,12 @@ def movements_in(
                     movements.append(Movement(goal, hand, kind, targets[n, g, m], moved[m]))
             if corrections:
                 ticks = total - sum(moved)
-                movements.append(Movement(goal, hand, "corrective", corrected[n, g], ticks))
+                corrected = accounts["corrected"][n, g, :dof]
+                movements.append(Movement(goal, hand, "corrective", corrected, ticks))
             if not hit:
                 break
             if len(movements) == before:  # hit on the way: show the hand
-                movements.append(Movement(goal, hand, "corrective", q[n, g], 0))
+                movements.append(Movement(goal, hand, "corrective", accounts["q"][n, g, :dof], 0))
         trials.append(movements)
     return trials
 
