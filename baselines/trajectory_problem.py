@@ -31,9 +31,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from threading import RLock
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import casadi
 import numpy as np
@@ -145,6 +145,26 @@ class PathPlan:
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
 
+class Layout(NamedTuple):
+    """Places of the variables of a programme in the vector of all of them."""
+
+    steps: slice
+    """Configuration changes, goal by goal."""
+    lengths: slice
+    """Bounds on the path lengths of the segments."""
+    durations: slice
+    depth: slice
+    """Depth inside the rim, for the goals that are deep."""
+    rates: slice
+    """Time derivatives of the configuration at start and goals."""
+
+    @classmethod
+    def of(cls, goals: int, dof: int, order: int) -> Layout:
+        """Lay out a programme of so many goals and derivatives."""
+        sizes = (goals * dof, goals, goals, 1, order * (goals + 1) * dof)
+        return cls(*map(slice, accumulate((0, *sizes[:-1])), accumulate(sizes)))
+
+
 class TrajectoryProblem:
     """The compiled programme of one cost, for every task of a robot with so many goals."""
 
@@ -152,6 +172,7 @@ class TrajectoryProblem:
         self.robot, self.goals, self.cost = robot, goals, cost
         self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
+        self._layout = Layout.of(goals, dof, order)
         steps = casadi.SX.sym("steps", dof, goals)  # configuration changes, goal by goal
         lengths = casadi.SX.sym("lengths", goals)
         rates = [casadi.SX.sym(f"rates{d}", dof, goals + 1) for d in range(order)]
@@ -194,11 +215,13 @@ class TrajectoryProblem:
             upper.append(0.0)
         self._lower, self._upper = np.array(lower), np.array(upper)
         self._evaluations = goals * len(hands)  # forward kinematics in one evaluation of the limits
+        variables = {"steps": steps, "lengths": lengths, "durations": durations, "depth": depth,
+                     "rates": casadi.veccat(*rates)}  # fmt: skip
         self._solver = casadi.nlpsol(
             "trajectory",
             "ipopt",
             {
-                "x": casadi.veccat(steps, lengths, durations, depth, *rates),
+                "x": casadi.veccat(*(variables[name] for name in Layout._fields)),
                 "p": casadi.veccat(q0, centres, right, rim, deep, weights),
                 "f": objective,
                 "g": casadi.vertcat(*limits),
@@ -222,23 +245,25 @@ class TrajectoryProblem:
         (0-based) as those lengths allow, instead of short paths. ``stops`` holds all rates at the
         goals at 0 (smoothness costs only). A solve that fails is a plan that has not converged.
         """
-        goals = self.goals
+        goals, at = self.goals, self._layout
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
         distances = np.sqrt((steps**2).sum(axis=1))
-        at, shortest, longest = np.zeros((3, goals))
+        # A start, a least and a most value of each variable.
+        first, least, most = bounds = np.zeros((3, at.rates.stop))
+        first[at.steps], least[at.steps], most[at.steps] = steps.ravel(), -free, free
         if self.cost == "path-length":
-            at, longest = distances.copy(), np.full(goals, np.inf)
+            first[at.lengths], most[at.lengths] = distances, np.inf
             if lengths is not None:
                 given = ~np.isnan(lengths)
-                at[given] = shortest[given] = longest[given] = lengths[given]
-        times, soonest, latest = np.ones((3, goals))
+                bounds[:, at.lengths][:, given] = lengths[given]
+        bounds[:, at.durations] = 1.0
         if self._order:  # durations vary at a constant total
             times = np.maximum(distances, 1e-3)
             times = np.maximum(times * (goals / times.sum()), 0.1)
-            times *= goals / times.sum()
-            soonest, latest = np.full(goals, _SHORTEST[self.cost]), np.full(goals, float(goals))
+            first[at.durations] = times * (goals / times.sum())
+            least[at.durations], most[at.durations] = _SHORTEST[self.cost], goals
         # Rates are 0 at rest (start and end, with stops each goal) and for joints held on either
         # side.
         still = np.vstack([instance.held[:1] | True, instance.held])
@@ -246,16 +271,8 @@ class TrajectoryProblem:
         still[-1] = True
         rates = np.tile(np.where(still | stops, 0.0, np.inf).ravel(), self._order)
         rim = instance.radius - _RIM
-        deepest = 0.0 if deep is None else rim
-        # A start, a least and a most value of each variable, in the order of the programme's.
-        blocks = [
-            (steps.ravel(), -free, free),
-            (at, shortest, longest),
-            (times, soonest, latest),
-            (np.zeros(1), np.zeros(1), np.full(1, deepest)),
-            (np.zeros(rates.size), -rates, rates),
-        ]
-        first, least, most = (np.concatenate(column) for column in zip(*blocks, strict=True))
+        least[at.rates], most[at.rates] = -rates, rates
+        most[at.depth] = 0.0 if deep is None else rim
         chosen = np.zeros(goals)
         chosen[[] if deep is None else list(deep)] = 1.0
         right = [float(hand == "right") for hand in instance.hands]
@@ -275,23 +292,20 @@ class TrajectoryProblem:
 
     def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
         """The plan of a solution; it has converged only if every constraint holds as well."""
-        goals, dof = self.goals, self.robot.dof
+        goals, dof, at = self.goals, self.robot.dof, self._layout
         x = np.asarray(solution["x"]).ravel()
         limits = np.asarray(solution["g"]).ravel()
         statistics = self._solver.stats()
-        end = goals * dof
         violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
         return PathPlan(
             instance=instance,
             converged=statistics["return_status"] in _SOLVED
             and bool(np.isfinite(x).all() and violation < 1e-8),
             reason=statistics["return_status"],
-            configurations=instance.q0 + np.cumsum(x[:end].reshape(goals, dof), axis=0),
+            configurations=instance.q0 + np.cumsum(x[at.steps].reshape(goals, dof), axis=0),
             cost=float(solution["f"]),
-            durations=x[end + goals : end + 2 * goals],
-            rates=x[end + 2 * goals + 1 :][: self._order * (goals + 1) * dof].reshape(
-                self._order, goals + 1, dof
-            ),
+            durations=x[at.durations],
+            rates=x[at.rates].reshape(self._order, goals + 1, dof),
             spent={
                 "forward_kinematics": self._evaluations * statistics.get("n_call_nlp_g", 0),
                 "jacobians": self._evaluations * statistics.get("n_call_nlp_jac_g", 0),

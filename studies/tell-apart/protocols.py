@@ -29,7 +29,7 @@ from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.posture_based import TwoGoals
 from coartic.baselines.posture_qp import CurrentGoal, GoalsAhead
 from coartic.baselines.receding_horizon import RecedingHorizon
-from coartic.method import Information, Session
+from coartic.method import Information, Session, run_method
 
 HERE = Path(__file__).parent
 PEOPLE = 3
@@ -91,8 +91,8 @@ def look(task, movements):
 
 def plan(task, method, seed=0, **parameters):
     """Return the solution of a planner or controller of the package."""
-    session = Session(task, seed, method.information, trusted=True)
-    return look(task, method(method.Parameters(**parameters)).solve(session).solution)
+    result, _ = run_method(method(method.Parameters(**parameters)), task, seed)
+    return look(task, result.solution)
 
 
 def learned(task, seed, start):
