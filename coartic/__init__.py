@@ -96,7 +96,7 @@ _HOMES = {
     "trajectories": ("Trajectory", "trajectory"),
 }
 HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
-"""Where each name of the API is."""
+"""Module of each name of the API."""
 
 
 def __getattr__(name: str) -> Any:

@@ -37,7 +37,8 @@ SEED = 0
 FEWEST = 3
 """Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
 FEWER_RESAMPLES = 1_999
-"""For intervals of which each resample takes long: of many values, and over instances."""
+"""Number of resamples for intervals of many values and over instances, of which each resample takes
+long."""
 LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""
@@ -93,7 +94,8 @@ def slices(count: int, most: int) -> Iterator[slice]:
 
 
 def varies(values: Array) -> Array:
-    """Whether values differ along the first axis by more than rounding (:data:`NEGLIGIBLE`)."""
+    """Return whether values differ along the first axis by more than rounding
+    (:data:`NEGLIGIBLE`)."""
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 

@@ -57,7 +57,7 @@ class Recorded:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How it was made: a task, its name or its path, as plain data."""
+        """Specification of the environment: a task, its name or its path, as plain data."""
         return self._spec
 
     @spec.setter
@@ -66,7 +66,8 @@ class Recorded:
 
 
 def plain_options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of an environment as plain data, of which the same environment can be made."""
+    """Return options of an environment as plain data, from which the same environment can be
+    made."""
     plain = dict(options)
     if isinstance(task := plain.get("task"), Task | Path):
         plain["task"] = str(task) if isinstance(task, Path) else task.model_dump(mode="json")
@@ -88,7 +89,7 @@ class Scope(NamedTuple):
     locked: tuple[str, ...]
     """Base coordinates that no robot can move."""
     differs: bool
-    """Whether the robots differ in links."""
+    """True if the robots differ in links."""
 
 
 def scope_of(
@@ -110,7 +111,7 @@ def scope_of(
 
 
 class TaskVectorEnv(Recorded, VectorEnv):
-    """N robots side by side, which takes a fraction of the time of N :class:`TaskEnv`.
+    """Let N robots act side by side, in a fraction of the time of N :class:`TaskEnv`.
 
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
     process fails, which costs ``coartic.optimisers.FAILED``. A trial that has ended begins anew in
@@ -232,7 +233,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         return task
 
     def places_of(self, robot: Robot) -> NDArray[np.int64]:
-        """Where the entries of a robot's configurations are among those of the widest one."""
+        """Return the indices of a robot's entries among the entries of the widest robot's
+        configurations."""
         left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
         return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self.widest.most_links + right])
 
@@ -316,8 +318,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
 
 class TaskEnv(Recorded, gymnasium.Env):
-    """One robot. Options, observations, actions and rewards are those of :class:`TaskVectorEnv`,
-    without new beginnings; ``render_mode`` may be ``"rgb_array"``."""
+    """Environment of one robot: options, observations, actions and rewards of
+    :class:`TaskVectorEnv`, whose trials begin with a reset only; ``render_mode`` may be
+    ``"rgb_array"``."""
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
 
@@ -380,7 +383,7 @@ class TaskEnv(Recorded, gymnasium.Env):
 
 
 def check_no_options(options: Mapping[str, Any] | None) -> None:
-    """Raises ValueError for options of a reset: there are none."""
+    """Refuse options of a reset, which has none. Raises ValueError for any."""
     if options:
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 
@@ -394,7 +397,7 @@ def whole_seed(seed: Any) -> int | None:
 
 
 def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
-    """Robots side by side as environments of Stable-Baselines3.
+    """Return robots side by side as environments of Stable-Baselines3.
 
     Parameters
     ----------
@@ -439,7 +442,7 @@ def score(
     seed: int = 0,
     **options: Any,
 ) -> pd.DataFrame:
-    """How good policies and planners are, beside random actions and the best known solutions.
+    """Compare policies and planners with random actions and the best known solutions.
 
     Parameters
     ----------
@@ -502,7 +505,8 @@ def column(rewards: Iterable[float | None]) -> Array:
 
 
 def acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """The function of observations that a policy is. Raises TypeError where it is none."""
+    """Return a policy as a function of observations. Raises TypeError for anything that is no
+    policy."""
     if hasattr(policy, "predict"):
         return lambda seen: policy.predict(seen, deterministic=True)[0]
     if callable(policy):
@@ -519,7 +523,7 @@ def rollout(
     tasks: int,
     trials: int = 1,
 ) -> Array:
-    """Let a policy make trials on each of so many tasks of an environment with these options.
+    """Let a policy make trials on each task of an environment with these options.
 
     Returns rewards, shape ``(tasks, trials)``; NaN where a trial failed.
     """
@@ -534,8 +538,8 @@ def rollout(
 
 
 def gaps(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
-    """Rewards of policies, shapes ``(K, trials)``, beside the best known ones, ``(K, 1)``, as
-    :func:`score` returns them."""
+    """Compare rewards of policies, shapes ``(K, trials)``, with the best known rewards, shape
+    ``(K, 1)``, as :func:`score` returns them."""
     rows = {}
     for name, earned in {**rewards, "best known": best}.items():
         gap = pd.DataFrame(100.0 * (best - earned) / np.abs(best))

@@ -37,23 +37,24 @@ class VectorState(NamedTuple):
     q: Configs
     """Configurations, shape ``(N, dof)``."""
     going: Flags
-    """Whether the trial goes on, shape ``(N,)``."""
+    """True where the trial goes on, shape ``(N,)``."""
     actions: Array
     """Shape ``(N, A)``: an entry for the hand, if there are two, and one for each joint."""
     rewards: Array
-    """Of the step, ticks, shape ``(N,)``."""
+    """Rewards of the step, ticks, shape ``(N,)``."""
     seen: NDArray[np.float32]
     """Observations, shape ``(N, O)`` (:func:`observe`)."""
     parameters: NDArray[np.void]
     """Robot parameters of each kind of robot, locks and radius."""
     kinds: Numbers
-    """Which of them a task has, shape ``(T,)``; -1 for a task that is not loaded."""
+    """Index in ``parameters`` of each task's robot, shape ``(T,)``; -1 for a task that is not
+    loaded."""
     goals: Points
-    """Centres of goals, shape ``(T, G, 2)``, of which a task has as many as ``counts`` says."""
+    """Centres of goals, shape ``(T, G, 2)``, of which a task has ``counts``."""
     counts: Numbers
     """Goals of each task, shape ``(T,)``."""
     movable: Flags
-    """Whether the robot of a task can move a joint, shape ``(T, E)``."""
+    """True where the robot of a task can move a joint, shape ``(T, E)``."""
     joints: Numbers
     """Indices in a configuration of the joints that are seen and moved, shape ``(E,)``."""
     sides: Hands
@@ -65,10 +66,10 @@ class VectorState(NamedTuple):
     failed: float
     """Reward of a step in which the corrective process fails."""
     runs: NDArray[np.void]
-    """Of some robots with each hand, shape ``(H, SLOTS)``."""
+    """Runs of a lot of robots with each hand, shape ``(H, SLOTS)``."""
     slots: Slots
     accounts: NDArray[np.void]
-    """Of the goals of these robots, shape ``(SLOTS,)``."""
+    """Accounts of these robots' goals, shape ``(SLOTS,)``."""
     indices: Numbers
     """Numbers of these robots, shape ``(SLOTS,)``."""
 
@@ -120,8 +121,8 @@ def squared_distance(run: Any) -> float:
 
 @inlined
 def aim(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
-    """Phase 2, *aim*: the hand that the corrective process brings to the goal by the shorter path,
-    or, if the action says so, the other one, and the solution of the process, or the present
+    """Phase 2, *aim*: choose the hand that the corrective process brings to the goal by the shorter
+    path, or, if the action says so, the other one, and the solution of the process, or the present
     posture where there is none, plus the action."""
     if len(state.sides) > 1:
         is_nearer = squared_distance(other) < squared_distance(run)

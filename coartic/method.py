@@ -53,21 +53,21 @@ class Information(StrEnum):
     """Information that a method can use, beyond the start, the hands and the number of goals."""
 
     GOALS = "goals"
-    """Where the goals are, and their radius."""
+    """Centres of the goals, and their radius."""
     FORWARD_KINEMATICS = "forward kinematics"
-    """Where a hand is in a configuration."""
+    """Place of a hand in a configuration."""
     JACOBIAN = "Jacobian"
-    """How a hand moves with the joints, in a configuration."""
+    """Derivative of a hand's place by the joints, in a configuration."""
     CORRECTIVE_PROCESS = "corrective process"
     """A configuration that hits a goal, found by **A**; **A** uses goal and Jacobian."""
     REWARD_BY_TRIAL = "reward by trial"
     """The total reward of a trial, after making it."""
     REWARD_BY_SUBTASK = "reward by subtask"
-    """What each goal of a trial added to its total reward, after making it."""
+    """Reward of each goal of a trial, after the trial is made."""
     KINEMATIC_MODEL = "kinematic model"
     """The kinematics as formulas, with all derivatives."""
     REWARD_FORMULA = "reward as a formula"
-    """That reward is lost in proportion to the joint-space path."""
+    """Fact that reward is lost in proportion to the joint-space path."""
     SECONDARY_OBJECTIVES = "secondary objectives"
     """Objectives beyond hitting the goals, such as smoothness."""
 
@@ -181,7 +181,7 @@ class Result:
 
     solution: tuple[Movement, ...]
     details: dict[str, Any] = field(default_factory=dict)
-    """Plain data to be kept beside the solution. Never its score."""
+    """Plain data to be stored with the solution. Never its score."""
     initial: tuple[Movement, ...] = ()
     """Movements of a learner's first trial, if it hit every goal. None follows a path."""
     replay: tuple[Movement, ...] = ()
@@ -204,7 +204,7 @@ class Outline(NamedTuple):
 
     @property
     def initial_is_policy(self) -> bool:
-        """Whether it is a policy."""
+        """Return whether the initial hands are a policy."""
         return self.initial_hands in INITIAL_POLICIES
 
     @property
@@ -415,7 +415,7 @@ class Session:
         )
 
     def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
-        """Make N physical trials at once, which takes a fraction of the time of N :meth:`trial`.
+        """Make N physical trials at once, in a fraction of the time of N calls of :meth:`trial`.
 
         ``hands`` is one hand sequence for all (``"RRLR"``), or one each. ``targets`` has shape
         ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
@@ -451,7 +451,8 @@ class Session:
         )
 
     def _affordable(self, count: int) -> int:
-        """How many of so many trials the budget has. Raises BudgetError where it has none."""
+        """Return how many of ``count`` trials the budget allows. Raises BudgetError if none is
+        left."""
         left = self.trials_left
         if left is None:
             return count
@@ -520,7 +521,7 @@ class Session:
 
     @property
     def trials_left(self) -> int | None:
-        """Trials left in the budget; None where there is none."""
+        """Number of trials left in the budget; None without a budget."""
         return None if self._trial_budget is None else self._trial_budget - self._meter.trials
 
     # Copies of the counts so far.
@@ -608,10 +609,10 @@ class Method(ABC):
     secondary: ClassVar[tuple[str, ...]] = ()
     """Its secondary objectives, in words."""
     stochastic: ClassVar[bool] = True
-    """Whether the seed matters; the others are run once."""
+    """True if the seed matters; other methods are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
     files: ClassVar[tuple[str, ...]] = ()
-    """Data files beside the method's file. They count as its code."""
+    """Data files in the folder of the method's file. They count as its code."""
     quick: ClassVar[Mapping[str, Any]] = {}
     """Parameters for a check in seconds, where the defaults take longer than that."""
 
@@ -624,7 +625,7 @@ class Method(ABC):
 
     @abstractmethod
     def solve(self, session: Session) -> Result:
-        """Find a solution. Raises MethodError where there is none to be found."""
+        """Find a solution. Raises MethodError if no solution is found."""
 
     def most_together(self) -> int:
         """Number of runs in a batch, at most, for :meth:`solve_together`.

@@ -92,7 +92,7 @@ def sequences_of(session: Session) -> list[str]:
 
 
 class Objective:
-    """The cost of a trial, its ticks, a function of its target configurations.
+    """Cost of a trial, its ticks, as a function of its target configurations.
 
     A point holds the targets of all joints that the learner explores (:func:`explored_joints`),
     goal by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
@@ -210,7 +210,7 @@ class Objective:
 
     @property
     def proven(self) -> bool:
-        """Whether it is proven that no solution costs less than ``best_known``."""
+        """True if it is proven that no solution costs less than ``best_known``."""
         self.task  # noqa: B018 (refused in a method)
         return self._known is not None and self._known.proven
 
@@ -432,7 +432,7 @@ class Objective:
             raise ValueError("points have infinite entries; needed are finite ones")
 
     def _trials_left(self, wanted: int) -> int:
-        """How many of so many trials are left."""
+        """Return how many of ``count`` trials are left."""
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
         left = self._session.trials_left
@@ -454,7 +454,7 @@ def objective(
     model: MotionModel = PAPER,
     budget: int | None = None,
 ) -> Objective:
-    """The cost of a trial of a task, as a function that scipy and others can minimise.
+    """Return the cost of a task's trial as a function that scipy and others can minimise.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ from coartic.internal.text import short_repr
 from coartic.internal.validation import in_sentences
 
 Hand = Literal["left", "right"]
-"""Which hand: ``"left"`` or ``"right"``."""
+"""Name of a hand: ``"left"`` or ``"right"``."""
 Array = NDArray[np.float64]
 Configs = NDArray[np.float64]
 """Configurations, shape ``(..., dof)``: base x and y (length unit), then joint angles (rad)."""
@@ -47,16 +47,16 @@ BASE_DOF = 2
 
 
 class Arm(NamedTuple):
-    """One arm of a robot, as the formulas and the compiled kernels read it."""
+    """Arm of a robot, as the formulas and the compiled kernels read it."""
 
     first: int
     """Index in ``q`` of the angle of its first joint."""
     links: Any
     """Lengths of its links from shoulder to hand, shape ``(n,)``, length unit."""
     shoulder_x: float
-    """Where its shoulder is in x from the centre of the base, length unit."""
+    """Place of the shoulder in x from the centre of the base, length unit."""
     shoulder_y: float
-    """Where its shoulder is in y, length unit."""
+    """Place of the shoulder in y from the centre of the base, length unit."""
 
     def __repr__(self) -> str:
         return short_repr(self, **self._asdict())
@@ -168,7 +168,7 @@ class Robot:
             raise ValueError(f"unknown hand {hand!r}: a hand is 'left' or 'right'") from None
 
     def joints(self, hand: Hand) -> slice:
-        """Where the joint angles of one arm are in a configuration, without the base.
+        """Return the part of a configuration that has the joint angles of one arm.
 
         Returns
         -------
@@ -184,7 +184,7 @@ class Robot:
         return slice(arm.first, arm.first + len(arm.links))
 
     def reach(self, hand: Hand) -> tuple[float, float]:
-        """How near to its shoulder a hand can be, and how far from it.
+        """Return the least and the largest distance of a hand from its shoulder.
 
         Returns
         -------
@@ -201,7 +201,7 @@ class Robot:
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 
     def forward_kinematics(self, q: ArrayLike, hand: Hand) -> Array:
-        """Where a hand is: the forward kinematics F_a(q).
+        """Compute the position of a hand: the forward kinematics F_a(q).
 
         Parameters
         ----------
@@ -228,7 +228,7 @@ class Robot:
         return self._hand(*self._numpy_chain(array, hand), array)
 
     def joint_positions(self, q: ArrayLike, hand: Hand) -> Array:
-        """Where the shoulder, the joints and the hand of an arm are.
+        """Compute the positions of shoulder, joints and hand of an arm.
 
         Parameters
         ----------

@@ -77,7 +77,7 @@ class RobotEnvs(VecEnv):
         raise NotImplementedError("the environments have no methods of their own")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Whether each is wrapped: none is."""
+        """Return False for each environment: none is wrapped."""
         return [False] * self.num_envs
 
     def _cost(self, number: int) -> float:

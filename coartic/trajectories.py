@@ -33,7 +33,7 @@ class Trajectory:
     task: Task
     """The task."""
     execution: Execution
-    """What :func:`coartic.execute` says of the solution."""
+    """Execution of the solution (:func:`coartic.execute`)."""
     configurations: Array
     """Configurations passed, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row
     each control tick, the first one the start. A movement of k steps gives k + 1 rows, the last

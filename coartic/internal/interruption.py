@@ -1,4 +1,4 @@
-"""How a command ends that is interrupted: with one sentence, and exit code 130 or 143.
+"""End an interrupted command with one sentence, and exit code 130 or 143.
 
 Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, so that each ``with`` ends workers and removes
 temporary folders. Runs that are stored stay stored.
@@ -40,7 +40,7 @@ def catch_signals() -> None:
 
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """What is said where the block is interrupted; the sentence is made when that happens."""
+    """Print a sentence if the block is interrupted; the sentence is made when that happens."""
     try:
         yield
     except KeyboardInterrupt:

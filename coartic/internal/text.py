@@ -37,7 +37,7 @@ def error_line(error: BaseException) -> str:
 
 
 def one_line(text: str) -> str:
-    """Text as one printable line, whole; one that is so already stays as it is.
+    """Return text as one printable line; a printable line stays as it is.
 
     Lines are joined by `` | ``; what else does not print (control characters, escape sequences,
     marks that turn the direction of writing) is shown as its escape, such as ``\\x1b``.
@@ -49,7 +49,7 @@ def one_line(text: str) -> str:
 
 
 def prints(c: str) -> bool:
-    """Whether a character prints."""
+    """Return whether a character prints."""
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
@@ -121,4 +121,4 @@ def refuse_unprintable(text: str) -> str:
 printable = AfterValidator(refuse_unprintable)
 """Refuses what is not one line of printable text."""
 Line = Annotated[str, Field(max_length=LONGEST_LINE), printable]
-"""One line of printable text, such as a title or a citation."""
+"""Line of printable text, such as a title or a citation."""

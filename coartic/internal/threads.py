@@ -1,4 +1,4 @@
-"""How many threads or processes there are, and what all worker processes have in common."""
+"""Numbers of threads and processes, and the set-up that all worker processes share."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ ONE_THREAD = dict.fromkeys(
 
 
 def threads_for(jobs: int) -> int:
-    """Number of threads or processes; ``jobs`` is -1 for one a core.
+    """Return the number of threads or processes; ``jobs`` is -1 for one a core.
 
-    Raises ValueError for 0, which is none, and for what is no number of them.
+    Raises ValueError for any other number below 1.
     """
     if jobs != -1 or isinstance(jobs, float):
         check_limits("jobs", jobs, 1, MOST_JOBS)

@@ -55,12 +55,12 @@ def in_sentences(kind: type[T]) -> type[T]:
 
 @in_sentences
 class FileData(BaseModel):
-    """What a file states: it cannot be changed, and every key is known."""
+    """Content of a file, which cannot be changed and has known keys only."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     def __repr__(self) -> str:
-        """What it states beyond the defaults, in a few lines."""
+        """Return the values that differ from the defaults, in a few lines."""
         stated = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
@@ -73,9 +73,9 @@ class FileData(BaseModel):
 
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
-    """One line for each problem of a file, the first :data:`_SHOWN` of them.
+    """Return a line for each problem of a file, for the first :data:`_SHOWN` problems.
 
-    ``keys`` are the keys that it may have, wherever they belong.
+    ``keys`` are the keys that the file may have, wherever they belong.
     """
     sentences, more = explain_first(error, list(keys))
     lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
@@ -104,7 +104,8 @@ def error_saying(text: str) -> PydanticCustomError:
 
 
 def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
-    """One sentence for a thing that is wrong; ``keys`` is what an unknown key may have meant."""
+    """Return one sentence about a problem; ``keys`` are the keys that an unknown key may have
+    meant."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and keys:

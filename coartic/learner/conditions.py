@@ -39,7 +39,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 @in_sentences
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ExplorationCondition:
-    """What the learner explores. Source: paper, section *Experiments*.
+    """Exploration of the learner. Source: paper, section *Experiments*.
 
     ``CONDITIONS`` has the paper's four, ``ABLATIONS`` what takes something away;
     ``dataclasses.replace`` makes others of them. Raises ValueError for what cannot be.
@@ -50,23 +50,23 @@ class ExplorationCondition:
     hands: Annotated[tuple[Hand, ...], Field(min_length=1)]
     """Hands that the learner uses."""
     modify_chosen: bool
-    """Whether noise moves the targets of the base and of the arm that is to hit (AModChosen)."""
+    """True if noise moves the targets of the base and of the arm that is to hit (AModChosen)."""
     modify_other: bool
-    """Whether noise moves the targets of the other arm (AModOther)."""
+    """True if noise moves the targets of the other arm (AModOther)."""
     hand_exploration: Literal["none", "closest", "random"]
-    """How the hand for a goal is explored: not at all (``"none"``), by taking the one that is
-    closest to the goal (``"closest"``), or at random (``"random"``, DASel)."""
+    """Exploration of the hand for a goal: none (``"none"``), the hand closest to the goal
+    (``"closest"``), or a random hand (``"random"``, DASel)."""
     epsilon: Share = 0.2
     """ε: the probability with which the hand for a goal is explored (published)."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE)] = 0.05
     """Standard deviation of the noise η, length unit (base) and rad (joints) (published)."""
     corrects: bool = True
-    """Whether **A** finishes what a stored target misses. If not, such a trial fails;
+    """True if **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
     learned: Literal["best", "replay"] = "best"
-    """What is learned in the end: the best trial, or the noiseless replay after the last."""
+    """Result of learning: the best trial, or the noiseless replay after the last trial."""
     credit: Literal["overall", "subtask"] = "overall"
-    """What Q(s, a) of a goal stands for: the reward R of the whole trial, or the return of that
+    """Meaning of Q(s, a) of a goal: the reward R of the whole trial, or the return of that
     goal, the reward of its own subtask first."""
     discount: Share = 0.0
     """γ: the return of goal g is Σ γ^|h − g| r_h, with r_h the reward of the movements to goal h. 0

@@ -51,7 +51,7 @@ _RANDOM = 1
 _EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 TENTHS = 10
-"""Equal parts of the trials after trial 0, of which corrections are counted apart."""
+"""Number of equal parts of the trials after trial 0, whose corrections are counted apart."""
 Flags = NDArray[np.bool_]
 
 
@@ -59,7 +59,7 @@ class LearnerParameters(NamedTuple):
     """Learner parameters: a task and an exploration condition, as the kernel reads them."""
 
     start: Configs
-    """Where trials start, shape ``(dof,)``."""
+    """Configuration at the start of a trial, shape ``(dof,)``, length unit and rad."""
     goals: Points
     """Centres of the goals, shape ``(G, 2)``."""
     first_hands: Hands
@@ -69,9 +69,9 @@ class LearnerParameters(NamedTuple):
     hands: Hands
     """Hands available, shape ``(1,)`` or ``(2,)``."""
     follows: Flags
-    """Whether a joint takes its current value, shape ``(2, width)``, for each chosen hand."""
+    """True where a joint takes its current value, shape ``(2, width)``, for each chosen hand."""
     explored: Flags
-    """Whether a joint is perturbed, likewise."""
+    """True where a joint is perturbed, shape ``(2, width)``, for each chosen hand."""
     exploration: int
     epsilon: float
     noise_sd: float
@@ -87,11 +87,11 @@ class Results(NamedTuple):
     rewards: NDArray[np.int64]
     """Total rewards, shape ``(N, T)``."""
     completed: Flags
-    """Whether each trial hit every goal, shape ``(N, T)``."""
+    """True where a trial hit every goal, shape ``(N, T)``."""
     best_trial: NDArray[np.int64]
     """First trial with the highest reward, -1 for none, shape ``(N,)``."""
     counts: NDArray[np.int64]
-    """What was spent without the replay, by :data:`coartic.motion.trial.COUNTED`, shape
+    """Counts of all trials but the replay, by :data:`coartic.motion.trial.COUNTED`, shape
     ``(N, 5)``."""
     corrections: NDArray[np.int64]
     """Corrective movements in trial 0 and in each tenth of the rest, shape ``(N, 11)``."""
@@ -108,7 +108,7 @@ class Workspace(NamedTuple):
 
     batch: Batch
     counts: NDArray[np.int64]
-    """What the trial takes, shape ``(N, 5)``."""
+    """Counts of the trial, shape ``(N, 5)``."""
     returns: Array
     """Returns of the goals of a trial, shape ``(G,)``."""
     xs: Array

@@ -128,7 +128,7 @@ def learn_many(
     jobs: int = -1,
     start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
-    """Run the learner for many seeds, as :func:`learn` for each of them.
+    """Run the learner once for each of many seeds, as :func:`learn` does.
 
     Runs go on side by side, which changes nothing but the time.
 

@@ -23,7 +23,7 @@ CORRECTIONS = "corrections"
 
 @dataclass(frozen=True)
 class LearningRun:
-    """One run of the learner and everything it found (:func:`learn`)."""
+    """Run of the learner, with everything that was learned (:func:`learn`)."""
 
     task: Task
     """The task."""
@@ -60,7 +60,7 @@ class LearningRun:
     counters: Meter
     """Counts of the run, without its replay."""
     wall_s: float
-    """Its share of the time that it and the runs beside it took, seconds."""
+    """Share of this run in the time of the runs made together, s."""
 
     def __repr__(self) -> str:
         return short_repr(
@@ -77,7 +77,7 @@ class LearningRun:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """Whether each trial hit every goal, shape ``(trials,)``.
+        """Return where trials hit every goal, bool, shape ``(trials,)``.
 
         The others failed: they changed neither ``values`` nor ``targets``.
         """

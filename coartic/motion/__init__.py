@@ -1,1 +1,1 @@
-"""How the robot moves: kernels, the corrective process, and execution of solutions."""
+"""Motion of the robot: kernels, the corrective process, trials, and execution of solutions."""

@@ -117,7 +117,7 @@ class Batch(NamedTuple):
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
-    """A batch of so many runs, as many as there are slots at most."""
+    """Return a batch of ``count`` runs, which is at most :data:`SLOTS`."""
     width = width_of(robot)
     fields = {
         "q": (np.float64, width),  # where the robot is, length unit and rad
@@ -142,7 +142,8 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
 
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
-    """The rows of arms of so many links; which of them a correction needs, and a movement.
+    """Return the rows of arms with this number of links, and which rows a correction and a movement
+    need.
 
     Shorter arms end in links of length 0.
     """

@@ -250,7 +250,7 @@ def keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
 
 
 def cache_folder() -> Path | None:
-    """A writable folder for compiled code, or None where there is none."""
+    """Return a writable folder for compiled code, or None if no folder is writable."""
     roots, chosen = [PACKAGE / "__pycache__"], import_numba().config.CACHE_DIR
     if Path(chosen).is_absolute():  # or it would change with where one stands
         roots.insert(0, Path(chosen) / "coartic")
@@ -271,7 +271,7 @@ def cache_folder() -> Path | None:
 
 
 def remove_old(root: Path, current: Path) -> None:
-    """Remove machine code of older sources that nobody has begun with for a month."""
+    """Remove machine code of older sources that no process has loaded for a month."""
     with contextlib.suppress(OSError):
         os.utime(current)
     for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
@@ -303,7 +303,7 @@ class MachineCode:
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
     def load_overload(self, *wanted: Any) -> Any:
-        """The code of a signature; None where there is none, and this process is to compile it."""
+        """Return the code of a signature; None if this process is to compile the code."""
         self.unlock()
         code = self.load(*wanted)
         if code is None and self.wait_for_lock():
@@ -331,7 +331,7 @@ class MachineCode:
         self.unlock()
 
     def wait_for_lock(self) -> bool:
-        """Lock this function's code; False where the system has no locks, or nobody lets go."""
+        """Lock this function's code; False if the system has no locks, or the lock stays taken."""
         with contextlib.suppress(ImportError, OSError):
             import fcntl
 

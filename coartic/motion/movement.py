@@ -68,7 +68,7 @@ class MoveResult(NamedTuple):
     ticks: int
     """Control ticks spent; the reward of the movement is ``-ticks``."""
     hit: bool
-    """Whether the hand is within the goal's radius."""
+    """True if the hand is within the goal's radius."""
     evaluations: int
     """Forward-kinematics evaluations the kernel made."""
 
@@ -83,7 +83,7 @@ class Correction(NamedTuple):
     """Configuration found, shape ``(dof,)``, length unit (base) and rad (joints); the last
     iterate if not converged."""
     converged: bool
-    """Whether the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
+    """True if the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
     iterations: int
     """Descent steps, each with one Jacobian and one forward-kinematics evaluation."""
 
@@ -167,7 +167,7 @@ def set_off(at: Any, count: int, step: float) -> bool:
 
 @inner
 def place_between(at: Any, count: int, step: float) -> None:
-    """The point at which each slot is now."""
+    """Set the configuration of each slot at its present step."""
     for i in range(padded_count(count)):
         fraction = at.step[i] * step / at.distance[i]
         for j in range(len(at.q)):
@@ -329,7 +329,7 @@ def move(
 
 @inner
 def find_statuses(at: Any, count: int, square: float) -> None:
-    """Set the status of slots whose hand is near enough, or nowhere."""
+    """Set the status of slots whose hand is near enough to the goal, or at no finite place."""
     tip = len(at.length)
     for i in range(padded_count(count)):
         error_x = at.goal[0, i] - at.x[tip, i]
@@ -489,8 +489,8 @@ def explain_failure(
     locked_base: Collection[str],
     model: MotionModel,
 ) -> str:
-    """Why the corrective process may have failed from ``q``, as the end of a sentence; empty where
-    neither cause that users can mend is there.
+    """Explain why the corrective process may have failed from ``q``, as the end of a sentence;
+    empty without a cause that users can mend.
 
     One is a hand whose joints all lie on the line to the goal: none of them moves it nearer. The
     other is a long arm. Near a goal, errors shrink by ``1 - gain σ²``, with the singular values σ
@@ -541,7 +541,7 @@ def follow(
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """The points of a path, ``(n + 1, dof)``: its steps of length m and its end.
+    """Return the points of a path, ``(n + 1, dof)``: its steps of length m and its end.
 
     Point k lies at arc length ``k m`` of the polyline from ``q`` through ``waypoints``
     (k, dof). Raises ValueError for a wrong shape.
@@ -556,7 +556,8 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
 
 
 def configuration(robot: Robot, q: Any) -> Array:
-    """A contiguous copy of one configuration; ValueError where the shape is wrong."""
+    """Return a contiguous copy of one configuration. Raises ValueError for a wrong shape or
+    figure."""
     array = np.array(real_array("configuration", q), order="C")
     if array.shape != (robot.dof,):
         raise ValueError(f"configuration has shape {array.shape}; this robot needs ({robot.dof},)")
@@ -571,7 +572,8 @@ def configuration(robot: Robot, q: Any) -> Array:
 
 
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
-    """The centre of a goal; ValueError where it is not finite or beyond ``LARGEST_ENTRY``."""
+    """Return the centre of a goal. Raises ValueError if it is not finite or beyond
+    ``LARGEST_ENTRY``."""
     x, y = float(centre[0]), float(centre[1])
     if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
         raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")

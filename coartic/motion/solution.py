@@ -50,7 +50,7 @@ less."""
 
 @dataclass(frozen=True)
 class Movement:
-    """One movement of a solution, which :func:`execute` makes.
+    """Movement of a solution (:func:`execute`).
 
     Source: paper, section *Generating Movement for Each Goal*.
     """
@@ -109,7 +109,7 @@ class Execution:
 
     @property
     def completed(self) -> bool:
-        """Whether every goal was hit."""
+        """True if every goal was hit."""
         return not self.reason
 
     @property
@@ -135,7 +135,7 @@ Refused = SolutionError | ValueError | TypeError | OverflowError
 
 
 def hands_in(movements: Iterable[Movement]) -> str:
-    """Hand used for each goal, such as ``"LRLR"``."""
+    """Return the hand used for each goal, such as ``"LRLR"``."""
     by_goal = {movement.goal: movement.hand for movement in movements}
     return letters_of([by_goal[goal] for goal in sorted(by_goal)])
 
@@ -237,12 +237,13 @@ Outcome = tuple[list[Movement], NDArray[np.void]]
 
 
 def has_path(plan: Plan) -> bool:
-    """Whether a movement follows a path."""
+    """Return whether a movement of a plan follows a path."""
     return any(movement.kind == "path" for movements in plan for movement in movements)
 
 
 def with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Straight movements to a goal as the kernel takes them, up to the first that **A** finds.
+    """Return straight movements to a goal as the kernel takes them, up to the first that **A**
+    finds.
 
     None comes first where no movement is made at once: the hand may be in the goal already.
     """
@@ -274,7 +275,8 @@ def make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Outcome
 def movements_in(
     accounts: NDArray[np.void], dof: int, kinds: Iterable[Iterable[Sequence[Kind | None]]]
 ) -> list[list[Movement]]:
-    """The movements of N trials from the accounts of their goals, up to the first goal missed.
+    """Return the movements of N trials from the accounts of their goals, up to the first goal
+    missed.
 
     ``kinds`` of the movements to given targets, by trial and goal; None for those that were not
     made.
@@ -303,7 +305,7 @@ def movements_in(
 
 
 def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Outcome:
-    """Make the movements of a plan, of which some follow paths, one after the other."""
+    """Make the movements of a plan that has paths, one after the other."""
     task, model, q = compiled.task, compiled.model, compiled.starts[0]
     made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
@@ -341,7 +343,7 @@ def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Outcome:
 def execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
-    """The execution of a plan, with the movements made and the accounts of its goals."""
+    """Return the execution of a plan from the movements made and the accounts of its goals."""
     hits = sum(goals["hit"].tolist())
     # The place of the hand is known before the first movement, and where that leads.
     checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
@@ -376,7 +378,7 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
-    """The movements grouped by goal, checked against the task."""
+    """Group movements by goal, checked against the task."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
             f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
@@ -443,7 +445,7 @@ def check_point(task: Task, point: Any) -> Array:
 
 
 def hold_base(task: Task, points: Array) -> Array:
-    """The points, ``(..., dof)``, of which locked base coordinates that move by no more than
+    """Return the points, ``(..., dof)``, of which locked base coordinates that move by no more than
     :data:`HELD` are put back. Raises ValueError where one moves by more."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
@@ -458,7 +460,7 @@ def hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """A copy of the targets; ValueError where they do not fit the task."""
+    """Return a copy of the targets. Raises ValueError for targets that do not fit the task."""
     copy = np.array(targets, dtype=np.float64)
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
@@ -473,7 +475,7 @@ def check_targets(task: Task, targets: Any) -> Configs:
 
 
 def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
-    """A solution from hands and target configurations.
+    """Make a solution of hands and target configurations.
 
     Parameters
     ----------
@@ -544,12 +546,12 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
 
 
 def corrective_movements(hands: str) -> list[Movement]:
-    """A corrective movement for each goal, with the given hands."""
+    """Return a corrective movement for each goal, with the given hands."""
     return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]
 
 
 def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[str]:
-    """All hand sequences of a task.
+    """List all hand sequences of a task.
 
     Parameters
     ----------
@@ -582,7 +584,7 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
 def initial_hands(
     task: TaskLike, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
 ) -> str:
-    """The hand sequence of a first trial of a task.
+    """Return the hand sequence of a task's first trial.
 
     A sequence that the task names stands as it is. Of a policy it is the sequence with which the
     corrective process alone gets the highest reward: among sequences of one hand
@@ -622,8 +624,8 @@ def initial_hands(
 
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
-    """Reward of the corrective process alone with a task's initial hands; None where it fails with
-    them, or there are none with which it completes the task."""
+    """Return the reward of the corrective process alone with a task's initial hands; None if the
+    process fails with these hands, or completes the task with no hands."""
     try:
         hands = initial_hands(task, model=model)
     except NotApplicableError:

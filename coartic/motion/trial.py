@@ -1,4 +1,4 @@
-"""The trial: the rule that every execution, learner and environment follows, goal by goal.
+"""Trials: the rule that every execution, learner and environment follows, goal by goal.
 
 A goal has five phases. A run, one of many side by side,
 
@@ -71,7 +71,8 @@ TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 
 @cache
 def account_type(width: int, moves: int = 1) -> np.dtype[np.void]:
-    """Type of the account of one goal: configurations of so many figures, and so many movements."""
+    """Return the type of the account of a goal, with ``moves`` movements and configurations of
+    ``width`` figures."""
     fields = {
         "q": (np.float64, width),  # where the robot is in the end, length unit and rad
         "target": (np.float64, (moves, width)),  # of each movement; as given where it is not made
@@ -142,8 +143,8 @@ def correct(count: int, robot: Any, batch: Any) -> None:
 
 @inlined
 def account(run: Any, goal: Any) -> None:
-    """Phase 5, *account*: note what happened at a goal, of whose movements to targets ``target``
-    and ``moved`` are noted already."""
+    """Phase 5, *account*: note the result of a goal, whose account has ``target`` and ``moved`` of
+    its movements to targets already."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = run.ticks
@@ -159,7 +160,7 @@ def account(run: Any, goal: Any) -> None:
 
 @inlined
 def count_goal(goal: Any, counts: Any) -> None:
-    """Add what a goal took to the counts of a trial."""
+    """Add the account of a goal to the counts of a trial."""
     counts[TICKS] += goal.ticks
     counts[EVALUATIONS] += goal.evaluations
     counts[ITERATIONS] += goal.iterations
@@ -208,7 +209,7 @@ class Requests(NamedTuple):
     """Shape ``(N, G, M, dof)``; NaN for joints that stay. The first movement for a goal is made,
     further ones where it is still missed."""
     stops: NDArray[np.bool_]
-    """Whether the movement to a target ends on arrival, shape ``(N, G, M)``; empty where all do."""
+    """True where the movement to a target ends on arrival, shape ``(N, G, M)``; empty if all do."""
     goals: Points
     """Shape ``(N, G, 2)``, or ``(1, G, 2)`` for the same goals of all."""
 
@@ -225,9 +226,9 @@ class Accounts(NamedTuple):
     """Accounts of N trials with G goals."""
 
     goals: NDArray[np.void]
-    """Of each goal, shape ``(N, G)``: records (:func:`account_type`)."""
+    """Accounts of the goals, shape ``(N, G)``: records (:func:`account_type`)."""
     counts: NDArray[np.int64]
-    """Of each trial, shape ``(N, 5)``: what it took, by :data:`COUNTED`."""
+    """Counts of the trials, by :data:`COUNTED`, shape ``(N, 5)``."""
     rewards: NDArray[np.int64]
     """Total rewards, shape ``(N,)``; :data:`NO_REWARD` where a trial failed."""
 
@@ -308,7 +309,7 @@ _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 
 
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
-    """Accounts of so many trials to be filled in; their counts are 0."""
+    """Return accounts of ``count`` trials to be filled in, whose counts are 0."""
     return Accounts(
         np.empty((count, goals), account_type(width_of(robot), moves)),
         np.zeros((count, len(COUNTED)), dtype=np.int64),
@@ -350,7 +351,7 @@ class Reached(NamedTuple):
     q: Configs
     """Configuration in which each arm ended, or stayed, shape ``(N, dof)``, length unit and rad."""
     hit: NDArray[np.bool_]
-    """Whether its hand is in the goal, shape ``(N,)``."""
+    """True where the hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
     """Control ticks of its movements, shape ``(N,)``."""
     corrected: Configs
@@ -434,17 +435,17 @@ class CompiledTask(NamedTuple):
 
     task: Task
     starts: Configs
-    """Where trials start, shape ``(1, dof)``."""
+    """Configuration at the start of a trial, shape ``(1, dof)``, length unit and rad."""
     goals: Points
     """Centres of the goals, shape ``(1, G, 2)``."""
     parameters: NDArray[np.void]
-    """Of the robot (:func:`coartic.motion.batch.robot_parameters`)."""
+    """Parameters of the robot (:func:`coartic.motion.batch.robot_parameters`)."""
     model: MotionModel
 
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
-    """A task for the kernels. Raises ValueError for a task or a model that no trial can be made
-    with: a copy of a task with changed fields is unchecked."""
+    """Return a task for the kernels. Raises ValueError for a task or a model that no trial can be
+    made with: a copy of a task with changed fields is unchecked."""
     check_model(model, radius=task.radius)
     goals = [check_goal(goal, task.radius) for goal in task.goals]
     return CompiledTask(
@@ -471,8 +472,8 @@ def make_trials(
 
 
 def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
-    """The reason why a trial, with these accounts of its goals, was not completed; empty if it
-    was."""
+    """Return the reason why a trial with these accounts of its goals was not completed; empty if
+    the trial was completed."""
     if goals["hit"][-1]:
         return ""
     number = int(goals["hit"].argmin())
@@ -491,7 +492,7 @@ class Trials(NamedTuple):
     ticks: NDArray[np.int64]
     """Control ticks of each, shape ``(N,)``."""
     completed: NDArray[np.bool_]
-    """Whether every goal was hit, shape ``(N,)``."""
+    """True where every goal was hit, shape ``(N,)``."""
     corrections: NDArray[np.int64]
     """Corrective movements made, shape ``(N,)``."""
     iterations: NDArray[np.int64]
@@ -511,7 +512,7 @@ class Trials(NamedTuple):
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Results of trials from their accounts."""
+    """Return the results of trials from their accounts."""
     goals, counts, _ = accounts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
@@ -532,7 +533,7 @@ HandSequences = str | Sequence[str]
 
 
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
-    """The hand of every trial and goal, shape ``(count, G)``.
+    """Return the hand of every trial and goal, shape ``(count, G)``.
 
     Raises ValueError where they do not fit the task.
     """
@@ -616,12 +617,12 @@ def ranked_sequences(
 
 
 def changes_of_hand(sequence: str) -> int:
-    """How often successive goals are hit by different hands."""
+    """Count the successive goals that are hit by different hands."""
     return sum(a != b for a, b in itertools.pairwise(sequence))
 
 
 def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
-    """All sequences of some hands for so many goals, in alphabetical order.
+    """List all sequences of some hands for a number of goals, in alphabetical order.
 
     Raises NotApplicableError, which names the task, where there are too many.
     """
@@ -632,7 +633,7 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
-    """Why the sequences of so many hands cannot all be tried on a task, or None where they can."""
+    """Say why not all hand sequences can be tried on a task, or None if all can be."""
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
@@ -640,7 +641,8 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Some of the hands of a task's robot, or all; ValueError where it does not have them."""
+    """Return some hands of a task's robot, or all. Raises ValueError for hands that the robot does
+    not have."""
     if hands is None:
         return task.hands
     chosen = tuple(hands)
@@ -655,8 +657,8 @@ def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
 def search_initial_hands(
     task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
 ) -> tuple[str, Mapping[str, int]]:
-    """The hand sequence of trial 0, and what its search spent, by the names of a meter: nothing for
-    a sequence that the task names.
+    """Find the hand sequence of trial 0; return it with the counts of the search, by the names of a
+    meter: no counts for a sequence that the task names.
 
     Of a policy it is the sequence with which the corrective process alone gets the highest reward:
     among sequences of one hand, or among all. Raises NotApplicableError where the process completes
@@ -673,7 +675,7 @@ def search_initial_hands(
 def search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """The search of a task, given as JSON, with these hands: the same is made once."""
+    """Search for the initial hands of a task, given as JSON; the same search is made once."""
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)
     if task.initial_hands == "best-single-hand":

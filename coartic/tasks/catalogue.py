@@ -11,7 +11,7 @@ from coartic.tasks.families import instance
 from coartic.tasks.task import Task, read_task, shipped_tasks
 
 TaskLike = Task | str | Path
-"""What stands for a task: the task itself, its name, or the path of its file."""
+"""A task, its name, or the path of its file."""
 
 
 def builtin_tasks() -> tuple[str, ...]:

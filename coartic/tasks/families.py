@@ -95,7 +95,7 @@ _Bases = tuple[Base, ...]
 
 
 class Region(FileData):
-    """Where goals are: a box, of whose sides a share is drawn and placed within it."""
+    """Region of the goals: a box, within which a box with a drawn share of its sides is placed."""
 
     x: Span
     """From, to, length unit; at the start the base is at the origin."""
@@ -151,25 +151,26 @@ class Family(FileData):
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals; the robot has both arms anyway."""
     goals: Annotated[tuple[_Count, _Count], _ordered]
-    """How many there are, from, to; each number as likely."""
+    """Least and largest number of goals; each number is equally likely."""
     links: Annotated[tuple[_PerArm, _PerArm], _ordered]
-    """How many each of both arms has, from, to; they have one length (to a thousandth)."""
+    """Least and largest number of links of each arm; all links have one length (to a
+    thousandth)."""
     reach: Thousandths = 4 * _PARTS
     """Sum of an arm's links, length unit; the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
-    """One is drawn: free, on a rail (it cannot move in y), or locked."""
+    """Bases, of which one is drawn: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
-    """Bases, beside its own, under which every instance can be done."""
+    """Bases, in addition to the instance's own, with which every instance can be completed."""
     radius: Thousandths = 100
     """Radius of every goal, length unit."""
     region: Region
-    """Where goals are: table ``[region]``."""
+    """Region of the goals: table ``[region]``."""
     line: Alignment | None = None
     """Goals on a line: table ``[line]``; scattered over the region where left out."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
-    """Postures of which one is drawn: tables ``[[start]]``."""
+    """Starting postures, of which one is drawn: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
-    """How the hands of trial 0 are found; the instance names them."""
+    """Policy that finds the hands of trial 0; the instance names the hands."""
     apart: Thousandths = 300
     """Least distance between the centres of two goals, length unit."""
     clear: Thousandths = 200
@@ -281,9 +282,10 @@ def broken_rule(family: Family, task: Task) -> str | None:
 def first_good(
     family: Family, address: Address, most: int = MOST_ATTEMPTS
 ) -> tuple[Task, tuple[str, ...]]:
-    """The first draft that breaks no rule, and the rules that those before it broke, in order.
+    """Return the first draft that breaks no rule, and the rules that earlier drafts broke, in
+    order.
 
-    Raises TaskError where there is none among the first ``most``.
+    Raises TaskError if each of the first ``most`` drafts breaks a rule.
     """
     rejected: list[str] = []
     while len(rejected) < most:
@@ -325,8 +327,8 @@ def instance_of(family: Family, address: Address) -> Task:
 
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """An instance of a shipped family by its name, ``two-armed/v1/i017``. Raises TaskError for what
-    is none."""
+    """Return an instance of a shipped family by its name, ``two-armed/v1/i017``. Raises TaskError
+    for any other name."""
     address = address_of(name)
     if address is None:
         raise TaskError(
@@ -337,9 +339,9 @@ def instance(name: str) -> Task:
 
 
 def named_by(text: str) -> list[str]:
-    """Names of the instances of a range, ``two-armed/v1/i000..i039``, or the name itself.
+    """List the names of the instances of a range, ``two-armed/v1/i000..i039``, or the name itself.
 
-    Raises TaskError for a range that is none, and for one of more than :data:`MOST_CELLS`.
+    Raises TaskError for an empty range, and for a range of more than :data:`MOST_CELLS`.
     """
     if "/" not in text or ".." not in text or text.endswith(".toml"):
         return [text]
@@ -366,7 +368,7 @@ def shipped_families() -> dict[str, Family]:
 
 
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
-    """The families of one's own files by name.
+    """Return the families of files by name.
 
     Raises TaskError for a file that cannot be used, and for a name that is taken.
     """

@@ -26,7 +26,7 @@ BEST_KNOWN = Path(__file__).with_name("best_known.csv")
 search that proved the bound), ``hands`` and ``essence``."""
 
 KEPT = ("start", "radius", "hands", "locked_base", "robot")
-"""What makes a task beside its goals."""
+"""Fields that, with the goals, define a task."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class KnownOptimum:
 
     @property
     def proven(self) -> bool:
-        """Whether no solution can be better."""
+        """True if no solution can be better."""
         return self.bound == self.reward
 
 
@@ -55,7 +55,7 @@ def essence(task: Task) -> str:
 def best_shipped(task: Task) -> KnownOptimum | None:
     """The best reward that is shipped of a task, however it is called.
 
-    None where none is: for a task of one's own, and for instances beyond the first of each family.
+    None for a task that is not shipped, and for instances beyond the first 40 of a family.
     """
     return _by_essence().get(essence(task))
 

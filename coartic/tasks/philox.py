@@ -53,9 +53,10 @@ class Draws:
         self._pairs = (pair for a, b, c, d in blocks for pair in (a << 32 | b, c << 32 | d))
 
     def integer(self, least: int, most: int) -> int:
-        """One of ``least`` to ``most``, all of them as likely to within (most - least) / 2^64."""
+        """Draw a number from ``least`` to ``most``, each equally likely to within (most - least) /
+        2^64."""
         return least + (next(self._pairs) * (most - least + 1) >> 64)
 
     def one_of(self, choices: Sequence[T]) -> T:
-        """One of some things, each as likely."""
+        """Draw one of the choices, each equally likely."""
         return choices[self.integer(0, len(choices) - 1)]

@@ -67,7 +67,7 @@ SPLITS: dict[str, Split] = {"d": "development", "i": "test"}
 
 
 class Address(NamedTuple):
-    """Which instance of a family of random tasks (:mod:`coartic.tasks.families`) a task is."""
+    """Address of an instance of a family of random tasks (:mod:`coartic.tasks.families`)."""
 
     family: str
     """With its version, as ``two-armed/v1``."""
@@ -77,7 +77,7 @@ class Address(NamedTuple):
 
     @property
     def split(self) -> Split:
-        """What the instance is for: to tune on, to report on, or drawn after both were done."""
+        """Purpose of the instance: to tune on, to report on, or drawn after both were done."""
         return SPLITS.get(self.stream, "fresh")
 
     def __str__(self) -> str:
@@ -94,7 +94,7 @@ def address_of(name: str) -> Address | None:
 
 
 class Provenance(FileData):
-    """Where a figure of a task comes from: the entry of a key in ``Task.provenance``."""
+    """Source of a figure of a task: the entry of a key in ``Task.provenance``."""
 
     status: Literal["published", "inferred", "chosen"]
     """Published in the paper, inferred from it, or chosen by the task's author."""
@@ -165,7 +165,8 @@ class Task(FileData):
         return goals
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
-        """A copy, unchecked, with some fields changed; arrays are made of those anew."""
+        """Return an unchecked copy with some fields changed, and its arrays made of these
+        fields."""
         copied = super().model_copy(update=update, deep=deep)
         for name in ("q0", "goal_array"):
             copied.__dict__.pop(name, None)
@@ -173,12 +174,12 @@ class Task(FileData):
 
     @property
     def initial_is_policy(self) -> bool:
-        """Whether the initial hands are found by a policy instead of being named."""
+        """True if the initial hands are found by a policy instead of being named."""
         return self.initial_hands in INITIAL_POLICIES
 
     @property
     def label(self) -> str:
-        """The title, or the name where there is none."""
+        """Title of the task, or its name without a title."""
         return self.title or self.name
 
     @property
@@ -189,7 +190,7 @@ class Task(FileData):
 
     @property
     def split(self) -> Split | None:
-        """What an instance of a family is for; None for other tasks."""
+        """Purpose of an instance of a family; None for other tasks."""
         address = address_of(self.name)
         return None if address is None else address.split
 
@@ -201,7 +202,7 @@ class Task(FileData):
     @model_validator(mode="before")
     @classmethod
     def _with_start(cls, content: Any) -> Any:
-        """Read ``q0`` as the start, or let both arms point along +x where there is none."""
+        """Read ``q0`` as the start, or let both arms point along +x without a start."""
         if isinstance(content, dict) and "penalty" in content:
             reads = "version 1.1.0 of coartic reads tasks with a penalty"
             raise error_saying(f"{reads}; here a reward is minus the ticks")
@@ -289,7 +290,7 @@ class Task(FileData):
         write_output(file, task_text(self).encode(), replace=replace)
 
     def __repr__(self) -> str:
-        """Its name and what there is to hit, with which hands."""
+        """Return the name, the goals and the hands of the task."""
         return short_repr(
             self,
             repr(self.name),
@@ -363,8 +364,8 @@ def check_task(task: Task, model: MotionModel = PAPER) -> Task:
 
 
 def read_task(path: Path) -> Task:
-    """The task of a file, which has the file's name unless it says another. Raises TaskError,
-    naming the file and the key, where it is none."""
+    """Read the task of a file, which has the file's name unless it states another. Raises
+    TaskError, which names the file and the key, for a file that is no task."""
     return parse_task({"name": path.stem, **read_toml(path, error=TaskError)}, str(path))
 
 
