@@ -134,7 +134,8 @@ def move(count: int, robot: Any, batch: Any) -> None:
 @inlined
 def correct(count: int, robot: Any, batch: Any) -> None:
     """Phase 4, *correct*: have **A** finish missed goals. ``target`` and ``ticks`` become what its
-    movements have."""
+    movements have. A preferred posture has its place in
+    :func:`coartic.motion.movement.descend_to_goals`."""
     find_corrections(count, robot, batch)
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
