@@ -4,7 +4,7 @@ Every hand sequence has an evolution strategy of its own (CMA-ES, Hansen 2016) o
 targets of all its explored joints, which sees the total reward of each trial and nothing
 else. Its first mean are the configurations of the corrective process **A** alone, which takes
 one trial; its first step size is the learner's noise; where it stops by its own
-criteria it begins anew there with twice the population (IPOP, Auger & Hansen 2005). A
+criteria it starts again there with twice the population (IPOP, Auger & Hansen 2005). A
 failed trial ranks last. UCB1 (Auer, Cesa-Bianchi & Fischer 2002) on the best reward of each
 sequence, scaled by the spread of the first rewards, decides in ``cma-es/bandit`` which strategy
 makes the next generation of trials.

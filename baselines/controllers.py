@@ -164,7 +164,7 @@ class Control(Method):
     quick: ClassVar[dict[str, Any]] = {"period": 20}
     controller: ClassVar[type[Controller]]
     goals_ahead: ClassVar[int] = 0
-    """Goals after the current one that the controller heeds."""
+    """Goals after the current one that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
         """Return why there are too many sequences to simulate, if there are."""

@@ -160,7 +160,7 @@ class Layout(NamedTuple):
 
     @classmethod
     def of(cls, goals: int, dof: int, order: int) -> Layout:
-        """Lay out a programme of so many goals and derivatives."""
+        """Lay out a programme for a number of goals and derivatives."""
         sizes = (goals * dof, goals, goals, 1, order * (goals + 1) * dof)
         return cls(*map(slice, accumulate((0, *sizes[:-1])), accumulate(sizes)))
 

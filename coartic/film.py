@@ -122,7 +122,7 @@ def set_scene(axes: Axes, movement: Filmed, colour: str) -> Callable[[int], None
     """Draw what moves in one picture.
 
     Returns a function that shows the state at a row of the movement, or at its last one: artists
-    are updated, never drawn anew.
+    are updated, never drawn again.
     """
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}

@@ -114,7 +114,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     """Let N robots act side by side, in a fraction of the time of N :class:`TaskEnv`.
 
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
-    process fails, which costs ``coartic.optimisers.FAILED``. A trial that has ended begins anew in
+    process fails, which costs ``coartic.optimisers.FAILED``. A trial that has ended starts again in
     the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info`` are what
     it ended with. Nothing is random but which instance of a family is drawn.
 
@@ -291,7 +291,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     def step(
         self, actions: ArrayLike
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Reach for the next goal of each trial, and begin anew those that have ended."""
+        """Reach for the next goal of each trial, and start again those that have ended."""
         state = self.state
         if not state.going.all():
             raise ResetNeeded("no trial goes on: reset first")
@@ -411,7 +411,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     Returns
     -------
     coartic.sb3.RobotEnvs
-        A ``VecEnv``: trials begin anew by themselves, actions are clipped, and rewards are shares
+        A ``VecEnv``: trials start again by themselves, actions are clipped, and rewards are shares
         of what the corrective process takes.
 
     Raises

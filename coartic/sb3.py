@@ -16,7 +16,7 @@ from coartic.robot import Array
 class RobotEnvs(VecEnv):
     """A vector environment of :mod:`coartic.gym` for Stable-Baselines3.
 
-    Actions are clipped to the box. A trial that has ended begins anew in the same step;
+    Actions are clipped to the box. A trial that has ended starts again in the same step;
     ``terminal_observation`` in its info is what was seen last, and ``episode`` has its reward in
     ticks. Rewards are ticks as a share of what the corrective process takes for the whole trial
     with the task's initial hands: all rewards of a trial that is like it add up to -1. No step

@@ -24,7 +24,7 @@ class Picture {
     return getComputedStyle(this.canvas).getPropertyValue(`--${name}`).trim();
   }
 
-  /* Begin anew, with a box of the world in sight. */
+  /* Start again, with a box of the world in sight. */
   begin([left, bottom, right, top]) {
     const { canvas, context } = this;
     const density = this.density || window.devicePixelRatio || 1;

@@ -353,7 +353,7 @@ def slope_of(mean, before, action, gain, sd):
 
 @cache
 def recall(ahead, agent, practice, model):
-    """The policy of an agent after its practice; it practises now where nobody has kept it."""
+    """The policy of an agent after its practice; it practises now unless it is stored."""
 
     def path(trials):
         what = f"{CODE} {np.__version__} {ahead} {agent} {trials} {tuple(model)}"
