@@ -147,6 +147,42 @@ def test_conditions_are_data(chosen, other, hands):
         assert set(slow.completed) == {True, False}
 
 
+INFORMED = [
+    {"drift": 0.3},
+    {"drift": 1.0, "noise_sd": 0.01},
+    {"drift": (0.0, 0.1, 1.0)},
+    {"pull": 0.05},
+    {"drift": 0.3, "pull": 0.02, "hand_exploration": "nearest-posture", "epsilon": 0.5},
+]
+
+
+@pytest.mark.parametrize("direction", ["next-goal", "stay", "start"])
+@pytest.mark.parametrize("fields", INFORMED, ids=str)
+def test_informed_conditions_equal_the_slow_learner_trial_by_trial(direction, fields):
+    """On the tasks of the paper and on an uneven robot with a rail, under EC1, EC3 and EC4."""
+    one_hand = {name: value for name, value in fields.items() if name != "hand_exploration"}
+    differ = 0
+    for task, condition, fields_of_task in (
+        (load_task("ascending"), "EC1", one_hand),
+        (load_task("two-armed-1"), "EC4", fields),
+        (uneven_task(locked_base=["x"]), "EC4", fields),
+        (load_task("two-armed-2"), "EC3", fields),
+    ):
+        rules = replace(CONDITIONS[condition], direction=direction, **fields_of_task)
+        slow = assert_equals_reference(task, rules, trials=6, seed=7)
+        plain = learn(task, CONDITIONS[condition], seed=7, trials=6, model=SOON_FAILED)
+        differ += not np.array_equal(plain.rewards.data, slow.rewards)
+    assert differ > 0
+
+
+def test_without_information_an_informed_condition_is_the_papers():
+    """No drift and no pull draw nothing and change nothing; a list of drifts draws."""
+    paper = learn("two-armed-1", "EC4", seed=3, trials=200)
+    for drift, equal in ((0.0, True), ((0.0,), True), ((0.0, 0.0), True), (1e-12, False)):
+        run = learn("two-armed-1", replace(CONDITIONS["EC4"], drift=drift), seed=3, trials=200)
+        assert np.array_equal(run.targets, paper.targets, equal_nan=True) == equal
+
+
 def planned(hands, configurations):
     """A planner's solution: one movement to each goal."""
     rows = enumerate(zip(hands, configurations, strict=True), 1)

@@ -4,6 +4,13 @@ A condition says which hands the robot has, which joints are perturbed (AModChos
 base and chosen arm; AModOther: the other arm) and how hands are explored (DASel).
 The learner reads these fields; it has no code of its own for any condition.
 
+Informed conditions join informed and uninformed search, which the paper leaves to "future research"
+(section *Integrating Informed and Uninformed Search*). With the preferred posture p, fixed when a
+goal becomes current, the stored target t and the projection N(x) = I − J⁺J onto the null space of
+the chosen hand's Jacobian, exploration has the mean ``t + κ N(t) (p − t)``, and an iteration of the
+corrective process adds ``β N(x) (p − x)``. N mixes lengths and angles, as the paper's distance
+does.
+
 Variants go beyond the paper. One takes the corrective process away, one learns from the reward
 of each subtask in place of the overall one, which the paper calls crucial. Suite ablations
 measures what each does to learning.
@@ -34,6 +41,7 @@ MOST_NOISE = 100.0
 lose themselves in the far would be approached step by step without an end."""
 Counted = Literal["later", "all"]
 Share = Annotated[float, Field(ge=0, le=1)]
+Drift = Annotated[float, Field(ge=0, le=10)]
 
 
 @in_sentences
@@ -53,9 +61,10 @@ class ExplorationCondition:
     """True if noise moves the targets of the base and of the arm that is to hit (AModChosen)."""
     modify_other: bool
     """True if noise moves the targets of the other arm (AModOther)."""
-    hand_exploration: Literal["none", "closest", "random"]
+    hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
     """Exploration of the hand for a goal: none (``"none"``), the hand closest to the goal
-    (``"closest"``), or a random hand (``"random"``, DASel)."""
+    (``"closest"``), a random hand (``"random"``, DASel), or the hand whose corrective posture for
+    the goal is nearest in joint space (``"nearest-posture"``)."""
     epsilon: Share = 0.2
     """ε: the probability with which the hand for a goal is explored (published)."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE)] = 0.05
@@ -73,6 +82,15 @@ class ExplorationCondition:
     is the reward of the subtask alone. With credit "subtask" only."""
     counted: Counted = "later"
     """Goals h of this sum: g and later ones, or all. Of all, γ = 1 is R, for every goal."""
+    drift: Drift | Annotated[tuple[Drift, ...], Field(min_length=1)] = 0.0
+    """κ of informed exploration: the share of the way to the preferred posture, in the null space
+    of the hand, by which the mean of exploration moves. Of several each trial draws one."""
+    pull: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """β of informed correction: the same share in each iteration of the corrective process."""
+    direction: Literal["next-goal", "stay", "start"] = "next-goal"
+    """The preferred posture: halfway to the stored target of the next goal (``"next-goal"``), where
+    the robot is when the goal becomes current (``"stay"``), or where the trial began (``"start"``,
+    wrong information)."""
 
     def __post_init__(self) -> None:
         if self.discount and self.credit == "overall":
@@ -80,11 +98,25 @@ class ExplorationCondition:
                 f"discount is {self.discount}, but only rewards of subtasks can be discounted: set "
                 "credit to 'subtask'"
             )
+        if self.direction != "next-goal" and not self.is_informed:
+            raise ValueError(
+                f"direction is {self.direction!r}, which nothing goes by: set drift or pull above 0"
+            )
         if self.credit == "subtask" and self.learned == "best":
             raise ValueError(
                 "a learner with credit 'subtask' has no information about the whole task, so that "
                 "its best trial is no solution that it knows: set learned to 'replay'"
             )
+
+    @property
+    def drifts(self) -> tuple[float, ...]:
+        """The values of ``drift``."""
+        return self.drift if isinstance(self.drift, tuple) else (self.drift,)
+
+    @property
+    def is_informed(self) -> bool:
+        """Whether a preferred posture informs exploration or correction."""
+        return any(self.drifts) or self.pull > 0
 
     def __repr__(self) -> str:
         positional = ("hands", "modify_chosen", "modify_other", "hand_exploration")

@@ -11,8 +11,8 @@ trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy genera
 (``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
 ε, where hands are explored; a second one that picks a hand, where the first fell below ε
 and the pick is random; one standard normal per explored joint, in the order of ``q``, where a
-target is stored. Runs share nothing: the result of one depends neither on the others nor on their
-number.
+target is stored. Where each trial draws its drift, that is its first draw. Runs share nothing: the
+result of one depends neither on the others nor on their number.
 """
 
 from __future__ import annotations
@@ -25,12 +25,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
-from coartic.motion.batch import Batch, arm_of, batch_for, width_of
-from coartic.motion.compile import entry, fill_row, generator_at, inlined, inner, record_type
+from coartic.motion.batch import Batch, arm_of, batch_for, load, width_of
+from coartic.motion.compile import (
+    entry,
+    fill_row,
+    generator_at,
+    inlined,
+    inner,
+    joint_lever,
+    record_type,
+)
+from coartic.motion.movement import correct_slots, project
 from coartic.motion.solution import Movement
 from coartic.motion.trial import (
     CORRECTIONS,
     COUNTED,
+    ITERATIONS,
     MOVE,
     TICKS,
     CompiledTask,
@@ -38,6 +48,8 @@ from coartic.motion.trial import (
     begin,
     correct,
     count_goal,
+    find_pulled_corrections,
+    make_corrections,
     move,
     set_off,
 )
@@ -48,11 +60,23 @@ from coartic.tasks.task import Task
 
 NO_HAND = 2  # ∅, the previous hand before goal 1
 _RANDOM = 1
-_EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2}
+_NEAREST_POSTURE = 3
+_EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2, "nearest-posture": _NEAREST_POSTURE}
+_NEXT_GOAL, _STAY = 0, 1
+_DIRECTION = {"next-goal": _NEXT_GOAL, "stay": _STAY, "start": 2}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 TENTHS = 10
 """Number of equal parts of the trials after trial 0, whose corrections are counted apart."""
 Flags = NDArray[np.bool_]
+
+
+class Informed(NamedTuple):
+    """What an informed condition adds to the parameters of the learner."""
+
+    drifts: Array
+    """Values of κ, of which each trial draws one where there are several, shape ``(K,)``."""
+    pull: float
+    direction: int
 
 
 class LearnerParameters(NamedTuple):
@@ -79,6 +103,8 @@ class LearnerParameters(NamedTuple):
     by_subtask: bool
     discount: float
     counts_earlier: bool
+    informed: Informed | None
+    """None under conditions without information, whose kernel has no code for any."""
 
 
 class Results(NamedTuple):
@@ -114,6 +140,8 @@ class Workspace(NamedTuple):
     xs: Array
     """Places of joints from shoulder to hand, shape ``(n + 1,)`` for the longer arm."""
     ys: Array
+    jacobian: Array
+    """Rows x and y of a Jacobian, and joint changes, shape ``(3, width)``."""
 
 
 def learner_parameters(
@@ -149,6 +177,11 @@ def learner_parameters(
         by_subtask=condition.credit == "subtask",
         discount=float(condition.discount),
         counts_earlier=condition.counted == "all",
+        informed=Informed(
+            np.array(condition.drifts), float(condition.pull), _DIRECTION[condition.direction]
+        )
+        if condition.is_informed or condition.hand_exploration == "nearest-posture"
+        else None,
     )
 
 
@@ -172,6 +205,7 @@ def workspace_for(runs: int, task: Task) -> Workspace:
         returns=np.empty(len(task.goals)),
         xs=np.empty(task.robot.most_links + 1),
         ys=np.empty(task.robot.most_links + 1),
+        jacobian=np.zeros((3, width_of(task.robot))),
     )
 
 
@@ -187,16 +221,53 @@ def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
     return math.sqrt(dx * dx + dy * dy)
 
 
+@inner
+def nearest_posture(informed: Any, n: int, robot: Any, learner: Any, workspace: Any) -> int:
+    """Find the hand of run ``n`` whose corrective posture for the goal is nearest in joint space.
+
+    A hand with which **A** fails is farthest; of equal ones the first.
+    """
+    nearest = learner.hands[0]
+    if informed is not None:
+        batch, least = workspace.batch, math.inf
+        run = batch.runs[n]
+        for hand in learner.hands:
+            run.hand = hand
+            fill_row(run.target, run.q)
+            load(batch.slots.at[0], 0, n, run, arm_of(robot, hand))
+            correct_slots(batch.slots, 1, robot, batch.runs)
+            workspace.counts[n, ITERATIONS] += run.iterations
+            square = 0.0
+            for j in range(len(run.q)):
+                square += (run.target[j] - run.q[j]) ** 2
+            if run.converged and square < least:
+                nearest, least = hand, square
+        fill_row(run.target, run.q)
+    return int(nearest)
+
+
+@inlined
+def best_hand(entries: Any, hands: Any) -> int:
+    """Return the hand of highest value, of equal ones the first."""
+    best = hands[0]
+    for hand in hands[1:]:
+        if entries[hand].value > entries[best].value:
+            best = hand
+    return int(best)
+
+
 @inlined
 def choose_hand(
-    run: Any, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
+    n: int, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
 ) -> int:
-    """The hand of highest value; with probability ε a random one, or the closest to the goal.
+    """Choose the hand of highest value; with probability ε another, as the condition explores.
 
-    Of equal values the first, of hands that are equally close a random one.
+    Of hands that are equally close to the goal a random one.
     """
-    hands = learner.hands
+    hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
+        if learner.exploration == _NEAREST_POSTURE:
+            return nearest_posture(learner.informed, n, robot, learner, workspace)
         nearest, draws = hands[0], learner.exploration == _RANDOM
         if not draws:
             least = distance_to_goal(run, nearest, robot, workspace)
@@ -206,11 +277,7 @@ def choose_hand(
                 if distance < least:
                     nearest, least = hand, distance
         return int(hands[int(rng.random() * len(hands))]) if draws else int(nearest)
-    best = hands[0]
-    for hand in hands[1:]:
-        if entries[hand].value > entries[best].value:
-            best = hand
-    return int(best)
+    return best_hand(entries, hands)
 
 
 @inlined
@@ -221,17 +288,100 @@ def find_mean(run: Any, stored: Any, learner: Any) -> None:
         run.target[j] = run.q[j] if learner.follows[run.hand, j] else stored.target[j]
 
 
+@inner
+def draw_drift(informed: Any, run: Any, rng: Any) -> None:
+    """Set the drift κ of a run for a trial."""
+    if informed is not None:
+        number = len(informed.drifts)
+        run.drift = informed.drifts[int(rng.random() * number) if number > 1 else 0]
+        run.pull = informed.pull
+
+
+@inner
+def prefer(informed: Any, run: Any, number: int, table: Any, learner: Any) -> None:
+    """Set the preferred posture p of a run, which has chosen its hand for a goal.
+
+    *next goal*: (q + t') / 2 with the stored target t' of the next goal for the hand that is best
+    there, given this one; q for joints that the movement to it would not explore, and where nothing
+    is stored.
+    """
+    if informed is not None:
+        fill_row(run.preferred, run.q)
+        if informed.direction == _NEXT_GOAL:
+            if number + 1 < len(table):
+                hand = best_hand(table[number + 1, run.hand], learner.hands)
+                following = table[number + 1, run.hand, hand]
+                if following.value > -math.inf:
+                    for j in range(len(run.q)):
+                        if learner.explored[hand, j]:
+                            run.preferred[j] = 0.5 * (run.q[j] + following.target[j])
+        elif informed.direction != _STAY:
+            fill_row(run.preferred, learner.start)
+
+
+@inner
+def drift(informed: Any, run: Any, robot: Any, learner: Any, workspace: Any) -> None:
+    """Move the mean t of exploration by κ N(t) (p − t), and an explored idle arm by κ (p − t)."""
+    if informed is not None and run.drift > 0.0:
+        x, y, v = workspace.jacobian
+        arm = arm_of(robot, run.hand)
+        tip = len(arm.links)
+        joint_chain(run.target, arm, workspace.xs, workspace.ys)
+        for j in range(len(run.q)):
+            x[j], y[j], v[j] = 0.0, 0.0, 0.0
+            k = j - arm.first
+            if learner.explored[run.hand, j]:
+                away = run.preferred[j] - run.target[j]
+                if j == 0:
+                    x[j], v[j] = 1.0, away
+                elif j == 1:
+                    y[j], v[j] = 1.0, away
+                elif 0 <= k < tip:
+                    x[j], y[j] = joint_lever(workspace.xs, workspace.ys, k, tip)
+                    v[j] = away
+                else:
+                    run.target[j] += run.drift * away
+        project(v, x, y)
+        for j in range(len(run.q)):
+            run.target[j] += run.drift * v[j]
+
+
+@inner
+def correct_as(informed: Any, first: bool, count: int, robot: Any, batch: Any) -> None:
+    """Phase 4 with the pull of an informed condition, which trial 0 does without."""
+    if informed is None:
+        correct(count, robot, batch)
+    else:
+        if first or informed.pull == 0.0:
+            correct(count, robot, batch)
+        else:
+            find_pulled_corrections(count, robot, batch)
+            make_corrections(count, robot, batch)
+
+
 @inlined
 def aim(
-    run: Any, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
+    n: int,
+    number: int,
+    before: int,
+    table: Any,
+    explore: bool,
+    robot: Any,
+    learner: Any,
+    rng: Any,
+    workspace: Any,
 ) -> None:
-    """Phase 2, *aim*: choose the hand of a run and, where there is a target q*(s, a), set
-    q^t = mean + η."""
-    run.hand = choose_hand(run, entries, explore, robot, learner, rng, workspace)
+    """Phase 2, *aim*: choose the hand of run ``n`` for a goal and, where there is a target
+    q*(s, a), set q^t = mean + η."""
+    run, entries = workspace.batch.runs[n], table[number, before]
+    run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
+    prefer(learner.informed, run, number, table, learner)
     if stored.value > -math.inf:
         run.action, run.corrects = MOVE, learner.corrects
         find_mean(run, stored, learner)
+        if explore:
+            drift(learner.informed, run, robot, learner, workspace)
         for j in range(len(run.q)):
             if explore and learner.explored[run.hand, j]:
                 run.target[j] += learner.noise_sd * rng.standard_normal()
@@ -253,6 +403,8 @@ def make_trial(
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
+        if explore and not first:
+            draw_drift(learner.informed, batch.runs[n], generator_at(rngs, n))
         for k in range(counts.shape[1]):
             counts[n, k] = 0
     for number in range(len(learner.goals)):
@@ -265,14 +417,14 @@ def make_trial(
                     aim_at(run, learner.first_targets[number])
             elif run.going:
                 before = trial[n, number - 1].hand if number > 0 else NO_HAND
-                entries, rng = tables[n, number, before], generator_at(rngs, n)
-                aim(run, entries, explore, robot, learner, rng, workspace)
+                rng = generator_at(rngs, n)
+                aim(n, number, before, tables[n], explore, robot, learner, rng, workspace)
         move(runs, robot, batch)
         for n in range(runs):
             trial[n, number].moved[0] = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
                 fill_row(trial[n, number].target[0], batch.runs[n].target)
-        correct(runs, robot, batch)
+        correct_as(learner.informed, first, runs, robot, batch)
         for n in range(runs):
             account(batch.runs[n], trial[n, number])
             count_goal(trial[n, number], counts[n])

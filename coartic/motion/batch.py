@@ -122,6 +122,9 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     fields = {
         "q": (np.float64, width),  # where the robot is, length unit and rad
         "target": (np.float64, width),  # where it is to go, or where the correction has ended
+        "preferred": (np.float64, width),  # posture that information prefers, length unit and rad
+        "drift": np.float64,  # share of the way to it by which the mean of exploration moves
+        "pull": np.float64,  # share that an iteration of the corrective process adds
         "goal": (np.float64, 2),  # x and y, length unit
         "hand": np.int64,  # that is to hit the goal: 0 left, 1 right
         "action": np.int64,  # next: see coartic.motion.trial
@@ -168,6 +171,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     }
     # Positions of shoulder, joints and hand; what an iteration of a correction adds to q.
     passing = {"x": (links + 1,), "y": (links + 1,), "status": (), "pull": joints}
+    passing["jacobian"] = (2, *joints)
     shapes = corrected | common | moved | passing
     kinds = dict.fromkeys(("run", "first", "links"), np.int64)
     record = np.dtype(

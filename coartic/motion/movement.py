@@ -54,6 +54,7 @@ _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
+_RANK = 1e-12  # square of the ratio of singular values up to which the smaller counts as 0
 _IN_GOAL, _MISSED = 1.0, 2.0  # statuses of a slot that has moved
 _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # and of one that has been corrected
 LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
@@ -340,7 +341,7 @@ def find_statuses(at: Any, count: int, square: float) -> None:
 
 
 @inlined
-def descend(at: Any, count: int, robot: Any, pull: Any) -> tuple[int, bool]:
+def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int, bool]:
     """q += α Jᵀ e in every slot that goes on, plus its rows ``pull`` where there is one (see
     :func:`descend_to_goals`); number of slots that have ended, and :func:`are_near`."""
     ended = 0
@@ -348,7 +349,7 @@ def descend(at: Any, count: int, robot: Any, pull: Any) -> tuple[int, bool]:
     tip = len(at.length)
     gain, free_x, free_y = robot.model.gain, robot.free_x, robot.free_y
     if pull is not None:
-        pull(at, count)
+        pull(at, count, robot, runs)
     for i in range(padded_count(count)):
         error_x = at.goal[0, i] - at.x[tip, i]
         error_y = at.goal[1, i] - at.y[tip, i]
@@ -381,9 +382,9 @@ def descend_to_goals(slots: Any, count: int, robot: Any, runs: Any, pull: Any) -
     """Let **A** descend in the first ``count`` slots until each has ended.
 
     The ``target`` of each run becomes what its slot ends with; ``converged`` and ``iterations`` of
-    its record are set. ``pull`` is the place of a preferred posture: None, or a kernel that is
-    called with the rows and ``count`` and fills in the rows ``pull``: what an iteration adds to the
-    base and to the joints of the arm at its iterate ``q``, zero for what is locked.
+    its record are set. ``pull`` is None, or a kernel that is called with rows, ``count``, robot and
+    runs and fills in the rows ``pull``: what an iteration adds to the base and to the joints of the
+    arm at its iterate ``q``, zero for what is locked.
     """
     at, iteration = slots.at[0], 0
     square = largest_square(robot.model.correction_tolerance)
@@ -393,7 +394,7 @@ def descend_to_goals(slots: Any, count: int, robot: Any, runs: Any, pull: Any) -
         find_statuses(at, count, square)
         ended = count
         if iteration < robot.model.max_iterations:
-            ended, near = descend(at, count, robot, pull)
+            ended, near = descend(at, count, robot, runs, pull)
         if ended > 0:
             for slot in range(count - 1, -1, -1):
                 if at.status[slot] == GOING and iteration < robot.model.max_iterations:
@@ -409,6 +410,60 @@ def descend_to_goals(slots: Any, count: int, robot: Any, runs: Any, pull: Any) -
                 if ended == 0:
                     break
         iteration += 1
+
+
+@inner
+def project(v: Any, x: Any, y: Any) -> None:
+    """Project joint changes ``v`` onto the null space of a Jacobian with the rows ``x`` and ``y``.
+
+    v −= J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺. A singular value below a millionth of the larger counts as 0.
+    """
+    a, b, c, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(len(v)):
+        a, b, c = a + x[j] * x[j], b + x[j] * y[j], c + y[j] * y[j]
+        along_x, along_y = along_x + x[j] * v[j], along_y + y[j] * v[j]
+    # J Jᵀ = (a, b; b, c) has the eigenvalues larger and determinant / larger.
+    larger = 0.5 * (a + c) + math.sqrt(0.25 * (a - c) * (a - c) + b * b)
+    determinant = a * c - b * b
+    back_x, back_y = 0.0, 0.0
+    if determinant > _RANK * larger * larger:
+        back_x = (c * along_x - b * along_y) / determinant
+        back_y = (a * along_y - b * along_x) / determinant
+    elif larger > 0.0:
+        u_x, u_y = (larger - c, b) if a > c else (b, larger - a)
+        square = u_x * u_x + u_y * u_y
+        share = (u_x * along_x + u_y * along_y) / (larger * square)
+        back_x, back_y = share * u_x, share * u_y
+    for j in range(len(v)):
+        v[j] -= x[j] * back_x + y[j] * back_y
+
+
+@inner
+def pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
+    """Set what pulls each slot to the preferred posture p of its run: β N(q) (p − q)."""
+    tip = len(at.length)
+    for i in range(count):
+        run, v = runs[at.run[i]], at.pull[:, i]
+        x, y = at.jacobian[0, :, i], at.jacobian[1, :, i]
+        for j in range(BASE_DOF + tip):
+            v[j], x[j], y[j] = 0.0, 0.0, 0.0
+        if robot.free_x:
+            v[0], x[0] = run.preferred[0] - at.q[0, i], 1.0
+        if robot.free_y:
+            v[1], y[1] = run.preferred[1] - at.q[1, i], 1.0
+        for k in range(at.links[i]):
+            j = BASE_DOF + k
+            v[j] = run.preferred[at.first[i] + k] - at.q[j, i]
+            x[j], y[j] = joint_lever(at.x[:, i], at.y[:, i], k, tip)
+        project(v, x, y)
+        for j in range(BASE_DOF + tip):
+            v[j] *= run.pull
+
+
+@shared
+def pull_slots(slots: Any, count: int, robot: Any, runs: Any) -> None:
+    """**A** with the pull to the preferred posture in the first ``count`` slots."""
+    descend_to_goals(slots, count, robot, runs, pull_to_preferred)
 
 
 @shared

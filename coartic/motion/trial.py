@@ -51,6 +51,7 @@ from coartic.motion.movement import (
     correct_slots,
     explain_failure,
     move_slots,
+    pull_slots,
 )
 from coartic.robot import HANDS, Array, Configs, Hand, Hands, Points, Robot
 from coartic.tasks.task import WITHOUT_REACH, Task, check_hands, hands_of, letters_of
@@ -137,6 +138,12 @@ def correct(count: int, robot: Any, batch: Any) -> None:
     movements have. A preferred posture has its place in
     :func:`coartic.motion.movement.descend_to_goals`."""
     find_corrections(count, robot, batch)
+    make_corrections(count, robot, batch)
+
+
+@inlined
+def make_corrections(count: int, robot: Any, batch: Any) -> None:
+    """Move to what **A** has found."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     move_acting(count, False, robot, batch)
@@ -181,8 +188,8 @@ def move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
         move_slots(batch.slots, slot, stops, robot, batch.runs)
 
 
-@shared
-def find_corrections(count: int, robot: Any, batch: Any) -> None:
+@inlined
+def find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
     """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
     at, slot = batch.slots.at[0], 0
     for i in range(count):
@@ -193,7 +200,19 @@ def find_corrections(count: int, robot: Any, batch: Any) -> None:
             fill_row(run.target, run.q)
             load(at, slot, i, run, arm_of(robot, run.hand))
             slot += 1
-    correct_slots(batch.slots, slot, robot, batch.runs)
+    descend(batch.slots, slot, robot, batch.runs)
+
+
+@shared
+def find_corrections(count: int, robot: Any, batch: Any) -> None:
+    """Have the paper's **A** look for where to finish missed goals."""
+    find_by(count, robot, batch, correct_slots)
+
+
+@shared
+def find_pulled_corrections(count: int, robot: Any, batch: Any) -> None:
+    """Have **A** look with a pull to the preferred posture of each run."""
+    find_by(count, robot, batch, pull_slots)
 
 
 # ---- Trials with given targets ----

@@ -133,8 +133,11 @@ def correct(
     *,
     locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
+    pull: float = 0.0,
+    preferred: Array | None = None,
 ) -> Correction:
-    """:func:`coartic.motion.movement.correct`, with the Jacobian as a matrix."""
+    """:func:`coartic.motion.movement.correct`, with the Jacobian as a matrix; each iteration adds
+    β N(x) (p − x) with the pull β and a preferred posture p."""
     free = np.ones(robot.dof)
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
     q = np.array(q)
@@ -146,11 +149,48 @@ def correct(
             return Correction(q, False, iteration)
         step = model.gain * free * (robot.jacobian(q, hand).T @ error)
         before, q = q, q + step
+        if pull:
+            moving = [j for j in np.flatnonzero(free) if j < 2 or _is_of(robot, hand, j)]
+            toward = (preferred - before)[moving]
+            q[moving] += pull * null_space(robot, before, hand, moving) @ toward
         if (q == before).all():  # a stationary point away from the goal: it stays for ever
             return Correction(q, False, iteration + 1)
     error = goal - robot.forward_kinematics(q, hand)
     converged = math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance
     return Correction(q, converged, model.max_iterations)
+
+
+def _is_of(robot: Robot, hand: Hand, joint: int) -> bool:
+    return joint in np.arange(robot.dof)[robot.joints(hand)]
+
+
+def null_space(robot: Robot, q: Array, hand: Hand, joints: Sequence[int]) -> Array:
+    """N(q) = I − J⁺J of a hand over some joints, by singular values."""
+    jacobian = robot.jacobian(q, hand)[:, joints]
+    return np.asarray(np.eye(len(joints)) - np.linalg.pinv(jacobian, rcond=1e-6) @ jacobian)
+
+
+def preferred_posture(
+    task: Task,
+    condition: ExplorationCondition,
+    q: Array,
+    number: int,
+    hand: Hand,
+    values: dict[tuple[State, Hand], float],
+    targets: dict[tuple[State, Hand], Array],
+) -> Array:
+    """The preferred posture p at a goal that has become current, with the hand that is chosen."""
+    if condition.direction == "start":
+        return np.array(task.q0)
+    p = np.array(q)
+    following: State = (number + 1, hand)
+    stored = {each: values[following, each] for each in HANDS if (following, each) in values}
+    if condition.direction == "next-goal" and number + 1 < len(task.goals) and stored:
+        best = max(stored, key=lambda each: stored[each])
+        middle = (q + targets[following, best]) / 2
+        explores = _explored(task, condition, best)
+        p[explores] = middle[explores]
+    return p
 
 
 def learn(
@@ -174,6 +214,9 @@ def learn(
     ticks = corrections = iterations = 0
     by_trial = np.zeros(trials, dtype=np.int64)
     for trial in range(trials):
+        drift = condition.drifts[0]
+        if trial and len(condition.drifts) > 1:
+            drift = condition.drifts[int(rng.random() * len(condition.drifts))]
         q = np.array(task.q0)
         total = 0
         previous: Hand | None = None
@@ -185,7 +228,9 @@ def learn(
             if trial == 0:
                 hand = first_hands[number]
             else:
-                hand = _choose(task, condition, q, goal, state, values, rng)
+                hand, spent = _choose(task, condition, q, goal, state, values, rng, model)
+                iterations += spent
+            p = preferred_posture(task, condition, q, number, hand, values, targets)
             has_target = (state, hand) in targets
             if trial == 0 and start:
                 target = start[number].target
@@ -193,7 +238,7 @@ def learn(
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks
             elif has_target:
-                target = _explore(task, condition, q, hand, targets[state, hand], rng)
+                target = _explore(task, condition, q, hand, targets[state, hand], rng, drift, p)
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks
@@ -203,8 +248,9 @@ def learn(
                 if has_target and not condition.corrects:
                     break
                 correction = correct(
-                    task.robot, q, hand, goal, locked_base=task.locked_base, model=model
-                )
+                    task.robot, q, hand, goal, locked_base=task.locked_base, model=model,
+                    pull=condition.pull if trial else 0.0, preferred=p,
+                )  # fmt: skip
                 iterations += correction.iterations
                 if not correction.converged:
                     break
@@ -249,15 +295,23 @@ def _choose(
     state: State,
     values: dict[tuple[State, Hand], float],
     rng: np.random.Generator,
-) -> Hand:
+    model: MotionModel,
+) -> tuple[Hand, int]:
+    """The hand, and the iterations of the corrective process that the choice takes."""
     hands = [hand for hand in HANDS if hand in condition.hands]
     if condition.hand_exploration != "none" and rng.random() < condition.epsilon:
+        if condition.hand_exploration == "nearest-posture":
+            locked = task.locked_base
+            each = [correct(task.robot, q, hand, goal, locked_base=locked, model=model)
+                    for hand in hands]  # fmt: skip
+            far = [_distance(found.q, q) if found.converged else math.inf for found in each]
+            return hands[far.index(min(far))], sum(found.iterations for found in each)
         if condition.hand_exploration == "closest":
             near = [_distance(task.robot.forward_kinematics(q, hand), goal) for hand in hands]
             if len(hands) == 1 or abs(max(near) - min(near)) > 1e-9:
-                return hands[int(np.argmin(near))]
-        return hands[int(rng.random() * len(hands))]
-    return max(hands, key=lambda hand: values.get((state, hand), -math.inf))
+                return hands[int(np.argmin(near))], 0
+        return hands[int(rng.random() * len(hands))], 0
+    return max(hands, key=lambda hand: values.get((state, hand), -math.inf)), 0
 
 
 def _explore(
@@ -267,16 +321,33 @@ def _explore(
     hand: Hand,
     stored: Array,
     rng: np.random.Generator,
+    drift: float,
+    p: Array,
 ) -> Array:
     other: Hand = "left" if hand == "right" else "right"
     target = np.array(stored)
-    explored = np.full(task.robot.dof, condition.modify_chosen)
-    explored[task.robot.joints(other)] = condition.modify_other
-    explored[:2] &= ["x" not in task.locked_base, "y" not in task.locked_base]
+    explored = _explored(task, condition, hand)
+    if drift:
+        projected = [
+            joint
+            for joint in np.flatnonzero(explored)
+            if joint < 2 or _is_of(task.robot, hand, joint)
+        ]
+        d = np.where(explored, p - stored, 0.0)
+        d[projected] = null_space(task.robot, stored, hand, projected) @ d[projected]
+        target += drift * d
     if not condition.modify_other:
         target[task.robot.joints(other)] = q[task.robot.joints(other)]
     target[explored] += condition.noise_sd * rng.standard_normal(int(explored.sum()))
     return target
+
+
+def _explored(task: Task, condition: ExplorationCondition, hand: Hand) -> NDArray[np.bool_]:
+    other: Hand = "left" if hand == "right" else "right"
+    explored = np.full(task.robot.dof, condition.modify_chosen)
+    explored[task.robot.joints(other)] = condition.modify_other
+    explored[:2] &= ["x" not in task.locked_base, "y" not in task.locked_base]
+    return explored
 
 
 def _distance(a: Array, b: Array | tuple[float, float]) -> float:
