@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from coartic.analysis.methods import CONDITION_OF, EC1, KNOWN_METHODS, LEARNERS, title_of
+from coartic.analysis.methods import (
+    CONDITION_OF,
+    EC1,
+    INFORMED_LEARNERS,
+    KNOWN_METHODS,
+    LEARNERS,
+    title_of,
+)
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, METHOD_PREFIX
 from coartic.method import Information
@@ -107,14 +114,14 @@ def joined_conditions(
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield label and row of the learner over one-armed and two-armed tasks together: under EC1,
     and on tasks for two arms under a condition that draws hands at random."""
-    one_armed = {cell.task for cell in cells.get(EC1, ())}
-    for label in LEARNERS:
-        two_armed = {cell.task for cell in cells.get(label, ())}
-        draws_hands = CONDITIONS[CONDITION_OF[label]].hand_exploration == "random"
-        if draws_hands and two_armed and one_armed - two_armed:
-            both = f"{CONDITION_OF[EC1]}, {CONDITION_OF[label]}"
-            row = {"parts": (EC1, label), "title": f"learner ({both})"}
-            yield f"{METHOD_PREFIX.rstrip('/')} ({both})", rows[label] | row
+    drawing = [x for x in LEARNERS if CONDITIONS[CONDITION_OF[x]].hand_exploration == "random"]
+    for one, two in (*((EC1, label) for label in drawing), INFORMED_LEARNERS):
+        one_armed, two_armed = ({cell.task for cell in cells.get(each, ())} for each in (one, two))
+        if two_armed and one_armed - two_armed:
+            both = f"{CONDITION_OF[one]}, {CONDITION_OF[two]}"
+            algorithm = rows[two]["algorithm"]
+            row = {"parts": (one, two), "title": f"{algorithm} ({both.replace('-informed', '')})"}
+            yield f"{METHOD_PREFIX.rstrip('/')} ({both})", rows[two] | row
 
 
 def looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:

@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 from coartic import Task
 from coartic.internal.text import one_line
-from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
+from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
 
-CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in (*CONDITIONS, *ABLATIONS)}
+CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
 """Exploration conditions and ablations of the learner by the id of the method."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
 """Ids of the learner under the paper's conditions, EC1 for one arm; later ones explore more."""
+INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
+"""Ids of the informed learner, for one arm and for two."""
 RANDOM_SEARCH = "random-search"
 """Id of random search: the best of random targets around those of the corrective process."""
 INITIAL = "corrective-alone/given"

@@ -21,7 +21,7 @@ from coartic.benchmarks.method_files import begin_reader
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, plain, unknown
 from coartic.internal.toml_files import check_file
-from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
+from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
 from coartic.runs.plan import SEARCH
 
@@ -93,7 +93,7 @@ def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) 
     """Add methods by id. Raises CoarticError for an id that is reserved or taken, or that differs
     from another name in case alone."""
     for info in infos:
-        names = (*registered, *CONDITIONS, *ABLATIONS, *NAMES)
+        names = (*registered, *EVERY_CONDITION, *NAMES)
         why = ""
         if info.name.startswith(RESERVED):
             ours = " or ".join(map(repr, RESERVED))
@@ -113,10 +113,10 @@ def methods_named(name: str, registered: Registry) -> list[str]:
 
     Raises CoarticError for an unknown name.
     """
-    name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | ABLATIONS else name
+    name = f"{METHOD_PREFIX}{name}" if name in EVERY_CONDITION else name
     named = [method for method in registered if fnmatchcase(method, name)]
     if not named:
-        raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *ABLATIONS]))
+        raise CoarticError(unknown("method", name, [*registered, *EVERY_CONDITION]))
     return named
 
 

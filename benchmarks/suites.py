@@ -27,20 +27,23 @@ from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
 Scalar = bool | int | float | str
+Value = Scalar | tuple[float, ...]
 TaskNamed = Callable[[str], Task]
 """A function that returns the task of a name or of a file."""
 
 
-def plain_scalar(value: Any) -> Scalar:
+def plain_value(value: Any) -> Value:
     """Return the value of a parameter. Raises an error for any other value."""
-    is_finite = not isinstance(value, float) or math.isfinite(value)
-    if isinstance(value, bool | int | float | str) and is_finite:
+    numbers = value if isinstance(value, list | tuple) else [value]
+    if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
+        return value if value is numbers[0] else tuple(map(float, numbers))
+    if isinstance(value, str):
         return value
-    problem = "should be true, false, a finite number or a text"
+    problem = "should be true, false, a finite number, a text or a list of finite numbers"
     raise PydanticCustomError("scalar", "{text}", {"text": problem})
 
 
-_Value = Annotated[Scalar, PlainValidator(plain_scalar)]
+_Value = Annotated[Value, PlainValidator(plain_value)]
 _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
-    from coartic.learner.conditions import ABLATIONS, CONDITIONS, ExplorationCondition
+    from coartic.learner.conditions import ABLATIONS, CONDITIONS, INFORMED, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
     from coartic.learner.learning_run import LearningRun
     from coartic.method import BudgetError, MethodError, UndeclaredError
@@ -36,6 +36,7 @@ __version__ = "2.0.0"
 __all__ = [
     "ABLATIONS",
     "CONDITIONS",
+    "INFORMED",
     "PAPER",
     "Arm",
     "BudgetError",
@@ -79,7 +80,7 @@ __all__ = [
 
 _HOMES = {
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
-    "learner.conditions": ("CONDITIONS", "ABLATIONS", "ExplorationCondition"),
+    "learner.conditions": ("CONDITIONS", "ABLATIONS", "INFORMED", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),
     "learner.learning_run": ("LearningRun",),
     "method": ("BudgetError", "MethodError", "UndeclaredError"),

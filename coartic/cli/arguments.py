@@ -83,11 +83,11 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
 def method_names(registered: Registry) -> Mapping[str, str]:
     """Return the names that people use for methods, by id; empty for a method without a name."""
     from coartic.analysis.methods import title_of
-    from coartic.learner.conditions import ABLATIONS, CONDITIONS
+    from coartic.learner.conditions import EVERY_CONDITION
 
     names = {name: title_of(name) for name in registered}
     named = {name: words if words != name else "" for name, words in names.items()}
-    return named | dict.fromkeys((*CONDITIONS, *ABLATIONS), "")
+    return named | dict.fromkeys(EVERY_CONDITION, "")
 
 
 def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:

@@ -9,18 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from itertools import chain
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from coartic.learner.conditions import (
-    ABLATIONS,
     CONDITIONS,
+    EVERY_CONDITION,
     METHOD_PREFIX,
     MOST_NOISE,
     Counted,
+    Credit,
+    Direction,
+    Drifts,
     ExplorationCondition,
+    HandExploration,
+    Learned,
+    Share,
 )
 from coartic.learner.learning import TRIALS, learn_many
 from coartic.learner.learning_run import CORRECTIONS
@@ -61,6 +66,69 @@ class SubtaskParameters(DualProcessParameters):
     total reward."""
 
 
+class InformedParameters(DualProcessParameters):
+    """Parameters of the informed learner; the defaults are those of its condition."""
+
+    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.01
+    """SD of η, length unit (base) or rad (joints)."""
+    drift: Drifts = 1.0
+    """κ: share of the way to the preferred posture by which the mean of exploration moves; of a
+    list each trial draws one."""
+    pull: Share = 0.0
+    """β: the same share in each iteration of the corrective process."""
+    direction: Direction = "next-goal"
+    """The preferred posture: halfway to the stored target of the next goal, where the robot is, or
+    where the trial began."""
+
+
+class CustomParameters(Parameters):
+    """Any exploration condition: one of the paper's, and the fields that are other than there."""
+
+    trials: Annotated[int, Field(gt=0)] = TRIALS
+    """Trials of a run."""
+    base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
+    """The paper's condition that is changed."""
+    modify_chosen: bool | None = None
+    """Whether noise moves the targets of the base and of the arm that is to hit."""
+    modify_other: bool | None = None
+    """Whether noise moves the targets of the other arm."""
+    hand_exploration: HandExploration | None = None
+    """How hands are explored."""
+    epsilon: Share | None = None
+    """ε: probability, for each goal, of exploring the hand."""
+    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] | None = None
+    """SD of η, length unit (base) or rad (joints)."""
+    corrects: bool | None = None
+    """Whether the corrective process finishes what a stored target misses."""
+    learned: Learned | None = None
+    """What is learned in the end: the best trial, or the replay."""
+    credit: Credit | None = None
+    """What is credited: the reward of the whole trial, or returns of subtasks."""
+    discount: Share | None = None
+    """γ of a goal's return."""
+    counted: Counted | None = None
+    """Subtasks whose rewards the return counts."""
+    drift: Drifts | None = None
+    """κ of informed exploration."""
+    pull: Share | None = None
+    """β of informed correction."""
+    direction: Direction | None = None
+    """The preferred posture."""
+
+    @model_validator(mode="after")
+    def check_condition(self) -> Self:
+        """Raise ValueError for fields that contradict each other."""
+        condition_of(CONDITIONS[self.base], self)
+        return self
+
+
+def condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
+    """Return a condition with the fields that parameters set."""
+    names = {field.name for field in fields(ExplorationCondition)}
+    given = parameters.model_dump(include=names, exclude_none=True)
+    return replace(base, **given)
+
+
 class DualProcess(Method):
     """Trial and error over the corrective process (paper, Figure 3)."""
 
@@ -69,11 +137,15 @@ class DualProcess(Method):
         "A. Shah, A. G. Barto, A. H. Fagg (2013). A dual process account of coarticulation "
         "in motor skill acquisition. Journal of Motor Behavior."
     )
-    Parameters = DualProcessParameters
+    Parameters: ClassVar[type[Parameters]] = DualProcessParameters
+
+    def rules(self) -> ExplorationCondition:
+        """Return the exploration condition with the parameters."""
+        return condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
-        """Why the condition does not apply to a task, or None where it does."""
-        return self.condition.why_not(task)
+        """Return why the condition does not apply to a task, None where it does."""
+        return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
         """Learn; the solution is the best trial's, or the replay's if that is learned."""
@@ -89,9 +161,7 @@ class DualProcess(Method):
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Learn in each session; a solution is the best trial's, or the replay's."""
-        parameters: DualProcessParameters = self.parameters
-        of_condition = parameters.model_dump(include={f.name for f in fields(ExplorationCondition)})
-        condition = replace(self.condition, **of_condition)
+        parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
         task, model = tasks[0], sessions[0].model
         for session in sessions:
@@ -123,6 +193,9 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
     parameters: type[DualProcessParameters] = DualProcessParameters
     citation = DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
+    if condition.is_informed:  # to move in the null space of a hand
+        information |= {Information.JACOBIAN}
+        parameters = InformedParameters
     if condition.hand_exploration == "closest":  # to find the closest hand
         information |= {Information.GOALS, Information.FORWARD_KINEMATICS}
     if condition.credit == "subtask":
@@ -151,6 +224,33 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
     )
 
 
-METHODS: tuple[type[DualProcess], ...] = tuple(
-    map(method_for, chain(CONDITIONS.values(), ABLATIONS.values()))
+class CustomDualProcess(DualProcess):
+    """The learner under any exploration condition, with all information that a condition may use.
+
+    Its parameters are the fields of a condition, so that a suite can change one assumption.
+    """
+
+    name = f"{METHOD_PREFIX}custom"
+    title = "Dual-process learner, any exploration condition"
+    information = frozenset(
+        {
+            Information.CORRECTIVE_PROCESS,
+            Information.REWARD_BY_TRIAL,
+            Information.REWARD_BY_SUBTASK,
+            Information.GOALS,
+            Information.FORWARD_KINEMATICS,
+            Information.JACOBIAN,
+        }
+    )
+    Parameters = CustomParameters
+
+    def rules(self) -> ExplorationCondition:
+        """Return the base condition with the fields that the parameters change."""
+        base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
+        return condition_of(base, self.parameters)
+
+
+METHODS: tuple[type[DualProcess], ...] = (
+    *map(method_for, EVERY_CONDITION.values()),
+    CustomDualProcess,
 )
