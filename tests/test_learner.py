@@ -3,6 +3,7 @@
 import doctest
 import itertools
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,8 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.analysis import load
+from coartic.benchmarks import run_suite
 from coartic.learner import learning
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
@@ -399,3 +402,47 @@ def test_a_goal_where_the_hand_is_already_takes_no_tick():
     run = learn(task, "EC3", seed=0, trials=1)
     assert (run.reward, run.hands, [m.ticks for m in run.solution]) == (0, "RR", [0, 0])
     assert run.execute().reward == 0
+
+
+OWN_SUITE = """\
+name = "mine"
+title = "One assumption changed"
+description = "The learner under conditions of my own."
+runs = 2
+trials = 40
+
+[[blocks]]
+tasks = ["two-armed-1"]
+methods = ["dual-process/custom"]
+parameters = {PARAMETERS}
+"""
+
+
+def test_any_condition_is_a_setting_of_a_method(tmp_path):
+    """A suite changes fields of a condition, among them a list of drifts."""
+    suite = tmp_path / "mine.toml"
+    fields = '{ base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01 }'
+    suite.write_text(OWN_SUITE.replace("{PARAMETERS}", fields), encoding="utf-8")
+    run_suite(str(suite), tmp_path / "results")
+    rules = replace(CONDITIONS["EC3"], modify_other=True, epsilon=0.4, drift=(0.0, 0.3), pull=0.01)
+    runs = load(tmp_path / "results").runs
+    due = [learn("two-armed-1", rules, seed=int(seed), trials=40).reward for seed in runs.seed]
+    assert runs.reward.tolist() == due
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ('{ direction = "stay" }', "nothing goes by: set drift or pull above 0"),
+        ('{ credit = "subtask" }', "set learned to 'replay'"),
+        ("{ drift = -1 }", "drift"),
+        ("{ drift = [] }", "list of finite numbers"),
+        ('{ base = "EC9" }', "'EC1', 'EC2', 'EC3' or 'EC4'"),
+        ("{ sigma = 0.1 }", "unknown"),
+    ],
+)
+def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, tmp_path):
+    suite = tmp_path / "mine.toml"
+    suite.write_text(OWN_SUITE.replace("{PARAMETERS}", fields), encoding="utf-8")
+    with pytest.raises(CoarticError, match=re.escape(sentence)):
+        run_suite(str(suite), tmp_path / "results")

@@ -172,7 +172,9 @@ ABLATIONS = {
 }
 
 INFORMED = {
-    f"{base}-informed": replace(CONDITIONS[base], id=f"{base}-informed", drift=1.0, noise_sd=0.01)
+    f"{base}-informed": replace(
+        CONDITIONS[base], id=f"{base}-informed", drift=1.0, noise_sd=0.01, epsilon=0.4
+    )
     for base in ("EC1", "EC4")
 }
 """Informed conditions, whose fields were chosen on development instances alone, for the smallest

@@ -69,6 +69,8 @@ class SubtaskParameters(DualProcessParameters):
 class InformedParameters(DualProcessParameters):
     """Parameters of the informed learner; the defaults are those of its condition."""
 
+    epsilon: Share = 0.4
+    """ε: probability, for each goal, of exploring the hand. EC1 has one hand."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.01
     """SD of η, length unit (base) or rad (joints)."""
     drift: Drifts = 1.0
