@@ -377,7 +377,7 @@ def test_a_copy_that_is_no_task_is_refused(update, message):
 def test_methods_of_the_learner():
     """The condition that takes the closest hand uses the goals; long runs go in small batches."""
     information = {method.name for method in METHODS if Information.GOALS in method.information}
-    assert information == {"dual-process/EC2"}
+    assert information == {"dual-process/EC2", "dual-process/custom"}
     method, parameters = METHODS[0], METHODS[0].Parameters
     sizes = [method(parameters(trials=n)).most_together() for n in (1000, 10**6, 10**7)]
     assert sizes == [SLOTS, 4, 1]
