@@ -3,12 +3,14 @@
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from coartic import MotionModel, Movement, execute, learn, load_task, trajectory
 from coartic.baselines.random_search import RandomSearch
+from coartic.learner.conditions import load_condition
 from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play.page import FOLDER
 from tests.support.strategies import (
@@ -148,33 +150,59 @@ def test_straight_solutions_are_executed_tick_by_tick():
     assert completed > 10
 
 
-LEARN = """(cases) => cases.map(([task, id, seed, trials]) => {
+LEARN = """(cases) => cases.map(([task, id, drift, seed, trials]) => {
   const problem = coartic.problem_of(task);
   const [condition, credit] = id.split("-");
-  const rules = { ...coartic.CONDITIONS[condition], ...(credit && { credit }) };
+  const rules = { ...coartic.CONDITIONS[condition], drift, ...(credit && { credit }) };
   const learner = new coartic.Learner(problem, rules, BigInt(seed));
   const rewards = Array.from({ length: trials }, () => learner.step().reward);
-  const learned = coartic.letters_of(learner.learned().hands);
-  return { rewards, replay: learner.replay().reward, learned };
+  const { hands, reached } = learner.learned();
+  return { rewards, replay: learner.replay().reward, learned: coartic.letters_of(hands), reached };
 })"""
 RUNS = [
-    *((task, condition, 7) for task, condition in PAPER_CELLS),
-    ("descending", "EC1-subtask", 2**100 + 3),
-    ("two-armed-1", "EC4-subtask", 0),
-    ("two-armed/v1/i003", "EC4", 2**63 - 1),
+    *((task, condition, 0, 7) for task, condition in PAPER_CELLS),
+    ("descending", "EC1-subtask", 0, 2**100 + 3),
+    ("two-armed-1", "EC4-subtask", 0, 0),
+    ("two-armed/v1/i003", "EC4", 0, 2**63 - 1),
+    ("ascending", "EC1", 0.03, 1),
+    ("descending", "EC1", 1, 2),
+    ("descending", "EC1-subtask", 0.3, 3),
+    ("two-armed-1", "EC2", 0.1, 4),  # the base is on a rail
+    ("two-armed-1", "EC3", 1, 5),
+    ("two-armed-1", "EC4", 0.3, 6),
+    ("two-armed-2", "EC3", 0.3, 7),
+    ("two-armed-2", "EC4", 1, 8),
+    ("long/v1/i000", "EC4", 0.3, 9),
+    ("redundancy/v1/i007", "EC1", 0.3, 10),
+    ("uneven", "EC4", 0.3, 11),
+    ("stiff", "EC4", 0.3, 12),
 ]
+OWN = {
+    "uneven": uneven_task(locked_base=["x"]),
+    # The base is locked, and the left arm has one joint: its hand has no null space.
+    "stiff": uneven_task(
+        locked_base=["x", "y"], goals=[[2.5, 1.0], [-0.59, 0.835], [2.0, -1.0]], initial_hands="RLR"
+    ),
+}
 
 
 def test_the_same_seed_learns_the_same_trial_by_trial():
-    """Ten runs of 4000 trials, draws included."""
+    """Runs of 4000 trials, draws included, with and without drift."""
     trials = 4000
-    cases = [(content(load_task(task)), of, str(seed), trials) for task, of, seed in RUNS]
-    for (task, of, seed), run in zip(RUNS, node(LEARN, cases), strict=True):
-        ours = learn(task, of, seed=seed, trials=trials)
+    tasks = [OWN.get(name) or load_task(name) for name, *_ in RUNS]
+    cases = [
+        (content(task), of, drift, str(seed), trials)
+        for task, (_, of, drift, seed) in zip(tasks, RUNS, strict=True)
+    ]
+    for task, (_, of, drift, seed), run in zip(tasks, RUNS, node(LEARN, cases), strict=True):
+        condition = replace(load_condition(of), drift=drift)
+        ours = learn(task, condition, seed=seed, trials=trials)
         rewards = [None if reward is np.ma.masked else int(reward) for reward in ours.rewards]
         assert run["rewards"] == rewards
         assert run["replay"] == ours.replay_reward
         assert run["learned"] == ours.hands
+        reached = ours.execute().configurations
+        np.testing.assert_allclose(run["reached"], reached, rtol=0, atol=1e-9)
         assert len(set(rewards)) > 10
 
 

@@ -2,12 +2,13 @@
 
 import re
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from coartic import Movement, Task, corrective_trial, execute, learn, load_task
+from coartic import CONDITIONS, Movement, Task, corrective_trial, execute, learn, load_task
 from coartic.analysis.signatures.context_tests import standardised_posture_difference
 from coartic.baselines.random_search import RandomSearch
 from coartic.motion.solution import hand_sequences, initial_hands
@@ -79,7 +80,7 @@ def changed_to(page, address, state):
 
 
 def trials_made(page):
-    return int(re.sub(r"\D", "", text(page, "progress")))
+    return int(re.sub(r"\D", "", text(page, "progress").partition(",")[0]))
 
 
 def test_it_is_one_small_file_without_addresses():
@@ -255,6 +256,52 @@ def test_the_link_holds_the_whole_state(opened, address):
     assert page.get_by_role("button", name="Goal 2, at 6, -12.").count() == 1
 
 
+def shown_condition(page):
+    """The learner's condition, by the Python that the page shows for it."""
+    code = page.locator("[data-is=python]").text_content()
+    return eval(code, {"CONDITIONS": CONDITIONS, "replace": replace})
+
+
+@pytest.mark.parametrize(
+    ("state", "fields"),
+    [
+        ("preset=3&drift=0.3", {"drift": 0.3}),
+        ("preset=3&explores=EC3&reward=movement&drift=1", {"drift": 1.0, "credit": "subtask"}),
+        ("preset=3", {}),
+    ],
+)
+def test_the_learner_is_that_of_the_python_that_the_page_shows(opened, state, fields):
+    page = settled(opened(state))
+    condition = shown_condition(page)
+    assert {name: getattr(condition, name) for name in fields} == fields
+    runs = [learn("two-armed-1", condition, seed=seed, trials=TRIALS) for seed in range(5)]
+    assert ticks(page, "The learner") == -median_run(runs).reward
+
+
+def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
+    page = settled(opened("preset=2&others=&trials=100"))
+    dial = page.get_by_role("slider", name="From trial and error to planning")
+    by_drift = [ticks(page, "The learner")]
+    dial.focus()
+    for drift in ("0.03", "0.1", "0.3", "1"):
+        page.keyboard.press("ArrowRight")
+        by_drift.append(ticks(settled(page), "The learner"))
+        assert f"drift={drift}&" in page.url
+        assert drift in dial.get_attribute("aria-valuetext")
+        assert text(page, "progress").endswith(f"drift {drift}")
+    assert by_drift == sorted(by_drift, reverse=True)  # the same trials find better movements
+    assert by_drift[3] < by_drift[0]
+    comes_back(page)
+    page.get_by_label("Task").select_option("1")
+    assert "drift=1" in settled(page).url
+    page.get_by_role("radio", name="planner").check()
+    assert not dial.is_visible()
+    for nonsense in ("x", "-1", "0.2", "1e9", "NaN", "Infinity", ""):
+        changed_to(page, address, f"preset=2&others=&trials=100&drift={nonsense}")
+        assert shown_condition(page) == CONDITIONS["EC1"]
+        assert ticks(page, "The learner") == by_drift[0]
+
+
 def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back(opened):
     page = settled(opened("who=plan&tick=200"))
     state, second = page.url, ticks(page, "Orange")
@@ -351,6 +398,7 @@ def test_a_goal_is_dragged_by_a_finger(opened):
     [
         (1280, "light", ""),
         (390, "dark", "preset=4&who=you"),
+        (390, "light", "preset=3&drift=0.03&reward=movement"),
     ],
 )
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme, state):

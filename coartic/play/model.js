@@ -98,6 +98,17 @@ function joint_positions(problem, q, hand) {
   return Array.from({ length: arm.links.length + 1 }, (_, k) => [xs[k], ys[k]]);
 }
 
+/* coartic/robot.py: how a point of an arm, its hand or an elbow, moves with some joints, a row each. Fills xs, ys. */
+function jacobian(problem, q, hand, joints, tip = problem.arms[hand].links.length) {
+  const arm = problem.arms[hand];
+  chain(q, arm, xs, ys);
+  return joints.map((j) => {
+    if (j < BASE_DOF) return j ? [0, 1] : [1, 0];
+    const k = j - arm.first;
+    return k >= 0 && k < tip ? [-(ys[tip] - ys[k]), xs[tip] - xs[k]] : [0, 0];
+  });
+}
+
 /* coartic/learner/kernel.py */
 function distance_to_goal(problem, q, number, hand) {
   const arm = problem.arms[hand];
@@ -192,6 +203,29 @@ function correct(problem, q, number, hand) {
     }
     if (!moved) return false; // a stationary point
   }
+}
+
+const RANK = 1e-12; // square of the ratio of singular values up to which the smaller counts as 0
+
+/* coartic/motion/movement.py: project joint changes `v` themselves onto the null space of a Jacobian, a row for each joint. */
+function project(v, rows) {
+  let [a, b, c, along_x, along_y] = [0, 0, 0, 0, 0];
+  rows.forEach(([x, y], i) => {
+    [a, b, c] = [a + x * x, b + x * y, c + y * y];
+    [along_x, along_y] = [along_x + x * v[i], along_y + y * v[i]];
+  });
+  const larger = 0.5 * (a + c) + Math.sqrt(0.25 * (a - c) * (a - c) + b * b);
+  const determinant = a * c - b * b;
+  let [back_x, back_y] = [0, 0];
+  if (determinant > RANK * larger * larger) {
+    back_x = (c * along_x - b * along_y) / determinant;
+    back_y = (a * along_y - b * along_x) / determinant;
+  } else if (larger > 0) {
+    const [u_x, u_y] = a > c ? [larger - c, b] : [b, larger - a];
+    const share = (u_x * along_x + u_y * along_y) / (larger * (u_x * u_x + u_y * u_y));
+    [back_x, back_y] = [share * u_x, share * u_y];
+  }
+  rows.forEach(([x, y], i) => { v[i] -= x * back_x + y * back_y; });
 }
 
 /* ---- Trials ---- */
@@ -443,7 +477,7 @@ class Generator {
 
 /* coartic/learner/conditions.py */
 const condition = (hands, modify_other, hand_exploration) => ({
-  hands, modify_other, hand_exploration, epsilon: 0.2, noise_sd: 0.05, credit: "overall",
+  hands, modify_other, hand_exploration, epsilon: 0.2, noise_sd: 0.05, credit: "overall", drift: 0,
 });
 const CONDITIONS = {
   EC1: condition([RIGHT], false, "none"),
@@ -488,16 +522,31 @@ class Learner {
     return this.greedy_hand(number, previous);
   }
 
-  /* q^t = q*(s, a) + η; null where no target is stored. */
+  /* The preferred posture at `q`, with the hand that is chosen: halfway to the stored target of the next goal. */
+  prefer(q, number, hand) {
+    if (number + 1 === this.problem.goals.length) return q;
+    const next = this.greedy_hand(number + 1, hand);
+    const stored = this.targets[number + 1][hand][next];
+    return stored ? q.map((value, j) => (this.explored[next][j] ? 0.5 * (value + stored[j]) : value)) : q;
+  }
+
+  /* Move the mean t of exploration by κ N(t) (p − t), and an explored idle arm, whose rows are 0, by κ (p − t). */
+  drift(target, preferred, hand) {
+    const joints = target.flatMap((_, j) => (this.explored[hand][j] ? [j] : []));
+    const v = joints.map((j) => preferred[j] - target[j]);
+    project(v, jacobian(this.problem, target, hand, joints));
+    joints.forEach((j, i) => { target[j] += this.rules.drift * v[i]; });
+  }
+
+  /* q^t = mean + η, the mean from q*(s, a); null where no target is stored. */
   set_target(q, number, previous, hand, explore) {
     const stored = this.targets[number][previous][hand];
     if (!stored) return null;
-    const { rng, rules: { noise_sd } } = this;
+    const { rng, rules: { noise_sd, drift } } = this;
     const explored = this.explored[hand];
-    return stored.map((value, j) => {
-      if (!explored[j]) return q[j];
-      return explore ? value + noise_sd * rng.standard_normal() : value;
-    });
+    const target = stored.map((value, j) => (explored[j] ? value : q[j]));
+    if (explore && drift > 0) this.drift(target, this.prefer(q, number, hand), hand);
+    return target.map((value, j) => (explore && explored[j] ? value + noise_sd * rng.standard_normal() : value));
   }
 
   make_trial(explore) {
@@ -581,20 +630,14 @@ class RandomSearch {
 
 /* The way from a point of an arm, its hand or an elbow, to a place, and how that point moves with some joints. */
 function pull_of(problem, q, place, hand, joints, tip = problem.arms[hand].links.length) {
-  const arm = problem.arms[hand];
-  chain(q, arm, xs, ys);
+  const rows = jacobian(problem, q, hand, joints, tip);
   const dx = place[0] - xs[tip];
   const dy = place[1] - ys[tip];
-  const rows = joints.map((j) => {
-    if (j < BASE_DOF) return j ? [0, 1] : [1, 0];
-    const k = j - arm.first;
-    return k >= 0 && k < tip ? [-(ys[tip] - ys[k]), xs[tip] - xs[k]] : [0, 0];
-  });
   return { dx, dy, distance: Math.sqrt(dx * dx + dy * dy), rows };
 }
 
 /* Move `q` to a near posture, by some joints, with that point within `radius` of a place; whether it gets there. */
-function project(problem, q, place, hand, joints, radius, tip) {
+function bring_within(problem, q, place, hand, joints, radius, tip) {
   for (let round = 0; round < 60; round += 1) {
     const { dx, dy, distance, rows } = pull_of(problem, q, place, hand, joints, tip);
     if (distance <= radius + 1e-9) return true;
@@ -620,7 +663,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
   const radius = problem.radius * (1 - 1e-3);
   const corners = guess.map((corner) => corner.slice());
   const strides = corners.map(() => 1);
-  if (!corners.every((corner, k) => project(problem, corner, problem.goals[from + k], hands[k], joints, radius))) return null;
+  if (!corners.every((corner, k) => bring_within(problem, corner, problem.goals[from + k], hands[k], joints, radius))) return null;
   for (let round = 0; round < rounds && Math.max(...strides) > 1e-3; round += 1) {
     corners.forEach((here, k) => {
       const before = k ? corners[k - 1] : q;
@@ -637,7 +680,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
       }
       const there = here.map((value, j) => value + strides[k] * way[j]);
       const around = (corner) => distance_of(corner, before) + (after ? distance_of(corner, after) : 0);
-      const shorter = project(problem, there, problem.goals[from + k], hands[k], joints, radius) && around(there) < around(here) - 1e-9;
+      const shorter = bring_within(problem, there, problem.goals[from + k], hands[k], joints, radius) && around(there) < around(here) - 1e-9;
       strides[k] = shorter ? Math.min(1, 1.5 * strides[k]) : strides[k] / 2;
       if (shorter) corners[k] = there;
     });

@@ -7,6 +7,7 @@ const TRIALS = 10000; // of a run
 const PACE = 90; // ticks a second
 const PRACTICE = 1.05; // by which the trials shown grow in two pictures, at first
 const HOLD_S = 0.9; // at a hit
+const DRIFTS = [0, 0.03, 0.1, 0.3, 1]; // κ, from trial and error to planning
 const MOST_GOALS = 6;
 const FAR = 12; // length units or rad: no goal lies farther, no joint is turned more
 const STRIDE = 2; // length units, to a new goal
@@ -28,7 +29,7 @@ const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
    has the place from which a goal has just moved. Of `own` postures, each with its hand, one without joints is left to
    the robot. Before tick 0 the robots stand where they hit the goal they share, or you place yours. */
 const AT_FIRST = {
-  open: 0, preset: 0, who: "learner", mate: "learner", reward: "whole", explores: "EC4", ahead: 1, goals: null,
+  open: 0, preset: 0, who: "learner", mate: "learner", reward: "whole", explores: "EC4", drift: 0, ahead: 1, goals: null,
   others: null, announced: null, trials: 0, tick: -1, own: null, edited: 1,
 };
 
@@ -151,11 +152,22 @@ class Play {
 
   /* The learner's condition. */
   get rules() {
-    const { reward, explores } = this.state;
-    const two = this.problems[0].hands.length > 1;
+    const { reward, explores, drift } = this.state;
+    const [{ hands }] = this.problems;
     const chosen = Object.hasOwn(CONDITIONS, explores) ? explores : "EC4";
-    const rules = two ? CONDITIONS[chosen] : { ...CONDITIONS.EC1, hands: this.problems[0].hands };
-    return reward === "movement" ? { ...rules, credit: "subtask" } : rules;
+    const id = hands.length > 1 ? chosen : "EC1";
+    return { ...CONDITIONS[id], id, hands, drift, credit: reward === "movement" ? "subtask" : "overall" };
+  }
+
+  /* The same in Python. */
+  get python() {
+    const { id, hands, drift, credit } = this.rules;
+    const fields = [
+      ...(same(hands, CONDITIONS[id].hands) ? [] : [`hands=("${HANDS[hands[0]]}",)`]),
+      ...(credit === "subtask" ? ['credit="subtask"', 'learned="replay"'] : []),
+      ...(drift ? [`drift=${drift}`] : []),
+    ];
+    return fields.length ? `replace(CONDITIONS["${id}"], ${fields.join(", ")})` : `CONDITIONS["${id}"]`;
   }
 
   /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
@@ -567,8 +579,9 @@ class Play {
       return line;
     });
     this.find("score").replaceChildren(...scores);
+    const drift = state.drift ? `, drift ${state.drift}` : "";
     this.set("textContent", {
-      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") : "", play: this.playing ? "Pause" : "Play",
+      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", play: this.playing ? "Pause" : "Play",
       count: `${this.main.map((mover, k) => `${this.main.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${mover.last + 1}`).join(", ")} ticks`,
     });
     if (state.who === "you") [this.find("hand").value] = this.own[state.edited - 1];
@@ -724,14 +737,14 @@ class Play {
     /* By the joints beyond the part that was moved, or else by all. */
     const settle = (from) => [joints(mine, from, mine.links.length), [...free, ...joints(mine, 0, mine.links.length)]].some((some) => {
       const there = [...q];
-      return project(problem, there, problem.goals[goal], hand, some, 0.9 * problem.radius) && Object.assign(q, there);
+      return bring_within(problem, there, problem.goals[goal], hand, some, 0.9 * problem.radius) && Object.assign(q, there);
     });
     if (part === "base") {
       free.forEach((axis) => { q[axis] = to[axis]; });
       settle(0);
     } else {
       const [moved, k] = part;
-      project(problem, q, to, moved, joints(problem.arms[moved], 0, k), 0.01, k);
+      bring_within(problem, q, to, moved, joints(problem.arms[moved], 0, k), 0.01, k);
       if (moved === hand) settle(k);
     }
     this.state.own = this.own.with(goal, [hand, ...q.map((value) => Math.round(1e4 * value) / 1e4)]);
@@ -751,9 +764,9 @@ class Play {
     };
     /* The task as it is chosen. */
     const choose = (preset) => {
-      const { who, mate, reward, open } = this.state;
+      const { who, mate, reward, drift, open } = this.state;
       const live = Object.hasOwn(NAMES, who) ? who : this.first.who;
-      this.restore(written({ ...this.first, preset, who: live, mate, reward, open }, this.first));
+      this.restore(written({ ...this.first, preset, who: live, mate, reward, drift, open }, this.first));
       this.keep();
     };
     on("preset", "change", (event) => choose(Number(event.target.value)));
@@ -770,6 +783,7 @@ class Play {
     });
     on("stored", "change", (event) => { if (event.target.value) change("who", event.target.value); });
     ["reward", "explores"].forEach((name) => on(name, "change", (event) => change(name, event.target.value)));
+    on("drift", "input", (event) => change("drift", DRIFTS[event.target.value]));
     ["ahead", "edited"].forEach((name) => on(name, "change", (event) => change(name, Number(event.target.value))));
     on("two", "change", (event) => {
       const [first, ...rest] = this.state.goals;
@@ -850,6 +864,7 @@ class Play {
     state.announced = announced && announced.length ? announced : null;
     state.own = state.own && state.own.map(bounded);
     if (!(state.trials >= 1 && state.trials < TRIALS)) state.trials = 0;
+    if (!DRIFTS.includes(state.drift)) state.drift = 0;
     [state.tick, state.trials] = [state.tick, state.trials].map(Math.round);
     this.find("more").open = Boolean(state.open);
     this.results.clear();
@@ -872,7 +887,7 @@ class Play {
     };
     state.ahead = Math.max(0, Math.min(Math.round(state.ahead), state.goals.length - 1));
     state.edited = Math.max(1, Math.min(Math.round(state.edited), state.goals.length));
-    const { who, goals, others, explores, ahead, edited } = state;
+    const { who, goals, others, explores, drift, ahead, edited } = state;
     const runs = preset.runs || [];
     const one = preset.task.hands.length < 2;
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
@@ -880,15 +895,18 @@ class Play {
     fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => ticks).join(" and ")} ticks`])]);
     fill("ahead", goals.map((_, k) => [k, k ? `${k} goal${k > 1 ? "s" : ""} ahead` : "no goal ahead"]));
     fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
-    this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores });
+    this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores, drift: DRIFTS.indexOf(drift) });
+    this.find("drift").setAttribute("aria-valuetext", `drift ${drift}`);
+    this.find("python").textContent = this.python;
     ["who", "reward"].forEach((name) => this.find(name).querySelectorAll("input").forEach((input) => { input.checked = input.value === state[name]; }));
     this.find("two").checked = Boolean(others);
     this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
     const few = goals.length < 2;
     this.set("disabled", { reset: !changed && !state.own, two: few, fewer: few, announced: few, add: goals.length >= MOST_GOALS });
+    const other = who !== "learner";
     this.set("hidden", {
-      runs: !runs.length, "for-learner": who !== "learner", "for-two": who !== "learner" || one, "for-plan": who !== "plan",
-      "for-you": who !== "you", "by-hand": one,
+      runs: !runs.length, dial: other, "for-learner": other, "for-dial": other, "for-two": other || one,
+      "for-plan": who !== "plan", "for-you": who !== "you", "by-hand": one,
     });
   }
 
