@@ -146,8 +146,6 @@ def headline_methods(rows: pd.DataFrame) -> list[str]:
     single conditions.
     """
     kept = rows[rows.headline]
-    joined = kept.condition[kept.parts.map(len) > 1]
-    if len(joined):
-        most = max(joined.index, key=lambda label: [*CONDITIONS].index(joined[label]))
-        kept = kept[(kept.kind != "learner") | (kept.index == most)]
+    joined = kept[kept.parts.map(len) > 1].groupby("algorithm").tail(1)
+    kept = kept[~kept.algorithm.isin(joined.algorithm) | kept.index.isin(joined.index)]
     return [*(kept if len(kept) else rows).index]

@@ -10,7 +10,7 @@ from scipy import stats
 
 from coartic import Task, load_task
 from coartic.analysis import standings
-from coartic.analysis.method_frame import BY_TRIAL, WITHOUT_REWARD
+from coartic.analysis.method_frame import BY_TRIAL, WITHOUT_REWARD, headline_methods
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about
 from coartic.analysis.report.render import columns_of
@@ -409,3 +409,20 @@ def test_the_condition_with_the_highest_mean_says_which_hands_are_learned():
     rows = [row(f"dual-process/{name}", reward, hands=hands, initial_hands="RRRR")
             for name, (reward, hands) in learned.items()]  # fmt: skip
     assert changed_hands(study_of(rows)).endswith("on Two-armed 1 † from RRRR to LRLR.")
+
+
+def test_learners_over_all_tasks_stand_for_their_conditions():
+    """The paper's and the informed one, each under its conditions for one arm and for two."""
+    learner, informed = (
+        [f"dual-process/{name}{ending}" for name in ("EC1", "EC4")] for ending in ("", "-informed")
+    )
+    rewards = {
+        (task, label): [-400, -401, -402]
+        for one, two in (learner, informed)
+        for task, label in (("ascending", one), ("two-armed-1", two))
+    }
+    learned = study(rewards)
+    together = ["dual-process (EC1, EC4)", "dual-process (EC1-informed, EC4-informed)"]
+    assert headline_methods(learned.methods) == together
+    titles = ["learner (EC1, EC4)", "informed learner (EC1, EC4)"]
+    assert learned.methods.title[together].tolist() == titles
