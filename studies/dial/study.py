@@ -1,0 +1,189 @@
+"""Measure the dial from trial and error to planning on tasks that nobody tuned on.
+
+    python studies/dial/protocols.py results/dial
+    python studies/dial/study.py results/dial
+
+writes results.csv, claims.csv, figure.svg and the page, README.md; without a folder figure and
+page, of the stored tables.
+
+The *gain* of a run is the share of the way from the task's initial solution to the best known.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
+
+FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
+PAPER, INFORMED, PLANNER = "0 0.05", "0.3 0.05 next-goal", "1 0.01 next-goal"
+DRIFTS = ("0", "0.03", "0.1", "0.3", "1")
+AFTER = (30, 100, 1_000, 10_000)
+TRIALS = AFTER[-1]
+POINTS = 5.0
+"""Points of the gain that count as a difference, set before the runs."""
+TIMES = 5.0
+"""Times fewer trials that count as much fewer, set before the runs."""
+
+
+def measure_runs(raw):
+    """Add gains and logarithms of trials to the stored runs, a row for each run.
+
+    ``gain_N`` after N trials, in per cent; NaN where the initial solution is the best known.
+    ``log_quarter`` and ``log_half``: trials to a quarter and to half of the gain, as a power of
+    ten; a run that does not come there counts as all trials.
+    """
+    possible = (raw.best_known - raw.initial).where(raw.best_known > raw.initial)
+    gains = {f"gain_{n}": 100 * (raw[f"reward_{n}"] - raw.initial) / possible for n in AFTER}
+    gaps = {f"gap_{n}": 100 * (raw[f"reward_{n}"] / raw.best_known - 1) for n in AFTER}
+    logs = {f"log_{name}": np.log10(raw[name].clip(upper=TRIALS).where(possible.notna()))
+            for name in ("quarter", "half")}  # fmt: skip
+    return raw.assign(**gains, **gaps, **logs)
+
+
+def tabulate(runs):
+    """Tabulate gains and gaps: means over random tasks (tasks count alike) or over the runs on a
+    task of the paper; medians and quartiles of the trials to half of the gain."""
+    drawn = runs[runs.family.isin(FAMILIES)]
+    every = pd.concat([drawn.assign(group="random"), runs.assign(group=runs.family)])
+    unit = every.run.where(~every.family.isin(FAMILIES), 0)
+    numbers = [*(f"gain_{n}" for n in AFTER), *(f"gap_{n}" for n in AFTER), "first"]
+    by = ["group", "setting", "task", unit]
+    units = every.groupby(by, sort=False)[numbers].mean().reset_index()
+    table = means(units, ["group", "setting"], numbers)
+    table.index = (table.group + " " + table.setting).rename("row")
+    trials = every.groupby(["group", "setting"], sort=False)[["quarter", "half"]]
+    for share in (0.25, 0.5, 0.75):
+        # the order statistic, as half of the runs may not come there
+        column = trials.quantile(share, interpolation="higher").add_suffix(f"_{share:g}")
+        table = table.merge(column, left_on=["group", "setting"], right_index=True)
+    return table.rename(columns={"rows": "units"})
+
+
+def judge_claims(runs):
+    """The claims, as they were registered before any random test task was run."""
+
+    def of(setting, column, family):
+        rows = runs[(runs.setting == setting) & (runs.family == family)]
+        return rows.groupby("task")[column].mean().dropna()
+
+    def in_each(sentence, compare, bound=0.0, families=FAMILIES):
+        return all_of(
+            *(mean_beyond(f"{family}: {sentence}", compare(family), bound) for family in families)
+        )
+
+    def more(first, second, column="gain_100"):
+        return lambda family: of(first, column, family) - of(second, column, family)
+
+    two_armed = FAMILIES[1:]
+    how = "one-tailed bootstrap tests over 40 random tasks, in each family, of the gain "
+    return judge({
+        "information-in-exploration-brings-much": (
+            "A drift of 0.3 with the paper's noise brings more after 100 trials, in every family. "
+            "Refuted where a family gains less.",
+            f"{how}after 100 trials: with κ = 0.3 more than {POINTS:g} points more than with 0",
+            in_each("{} points more with κ = 0.3", more(INFORMED, PAPER), POINTS),
+        ),
+        "information-makes-quick": (
+            "With a drift of 1 and little noise a quarter of the gain takes less than a fifth of "
+            "the paper's learner's trials, in every family. Refuted where it takes more.",
+            "one-tailed bootstrap tests over random tasks, in each family, of the logarithm of the "
+            f"trials to a quarter of the gain: κ = 1, σ = 0.01 takes {TIMES:g} times fewer than "
+            "the paper's learner",
+            in_each("10^{} times fewer trials", more(PAPER, PLANNER, "log_quarter"),
+                    float(np.log10(TIMES))),
+        ),
+        "information-in-correction-brings-little": (
+            "A pull of 0.05 in correction brings less than half of what a drift of 0.3 brings "
+            "after 100 trials, in every family. Refuted where it brings more than half.",
+            f"{how}after 100 trials: what κ = 0.3 adds is more than twice what β = 0.05 adds",
+            in_each("{} points more than twice the pull's", lambda family:
+                    of(INFORMED, "gain_100", family) - of(PAPER, "gain_100", family)
+                    - 2 * (of("correction", "gain_100", family) - of(PAPER, "gain_100", family))),
+        ),
+        "planning-alone-is-short-sighted": (
+            "With a drift of 1 and no noise learning stops early: with noise of 0.01 it gains more "
+            "in the end, in every family. Refuted where noise gains nothing.",
+            f"{how}after 10,000 trials: with σ = 0.01 more than {POINTS:g} points more than "
+            "without noise",
+            in_each("{} points more with noise", more(PLANNER, "1 0", "gain_10000"), POINTS),
+        ),
+        "wrong-information-helps-less": (
+            "A drift of 0.3 towards the start of the trial gains less after 100 trials than "
+            "towards the next goal, in every family. Refuted where it gains as much.",
+            f"{how}after 100 trials: towards the next goal more than {POINTS:g} points more",
+            in_each("{} points more towards the next goal", more(INFORMED, "0.3 0.05 start"),
+                    POINTS),
+        ),
+        "wrong-information-harms": (
+            "A drift of 1 towards the start of the trial gains less in the end than no drift, in "
+            "every family with two arms. Refuted where it gains more.",
+            f"{how}after 10,000 trials: without drift more than {POINTS:g} points more",
+            in_each("{} points more without drift", more(PAPER, "1 0.05 start", "gain_10000"),
+                    POINTS, two_armed),
+        ),
+        "drawn-drift-is-as-good": (
+            "A drift that each trial draws gains as much after 100 trials as one of 0.3, to five "
+            "points, in every family. Refuted where it gains less.",
+            f"{how}after 100 trials: drawn drift less than {POINTS:g} points less than κ = 0.3",
+            in_each("{} points more with a drawn drift", more("drawn", INFORMED), -POINTS),
+        ),
+        "information-about-hands": (
+            "Hands by the nearest posture gain more than random ones after 100 trials on long "
+            "tasks, and less in the end where few hands are to be chosen (two-armed, redundancy).",
+            f"{how}: on long tasks after 100 trials more than {POINTS:g} points more, on two-armed "
+            "and redundancy tasks after 10,000 less",
+            all_of(
+                in_each("{} points more", more("hands", PAPER), POINTS, ("long",)),
+                in_each("{} points less", more(PAPER, "hands", "gain_10000"), 0.0,
+                        ("two-armed", "redundancy")),
+            ),
+        ),
+    })  # fmt: skip
+
+
+@figures.styled
+def draw(table):
+    """Trials to a quarter and to half of the gain, and the gain after 100 trials, by drift."""
+    figure, panels = figures.panels((1, 3), (figures.TWO, 2.6))
+    rows = table[table.group.isin(FAMILIES) & table.setting.isin(along(0.05))]
+    rows = rows.assign(x=rows.setting.str.partition(" ")[0].map(DRIFTS.index))
+    for number, (family, of_family) in enumerate(rows.groupby("group", sort=False)):
+        of_family = of_family.sort_values("x")
+        look = {"color": figures.PALETTE[number % len(figures.PALETTE)], "label": family}
+        for axes, share in zip(panels, ("quarter", "half"), strict=False):
+            trials = of_family[f"{share}_0.5"].clip(upper=2 * TRIALS)
+            axes.plot(of_family.x, trials, marker="o", markersize=3, **look)
+        figures.means(panels[2], of_family, x="x", y="gain_100", **look)
+    for axes, share in zip(panels, ("quarter", "half"), strict=False):
+        axes.set_yscale("log")
+        axes.set_ylabel(
+            f"trials to a {share} of the gain"
+            if share == "quarter"
+            else "trials to half of the gain"
+        )
+        axes.axhline(TRIALS, color=figures.GREY, linewidth=0.6, linestyle=":")
+    panels[2].set_ylabel("gain after 100 trials (%)")
+    for axes in panels:
+        axes.set_xticks(range(len(DRIFTS)), DRIFTS)
+        axes.set_xlabel("drift κ")
+    figures.letters(panels)
+    figures.legend(figure, panels[2].get_legend_handles_labels()[0], 5)
+    return figure
+
+
+def along(sigma):
+    """Settings along the dial towards the next goal, with this noise."""
+    return [f"0 {sigma}", *(f"{kappa} {sigma} next-goal" for kappa in DRIFTS[1:])]
+
+
+def measure(folder):
+    """Return the tables by name; each becomes a CSV file."""
+    runs = measure_runs(pd.read_csv(Path(folder) / "runs.csv"))
+    return {"results": tabulate(runs), "claims": judge_claims(runs)}
+
+
+if __name__ == "__main__":
+    write_study(Path(__file__).parent, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)
