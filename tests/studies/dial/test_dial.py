@@ -1,0 +1,92 @@
+"""The dial: gains, and verdicts, of runs that nobody ran."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+FOLDER = Path(__file__).parents[3] / "studies" / "dial"
+
+
+def program(name):
+    spec = importlib.util.spec_from_file_location(f"dial_{name}", FOLDER / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+STUDY, PROTOCOLS = program("study"), program("protocols")
+
+
+def planted(gains, quarters=None):
+    """Stored runs with gains after 100 and 10,000 trials by setting, in per cent, on 12 instances
+    of each family; the paths from -600 to -500."""
+    rows = []
+    for setting in PROTOCOLS.SETTINGS:
+        early, late = gains.get(setting, (20, 40))
+        for family in STUDY.FAMILIES:
+            for number in range(12):
+                off = number % 4 - 1.5
+                rewards = dict(zip(
+                    (f"reward_{n}" for n in PROTOCOLS.AFTER),
+                    (-600, -600 + early + off, -600 + early + off, -600 + late + off), strict=True,
+                ))  # fmt: skip
+                rows.append({
+                    "task": f"{family}/v1/i{number:03d}", "family": family, "setting": setting,
+                    "run": 0, "initial": -600, "best_known": -500, **rewards,
+                    "quarter": (quarters or {}).get(setting, 1000) + number, "half": np.inf,
+                    "first": 0.0,
+                })  # fmt: skip
+    return STUDY.measure_runs(pd.DataFrame(rows))
+
+
+def verdicts(*arguments):
+    return STUDY.judge_claims(planted(*arguments)).verdict
+
+
+def test_gains_are_shares_of_the_way_to_the_best_known():
+    runs = planted({"0 0.05": (30, 70)})
+    paper = runs[(runs.setting == "0 0.05") & (runs.task == "long/v1/i000")].iloc[0]
+    assert (paper.gain_30, paper.gain_100, paper.gain_10000) == (0, 28.5, 68.5)
+    assert paper.gap_100 == pytest.approx(100 * (571.5 / 500 - 1))
+    assert (paper.log_quarter, paper.log_half) == (3, 4)  # a run that does not come there: all
+    nothing = STUDY.measure_runs(runs.assign(best_known=-600))
+    assert nothing.gain_100.isna().all()
+
+
+def test_verdicts_follow_the_gains():
+    informed, planner = "0.3 0.05 next-goal", "1 0.01 next-goal"
+    assert verdicts({informed: (60, 80)})["information-in-exploration-brings-much"] == "supported"
+    assert verdicts({informed: (10, 80)})["information-in-exploration-brings-much"] != "supported"
+    both = {informed: (60, 80), "correction": (25, 40)}
+    assert verdicts(both)["information-in-correction-brings-little"] == "supported"
+    both["correction"] = (55, 40)
+    assert verdicts(both)["information-in-correction-brings-little"] != "supported"
+    for trials, verdict in ((20, "supported"), (900, "not supported")):
+        judged = verdicts({}, {planner: trials})
+        assert judged["information-makes-quick"] == verdict
+    assert verdicts({"1 0.05 start": (20, 10)})["wrong-information-harms"] == "supported"
+    assert verdicts({"1 0.05 start": (20, 60)})["wrong-information-harms"] == "not supported"
+    drawn = {informed: (60, 80), "drawn": (58, 80)}
+    assert verdicts(drawn)["drawn-drift-is-as-good"] == "supported"
+
+
+def test_a_task_is_run_under_every_setting(monkeypatch):
+    """The learner's own runs; fields of hands are left out with one arm."""
+    for name, value in (("TRIALS", 40), ("FEW", 40), ("AFTER", (5, 10, 20, 40)), ("RUNS", 2)):
+        monkeypatch.setattr(PROTOCOLS, name, value)
+    rows = pd.DataFrame(PROTOCOLS.run_task("ascending"), columns=[
+        "task", "family", "setting", "run", "initial", "best_known", *"abcd", "quarter", "half",
+        "first", "hands",
+    ])  # fmt: skip
+    assert rows.groupby("setting").size().eq(2).all()
+    assert {*rows.setting} == {*PROTOCOLS.SETTINGS}
+    assert (rows.a <= rows.b).all()
+    assert (rows.c <= rows.d).all()
+    assert (rows.d <= rows.best_known).all()
+    half = rows[rows.half < np.inf]
+    assert (half.d >= (half.initial + half.best_known) / 2).all()
