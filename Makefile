@@ -11,7 +11,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations optimum)
 STORED := comparison ablations families
-FAMILIES := one-armed two-armed aligned redundancy long
+FAMILIES := one-armed two-armed aligned redundancy long many-goals
 STUDIES ?= $(notdir $(wildcard studies/[a-z]*))
 
 .PHONY: benchmark test check format docs shipped findings studies speed release-check setup clean
