@@ -161,6 +161,8 @@ def draw(table):
         figures.means(panels[2], of_family, x="x", y="gain_100", **look)
     for axes, share in zip(panels, ("quarter", "half"), strict=False):
         axes.set_yscale("log")
+        axes.set_yticks([1, 10, 100, 1_000, 10_000], ["1", "10", "100", "1000", "10 000"])
+        axes.minorticks_off()
         axes.set_ylabel(
             f"trials to a {share} of the gain"
             if share == "quarter"
