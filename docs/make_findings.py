@@ -31,7 +31,8 @@ STORED = DOCS / "stored"
 ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
     "comparison": (
-        "claims contexts hands learning methods runtimes published ranking signatures tasks",
+        "beside-random-search claims contexts hands learning methods runtimes published ranking "
+        "scores separation signatures tasks",
         "postures published ranking runtimes learning-curves",
     ),
     "ablations": ("methods signatures claims", ""),
