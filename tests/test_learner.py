@@ -178,6 +178,14 @@ def test_informed_conditions_equal_the_slow_learner_trial_by_trial(direction, fi
     assert differ > 0
 
 
+def test_joints_that_the_next_movement_would_not_explore_prefer_to_stay():
+    """Under EC3 an arm that is idle at the next goal: hands alternate where many are drawn."""
+    rules = replace(CONDITIONS["EC3"], drift=1.0, epsilon=0.7)
+    slow = assert_equals_reference(load_task("two-armed-1"), rules, trials=14, seed=2)
+    hands = {(goal, hand) for (goal, _), hand in slow.values}
+    assert len(hands) > len(load_task("two-armed-1").goals)
+
+
 def test_without_information_an_informed_condition_is_the_papers():
     """No drift and no pull draw nothing and change nothing; a list of drifts draws."""
     paper = learn("two-armed-1", "EC4", seed=3, trials=200)
