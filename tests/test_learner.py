@@ -186,6 +186,13 @@ def test_joints_that_the_next_movement_would_not_explore_prefer_to_stay():
     assert len(hands) > len(load_task("two-armed-1").goals)
 
 
+def test_a_hand_with_which_the_corrective_process_fails_is_farthest():
+    rules = replace(CONDITIONS["EC4"], hand_exploration="nearest-posture", epsilon=0.7)
+    for seed in range(3):
+        slow = assert_equals_reference(failing_task(), rules, trials=10, seed=seed)
+        assert slow.completed.all()
+
+
 def test_without_information_an_informed_condition_is_the_papers():
     """No drift and no pull draw nothing and change nothing; a list of drifts draws."""
     paper = learn("two-armed-1", "EC4", seed=3, trials=200)
