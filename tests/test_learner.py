@@ -332,6 +332,18 @@ def failing_task():
     )
 
 
+def test_a_trial_that_failed_stays_failed_where_the_hand_is_in_the_next_goal():
+    task = tiny_task(
+        locked_base=["x", "y"],
+        goals=[[1.5, 0.1], [3.5, 0.1]],
+        initial_hands="LL",
+        start={"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]},
+    )
+    left_only = ExplorationCondition("left", ("left",), True, False, "none")
+    slow = assert_equals_reference(task, left_only, trials=3)
+    assert not slow.completed.any()
+
+
 def test_run_without_any_completed_trial():
     task = tiny_task(locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]], initial_hands="R")
     run = learn(task, "EC1", seed=0, trials=20)
