@@ -187,8 +187,8 @@ def with_shares(columns: pd.DataFrame) -> pd.DataFrame:
     each row."""
     columns = with_gaps(columns)
     possible = columns.best_known - columns[ZERO]
-    known = "it is above best_known, which is to be the highest reward of the task"
-    refuse_rows(columns, ZERO, possible < 0, known)
+    highest = "it is above best_known, which is to be the highest reward of the task"
+    refuse_rows(columns, ZERO, possible < 0, highest)
     return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
 
 
@@ -296,7 +296,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def separation(frame: pd.DataFrame) -> pd.DataFrame:
-    """How well each task separates methods.
+    """Count, by task, the pairs of methods that it separates.
 
     Two methods are separated where their rewards differ by a two-tailed Mann-Whitney test,
     corrected for the pairs of the task (Bonferroni); a single run, such as that of a planner, where

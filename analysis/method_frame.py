@@ -74,8 +74,8 @@ def method_row(
     """Return the row of a method from its cells; ``labels`` has all methods of the study."""
     base, setting, label = cells[0].method, cells[0].setting, cells[0].label
     info = declared[base]
-    known = KNOWN_METHODS.get(base) if info.is_ours else None
-    default = base if setting else known.ablation_of if known else ""
+    facts = KNOWN_METHODS.get(base) if info.is_ours else None
+    default = base if setting else facts.ablation_of if facts else ""
     under = default if default in labels else ""
     return {
         "base": base,
@@ -83,14 +83,14 @@ def method_row(
         "setting": setting,
         "parts": (label,),
         "title": title_of(base, setting),
-        "algorithm": known.algorithm if known else one_line(label),
-        "kind": known.kind if known else "",
+        "algorithm": facts.algorithm if facts else one_line(label),
+        "kind": facts.kind if facts else "",
         "information": group_of(cells),
         "built_in": info.is_ours,
         "stochastic": info.stochastic,
-        "headline": not under and (known is None or known.headline),
+        "headline": not under and (facts is None or facts.headline),
         "under": under,
-        "look": tuple(known.look) if known and not setting else (),
+        "look": tuple(facts.look) if facts and not setting else (),
     }
 
 

@@ -34,18 +34,18 @@ LEAST_SHARE = 0.1
 def random_search_on(study: Study, task: str, trials: float = 0) -> list[str]:
     """Return the labels of the settings of random search that solved a task.
 
-    Of those that made at least so many ``trials``, the ones that made fewest.
+    With ``trials``: those with the fewest trials that are at least so many.
     """
     labels = study.methods.index[study.methods.algorithm == "random search"]
-    made = {
+    trials_by_label = {
         label: trials_of(study, task, label)
         for label in labels
         if (task, label) in study.cells and len(study.cells[task, label].good)
     }
     if not trials:
-        return [*made]
-    fewest = min((each for each in made.values() if each >= trials), default=None)
-    return [label for label in made if made[label] == fewest]
+        return [*trials_by_label]
+    fewest = min((each for each in trials_by_label.values() if each >= trials), default=None)
+    return [label for label, made in trials_by_label.items() if made == fewest]
 
 
 def trials_of(study: Study, task: str, label: str) -> float:

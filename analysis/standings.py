@@ -41,8 +41,8 @@ def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
     rows, by_method = study.methods, dict[str, dict[str, CellRuns]]()
     for method, parts in rows.parts[rows.kind != "optimum search"].items():
         keys = [(task, part) for part in parts for task in study.tasks]
-        found = {key[0]: study.cells[key] for key in keys if key in study.cells}
-        cells = {task: cell for task, cell in found.items() if cell.has_best_known}
+        by_task = {key[0]: study.cells[key] for key in keys if key in study.cells}
+        cells = {task: cell for task, cell in by_task.items() if cell.has_best_known}
         if len({cell.label for cell in cells.values()}) == len(parts):
             by_method[str(method)] = cells
     return by_method
@@ -56,8 +56,8 @@ def cells_on(study: Study, method: str, tasks: Iterable[str]) -> list[CellRuns]:
     """
     of_method, tasks = compared(study)[method], [*tasks]
     cells = [of_method[task] for task in tasks if task in of_method]
-    whole = len(cells) == len(tasks)
-    return cells if whole and {c.label for c in cells} == {*study.methods.parts[method]} else []
+    on_all = len(cells) == len(tasks)
+    return cells if on_all and {c.label for c in cells} == {*study.methods.parts[method]} else []
 
 
 def widest_tasks(

@@ -57,16 +57,16 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
                 message = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 raise CoarticError(message)
             sources[name] = stack.enter_context(open_store(folder_named(name)))
-        whole = join(plan, sources)
+        joined = join(plan, sources)
         target = stack.enter_context(writing(out))
         begun = SHIPPED in sources and target.begin_as(sources[SHIPPED])
         with target.transaction():
-            target.replace_plan(whole, current_environment(), command(), now())
+            target.replace_plan(joined, current_environment(), command(), now())
             origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
                 if not (begun and name == SHIPPED):  # it is a copy of them
                     copy_runs(name, source, target, origin)
-    return whole
+    return joined
 
 
 def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
@@ -82,10 +82,12 @@ def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
-    own = {job.cell.digest: job for job in plan}
+    jobs_by_digest = {job.cell.digest: job for job in plan}
     # Runs of a source are not performed here: their method may have other code here.
     missing = [
-        job for digest, job in own.items() if not held.issuperset((digest, n) for n in job.numbers)
+        job
+        for digest, job in jobs_by_digest.items()
+        if not held.issuperset((digest, n) for n in job.numbers)
     ]
     parts = {**plans, "this command": missing}
     check_together(
@@ -95,7 +97,7 @@ def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
     jobs: dict[str, Job] = {}
     for job in itertools.chain(plan, *plans.values()):
         digest = job.cell.digest
-        runs = len(own[digest].numbers) if digest in own else 0
+        runs = len(jobs_by_digest[digest].numbers) if digest in jobs_by_digest else 0
         while (digest, runs) in held:
             runs += 1
         if runs:
@@ -111,7 +113,7 @@ def warn_of_gaps(
     """Warn of unfinished sources, and of sources that have fewer runs of a cell than the plan asks
     for of its own cells."""
     most = max(len(job.numbers) for job in plan)
-    own = {job.cell.digest for job in plan}
+    digests = {job.cell.digest for job in plan}
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
         for job in part:
@@ -119,7 +121,7 @@ def warn_of_gaps(
             there = len(jobs[digest].numbers) if digest in jobs else 0
             if there < len(job.numbers):
                 lacking.append(job)
-            elif digest not in own and method.stochastic and there < most:
+            elif digest not in digests and method.stochastic and there < most:
                 few.append(job)
         if lacking:
             words = f"{name} is not finished: it lacks runs of {named(lacking)}"

@@ -3,7 +3,7 @@ folder.
 
 ``python -m coartic.benchmarks.shipped FOLDER`` packs a results folder whose runs have the same
 results as the shipped runs. The rewards of trials are downsampled
-(:meth:`coartic.runs.record.Run.downsample`): 2 MB in place of 30 MB.
+(:meth:`coartic.runs.record.Run.downsample`): 5 MB in place of 150 MB.
 """
 
 from __future__ import annotations

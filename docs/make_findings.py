@@ -123,9 +123,9 @@ def known_optima() -> pd.DataFrame:
     ``median``: the median distance of a bound from the reward, per cent of the reward, for which an
     instance without a bound counts as infinitely far.
     """
-    known = pd.read_csv(BEST_KNOWN)
-    known["distance"] = 100 * (known.bound - known.reward) / -known.reward
-    by_family = known.groupby(known.instance.str.partition("/")[0])
+    instances = pd.read_csv(BEST_KNOWN)
+    instances["distance"] = 100 * (instances.bound - instances.reward) / -instances.reward
+    by_family = instances.groupby(instances.instance.str.partition("/")[0])
     return pd.DataFrame(
         {
             "instances": by_family.size(),

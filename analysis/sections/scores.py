@@ -33,8 +33,8 @@ def after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     early, learned = runs.copy(), improvements(study)
     for row, run_id in zip(runs.index, runs.run_id, strict=True):
         if run_id in learned:
-            made, rewards = learned[run_id]
-            last = int(np.searchsorted(made, trials, side="right")) - 1
+            numbers, rewards = learned[run_id]
+            last = int(np.searchsorted(numbers, trials, side="right")) - 1
             early.loc[row, "reward"] = int(rewards[last]) if last >= 0 else pd.NA
     return early
 
@@ -93,7 +93,7 @@ def list_scores(study: Study) -> Rows:
     "at_ceiling: methods above 95 % of the possible gain; at_floor: methods below 5 %"
 )
 def list_separation(study: Study) -> Rows:
-    """How well each task separates the compared methods."""
+    """Count, by task, the pairs of compared methods that it separates."""
     runs = compared_runs(study)
     main = study.methods.index[(study.methods.under == "")]
     runs = runs[runs.method.isin(main)]

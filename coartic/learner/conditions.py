@@ -121,7 +121,7 @@ class ExplorationCondition:
 
     @property
     def is_informed(self) -> bool:
-        """Whether a preferred posture informs exploration or correction."""
+        """True if a preferred posture informs exploration or correction."""
         return any(self.drifts) or self.pull > 0
 
     def __repr__(self) -> str:

@@ -71,10 +71,10 @@ Flags = NDArray[np.bool_]
 
 
 class Informed(NamedTuple):
-    """What an informed condition adds to the parameters of the learner."""
+    """Information of a condition: drift, pull and direction, as the kernel reads them."""
 
     drifts: Array
-    """Values of κ, of which each trial draws one where there are several, shape ``(K,)``."""
+    """Values of κ, shape ``(K,)``; of several each trial draws one."""
     pull: float
     direction: int
 

@@ -91,21 +91,21 @@ class CustomParameters(Parameters):
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
     """The paper's condition that is changed."""
     modify_chosen: bool | None = None
-    """Whether noise moves the targets of the base and of the arm that is to hit."""
+    """True if noise moves the targets of the base and of the arm that is to hit."""
     modify_other: bool | None = None
-    """Whether noise moves the targets of the other arm."""
+    """True if noise moves the targets of the other arm."""
     hand_exploration: HandExploration | None = None
-    """How hands are explored."""
+    """Exploration of the hand for a goal."""
     epsilon: Share | None = None
     """ε: probability, for each goal, of exploring the hand."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] | None = None
     """SD of η, length unit (base) or rad (joints)."""
     corrects: bool | None = None
-    """Whether the corrective process finishes what a stored target misses."""
+    """True if the corrective process finishes what a stored target misses."""
     learned: Learned | None = None
-    """What is learned in the end: the best trial, or the replay."""
+    """Result of learning: the best trial, or the replay."""
     credit: Credit | None = None
-    """What is credited: the reward of the whole trial, or returns of subtasks."""
+    """Credit of a goal: the reward of the whole trial, or the return of its subtask."""
     discount: Share | None = None
     """γ of a goal's return."""
     counted: Counted | None = None
