@@ -215,11 +215,12 @@ SECTIONS = (
         "Random search",
         "Is it more than selection alone?",
         table=random_search.list_beside_random_search,
-        caption="Signatures beside random search with the same hands (ticks; idle arm: share)",
+        caption="Signatures beside random search with the same hands, means over runs",
         note="Random search learns nothing: it selects the best of many targets, drawn in a box "
         "around the corrective process's postures. Runs improved if they take fewer ticks than the "
         "corrective process alone with the same hands; other runs show nothing. Of several widths "
-        "of the box the one that shows most counts, in each column. p is one-tailed, uncorrected.",
+        "of the box, the one that shows most counts, in each column, if it has three such runs. "
+        "p is one-tailed, uncorrected.",
         folded=True,
     ),
     Section(

@@ -17,15 +17,20 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 from coartic.robot import Array
 
-SHOWN = ("first", "arm", "other arm")
-"""Signatures of the table: the choice of hands itself is not among them, as hands are equal."""
+SHOWN = {
+    "first": "first movement slower (ticks)",
+    "arm": "next goal nearer (ticks)",
+    "other arm": "idle hand nearer (share)",
+}
+"""Signatures of the table, in words. The choice of hands is not among them, as hands are equal."""
 MORE = 10
 """Times as many trials in the last column."""
 
 
 @table(
-    "signature; task; method; hands; runs; value: learner .2; "
-    "improved: random search, runs that improved .2; p: p beyond it .p; "
+    "signature; task; method; hands; runs; value: mean .2; "
+    "improved: random search, runs that improved .2; random_runs: their number; "
+    "p: p that the method has more .p; "
     "every: random search, all runs .2; "
     "more_trials: random search, ten times the trials, runs that improved .2"
 )
@@ -46,13 +51,14 @@ def list_beside_random_search(study: Study) -> Rows:
                     there = signature, task, hands
                     enough = len(improved) > 0
                     row: Row = {
-                        "signature": signature,
+                        "signature": SHOWN[signature],
                         "task": marked(study.tasks[task]),
                         "method": label,
                         "hands": hands,
                         "runs": len(values),
                         "value": values.mean(),
                         "improved": mean_of(improved),
+                        "random_runs": len(improved),
                         "p": bootstrap_test(values, improved).p if enough else np.nan,
                         "every": mean_of(most_of_random_search(study, *there, trials, every=True)),
                         "more_trials": mean_of(most_of_random_search(study, *there, MORE * trials)),
