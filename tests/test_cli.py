@@ -142,7 +142,7 @@ def test_reproduce(coartic, tmp_path):
 
 
 INTERRUPTED = """
-import contextlib, os, signal, sys, tempfile, threading, time
+import contextlib, ctypes, os, signal, sys, tempfile, threading, time
 import coartic.__main__
 
 moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
@@ -161,9 +161,13 @@ def clean():
         stack.callback(signals.start)
         interrupt()
 
-if moment == "cleaning":  # which ends after the signals
+def call_back():
+    ctypes.CFUNCTYPE(None)(interrupt)()  # which passes no exception on
+    time.sleep(60)
+
+if moment in ("cleaning", "calling back"):  # which end after the signals
     import coartic.cli
-    coartic.cli.main = clean
+    coartic.cli.main = clean if moment == "cleaning" else call_back
 else:  # milliseconds after it has begun
     threading.Timer(int(moment) / 1000, interrupt).start()
 coartic.__main__.main()
@@ -177,7 +181,7 @@ coartic.__main__.main()
     [
         ("300", "SIGINT", 2),
         ("2500", "SIGTERM", 2),
-        ("1800", "SIGHUP", 1),
+        ("calling back", "SIGHUP", 1),
         ("cleaning", "SIGINT", 3),
         ("cleaning", "SIGTERM", 1),
     ],

@@ -9,9 +9,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 ENDING = {
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -36,6 +41,22 @@ def catch_signals() -> None:
     for number in ENDING:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
+    sys.unraisablehook = _interrupt_again
+
+
+def _interrupt_again(lost: UnraisableHookArgs) -> None:
+    """Repeat an interruption that Python could not pass on, soon: an exception ends no callback of a
+    library, such as LLVM's, and no destructor. Other such exceptions are printed as ever."""
+    if lost.exc_type is not KeyboardInterrupt or not _heard:
+        sys.__unraisablehook__(lost)
+        return
+    number, _ = _heard[-1]
+    _heard[-1] = number, -_CLEANING_S
+    if hasattr(signal, "pthread_kill"):
+        main = threading.main_thread().ident
+        threading.Timer(0.01, lambda: signal.pthread_kill(main or 0, number)).start()
+    else:
+        threading.Timer(0.01, signal.raise_signal, [number]).start()
 
 
 @contextmanager
