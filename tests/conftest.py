@@ -165,15 +165,8 @@ def visited(browser):
 
 
 FIRST = (
-    *(
-        "test_conformance",
-        "test_pool",
-        "test_cli",
-        "test_method_files",
-        "test_harness",
-        "test_dask",
-    ),
-    *("test_browser", "test_play_page", "test_report", "test_figures"),
+    *("test_conformance", "test_pool", "test_cli", "test_method_files", "test_runner"),
+    *("test_cluster", "test_report_page", "test_play_page", "test_report", "test_figures"),
 )
 """Modules that begin: those that start processes, then those that read one report and draw, so that
 one worker does; they take longest, and none is left alone with them at the end."""

@@ -1,14 +1,35 @@
-"""Movement: the kernel against the engine that visits every step, and against geometry."""
+"""Movement against the engine that visits every step; the corrective process, its definition."""
+
+import math
+import re
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from coartic import PAPER, MotionModel, Robot, move
-from coartic.motion.compile import entry
-from coartic.motion.movement import clear_steps
+from coartic import (
+    PAPER,
+    MotionModel,
+    NotApplicableError,
+    Robot,
+    Task,
+    correct,
+    corrective_trial,
+    execute,
+    initial_hands,
+    load_task,
+    move,
+    objective,
+)
+from coartic.baselines.corrective_alone import BestHands
+from coartic.method import MethodError, Session
+from coartic.motion.compile import entry, joint_lever
+from coartic.motion.movement import clear_steps, largest_square
+from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
 from tests.support import reference
-from tests.support.strategies import UNEVEN
+from tests.support.strategies import TIED, UNEVEN, configurations
 
 ROBOT = Robot()
 
@@ -152,3 +173,155 @@ def test_inputs_are_left_alone_and_checked():
         move(ROBOT, q, target, "right", (np.nan, 1.0), 0.1)
     with pytest.raises(ValueError, match="radius is nan"):
         move(ROBOT, q, target, "right", (1.0, 1.0), np.nan)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    robot=st.just(ROBOT) | st.just(UNEVEN),
+    data=st.data(),
+    hand=st.sampled_from(HANDS),
+    goal=st.tuples(st.floats(-6, 6), st.floats(-3, 3)),
+    locked=st.sampled_from([(), ("x",), ("y",)]),
+)
+def test_equals_the_matrix_form(robot, data, hand, goal, locked):
+    model = MotionModel(max_iterations=400)
+    q = data.draw(configurations(robot, -3, 3))
+    fast = correct(robot, q, hand, goal, locked_base=locked, model=model)
+    slow = reference.correct(robot, q, hand, goal, locked_base=locked, model=model)
+    assert fast.converged == slow.converged
+    if fast.converged:
+        assert fast.iterations == slow.iterations
+        np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
+
+
+@entry
+def _largest(length):
+    return largest_square(length)
+
+
+@settings(max_examples=100)
+@given(length=st.floats(1e-9, 1e5) | st.sampled_from([0.0, 1e-200, 0.001, 0.01, 0.1]))
+def test_a_square_within_the_largest_has_a_root_within_the_length(length):
+    """Errors are compared by their squares: to the last bit as by themselves."""
+    square = _largest(length)
+    assert math.sqrt(square) <= length < math.sqrt(math.nextafter(square, math.inf))
+
+
+@entry
+def _by_steps(q, arm, goal, gain, tolerance, most, xs, ys):
+    """The descent with the cosine that knows any angle, one evaluation after the other."""
+    tip = len(arm.links)
+    for iteration in range(most):
+        joint_chain(q, arm, xs, ys)
+        error_x, error_y = goal[0] - xs[tip], goal[1] - ys[tip]
+        if math.sqrt(error_x * error_x + error_y * error_y) <= tolerance:
+            return iteration
+        q[0] += gain * error_x
+        q[1] += gain * error_y
+        for k in range(tip):
+            dx, dy = joint_lever(xs, ys, k, tip)
+            q[arm.first + k] += gain * (dx * error_x + dy * error_y)
+    return most
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
+    """Beyond what the kernels' own cosine knows, from the start or on the way."""
+    rng = np.random.default_rng(seed)
+    robot, hand = (ROBOT, UNEVEN)[seed % 2], HANDS[seed // 2 % 2]
+    q = rng.uniform(-1, 1, robot.dof)
+    q[2:] += rng.choice([9.9e4, 5e4, 2.4e4]) * rng.choice([1, 1, -1])
+    goal, slow = rng.uniform(-1, 1, 2), q.copy()
+    fast = correct(robot, q, hand, tuple(goal))
+    model = PAPER
+    iterations = _by_steps(
+        slow, robot.arm(hand), tuple(goal), model.gain, model.correction_tolerance,
+        model.max_iterations, *np.empty((2, robot.most_links + 1)),
+    )  # fmt: skip
+    assert fast.iterations == iterations
+    np.testing.assert_array_equal(fast.q, slow)
+
+
+@pytest.mark.parametrize(
+    ("task", "budget", "hands", "trials"),
+    [
+        (load_task("two-armed-1"), None, "LRLR", 16),
+        (load_task("two-armed-1"), 3, "LLLR", 3),  # -760, -672, -715
+        (TIED, None, "RRL", 8),
+    ],
+)
+def test_every_hand_sequence_alone(task, budget, hands, trials):
+    session = Session(task, 0, BestHands.information, trial_budget=budget)
+    assert execute(task, BestHands().solve(session).solution).hands == hands
+    assert session.meter.trials == trials
+
+
+def test_stationary_point_ends_the_descent():
+    """A straight arm on a locked base, the goal in line with it: the gradient vanishes."""
+    correction = correct(ROBOT, np.zeros(10), "right", (2.5, 0.1), locked_base=("x", "y"))
+    assert not correction.converged
+    assert correction.iterations == 1
+    np.testing.assert_array_equal(correction.q, np.zeros(10))
+
+
+def arm_of(*links, locked_base=("x", "y"), scale=1.0, radius=0.1):
+    """A task of one arm, a little bent, with a goal at two thirds of its reach."""
+    links = tuple(scale * link for link in links)
+    place = 0.0, 0.0
+    robot = Robot((1.0,), links, left_shoulder=place, right_shoulder=place)
+    goals = [(2 / 3 * sum(links) * math.cos(1.0), 2 / 3 * sum(links) * math.sin(1.0))]
+    bent = {"radius": radius, "q0": [0, 0, 0, *[0.3] * len(links)]}
+    return Task(goals=goals, robot=robot, hands=["right"], locked_base=locked_base, **bent)
+
+
+LONG = {
+    "ten unit links": ([1] * 10, ("x", "y")),
+    "twenty unit links": ([1] * 20, ("x", "y")),
+    "15, 15, 5 and 5 cm": ([15, 15, 5, 5], ("x", "y")),
+    "239 and 317 mm": ([239, 317], ("x", "y")),
+    "seven unit links": ([1] * 7, ("x", "y")),
+    "ten unit links on a rail": ([1] * 10, ("y",)),
+    "15, 15, 5 and 5 cm on wheels": ([15, 15, 5, 5], ()),
+}
+
+
+@pytest.mark.parametrize(("links", "locked_base"), LONG.values(), ids=LONG)
+def test_a_long_arm_is_named_with_a_factor_that_helps(links, locked_base):
+    """The largest singular value of all postures is below the limit then, and not much."""
+    options = {"locked_base": locked_base, "radius": 0.1 * min(links)}
+    reason = corrective_trial(arm_of(*links, **options), "R").reason
+    numbers = re.search(r"is (\S+), and above 2 .* by ([0-9.]+),", reason).groups()
+    said, factor = map(float, numbers)
+    free = [k for k in (0, 1) if "xy"[k] not in locked_base]
+
+    def largest(scale):
+        robot = arm_of(*links, scale=scale, **options).robot
+        straight = robot.jacobian(np.zeros(robot.dof), "right")[:, [*free, *range(3, robot.dof)]]
+        return 0.05 * np.linalg.norm(straight, 2) ** 2
+
+    assert said == pytest.approx(largest(1.0), rel=0.01)
+    assert 1.7 < largest(1.0 / factor) < 2.0
+    helped = arm_of(*links, scale=1.0 / factor, locked_base=locked_base)
+    assert corrective_trial(helped, "R").completed
+
+
+@pytest.mark.parametrize("links", [(3, 2, 1), (0.309, 0.333), (0.1, 0.11), (0.05,) * 20])
+def test_arms_of_others_that_are_not_too_long_are_corrected(links):
+    assert corrective_trial(arm_of(*links, radius=min(0.1, sum(links) / 20)), "R").completed
+
+
+def test_a_straight_arm_that_points_at_its_goal_is_named():
+    for goal in ((-2.0, 0.1), (2.5, 0.1)):
+        task = Task(goals=[goal], hands=["right"], locked_base=("x", "y"))
+        assert "straight and points at the goal; bend it" in corrective_trial(task, "R").reason
+        with pytest.raises(NotApplicableError, match="with R, goal 1: .* bend it"):
+            initial_hands(task)
+        with pytest.raises(MethodError, match="with R, goal 1: .* bend it"):
+            objective(task)
+    few = corrective_trial(load_task("ascending"), "RRR", model=MotionModel(max_iterations=2))
+    assert few.reason.endswith("in 2 iterations")
+
+
+def test_too_large_a_gain_is_an_outcome():
+    model = MotionModel(gain=1e6, max_iterations=500)
+    assert not correct(ROBOT, np.full(10, 0.3), "right", (5.0, 1.0), model=model).converged

@@ -98,7 +98,7 @@ def test_subgoals_of_lower_priority_coarticulate():
 
 
 def test_a_goal_behind_a_straight_arm_is_reached():
-    """The gradient vanishes there: the corrective process does not leave (test_corrective)."""
+    """The gradient vanishes there: the corrective process does not leave (test_movement)."""
     task = tiny_task(goals=[[2.5, 0.1], [3.0, 1.0]], hands=["right"])
     for locked in (("x", "y"), ("x",)):
         _, execution, _ = solve(GoalsAhead, task.model_copy(update={"locked_base": locked}))

@@ -18,13 +18,14 @@ from coartic.analysis.methods import title_of
 from coartic.analysis.report import about, render
 from coartic.analysis.report.about import answers, attempt, limits
 from coartic.analysis.report.build import write_report
+from coartic.analysis.report.player import methods_played, player
 from coartic.analysis.report.trace import read_table, runs_behind, tables_of
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
 from coartic.runs.store import RUNS_FILE
 from tests.support import made_up
-from tests.support.suites import cells_of, run_and_write, suite_of
+from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write, suite_of
 
 
 @pytest.fixture(scope="module")
@@ -326,3 +327,17 @@ def test_a_goal_alone_and_followed_have_a_report(tmp_path):
     study = run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
     assert TABLES["contexts"](study).empty
     write_report(study, tmp_path / "report", for_paper=False)
+
+
+def test_methods_that_follow_paths_are_left_out(tmp_path):
+    tasks = [load_task(name) for name in ("ascending", "descending")]
+    cells = [
+        cell_on(task, KNOWN[method])
+        for task in tasks
+        for method in ("posture-qp/current-goal", "corrective-alone/given")
+    ]
+    study = run_and_write(tmp_path / "both", cells, trials=20, runs=1)
+    played = methods_played(study, [task.name for task in tasks])
+    assert [run["id"] for run in played] == ["corrective-alone/given"]
+    alone = run_and_write(tmp_path / "alone", cells[::2], trials=20, runs=1)
+    assert player(alone) == ""

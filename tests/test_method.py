@@ -1,9 +1,15 @@
-"""Sessions' trials in one call: what is taken, what is refused, and what is counted."""
+"""Sessions: what a method is told, what is taken and refused, and what is counted."""
+
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from coartic import load_task
+from coartic import (
+    Movement,
+    corrective_trial,
+    load_task,
+)
 from coartic.method import BudgetError, Information, Session, UndeclaredError
 from coartic.motion.solution import movements_of
 from coartic.optimisers import OPTIMISER_INFORMATION
@@ -124,3 +130,34 @@ def test_until_the_first_that_is_better():
     np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
     alone.trials(hands[:6], targets[:6])
     assert session.meter == alone.meter
+
+
+def test_a_session_counts_per_configuration():
+    session = Session(load_task("ascending"), 0, set(Information), trial_budget=2)
+    session.forward_kinematics(np.zeros((4, 5, 10)), "right")
+    session.jacobian(np.zeros((3, 10)), "right")
+    correction = session.correct(session.q0, "right", 1)
+    execution = session.trial([Movement(k, "right", "corrective") for k in (1, 2, 3)])
+    meter = session.meter
+    assert meter.forward_kinematics == 20 + correction.iterations + 1 + execution.evaluations
+    assert meter.jacobians == 3 + correction.iterations + execution.iterations
+    assert (meter.trials, meter.movement_ticks, meter.corrections) == (1, 319, 3)
+    assert session.trials_left == 1
+    with pytest.raises(ValueError, match="goals are numbered 1 to 3"):
+        session.correct(session.q0, "right", 4)
+
+
+def test_a_session_is_shared_by_threads():
+    task = load_task("ascending")
+    session = Session(task, 0, OPTIMISER_INFORMATION, trial_budget=100)
+    solution = corrective_trial(task, "RRR").movements
+
+    def work(n):
+        try:
+            return session.trial(solution).reward
+        except BudgetError:
+            return None
+
+    with ThreadPoolExecutor(8) as pool:
+        rewards = [*pool.map(work, range(300))]
+    assert rewards.count(-319) == session.meter.trials == len(session.rewards) == 100

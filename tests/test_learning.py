@@ -1,4 +1,4 @@
-"""The learner against the paper's loop, the published results, and its own laws."""
+"""The learner against the paper's loop, the published results, and itself beside other runs."""
 
 import doctest
 import itertools
@@ -7,11 +7,13 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import numpy.testing as npt
 import pytest
 
 from coartic import (
     ABLATIONS,
     CONDITIONS,
+    PAPER,
     CoarticError,
     ExplorationCondition,
     MotionModel,
@@ -473,3 +475,48 @@ def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, t
     suite.write_text(OWN_SUITE.replace("{PARAMETERS}", fields), encoding="utf-8")
     with pytest.raises(CoarticError, match=re.escape(sentence)):
         run_suite(str(suite), tmp_path / "results")
+
+
+FAILED_AT_ONCE = MotionModel(max_iterations=60)
+
+
+def shown(movements):
+    return [(m.goal, m.hand, m.kind, m.ticks, tuple(m.target)) for m in movements]
+
+
+def assert_same(a, b):
+    assert a.seed == b.seed
+    assert a.counters == b.counters
+    assert a.best_trial == b.best_trial
+    assert a.replay_reward == b.replay_reward
+    npt.assert_array_equal(a.rewards.data, b.rewards.data)
+    for name in ("completed", "values", "targets"):
+        npt.assert_array_equal(getattr(a, name), getattr(b, name))
+    for name in ("initial", "solution", "replay"):
+        assert shown(getattr(a, name)) == shown(getattr(b, name))
+
+
+@pytest.mark.parametrize(
+    ("task", "condition", "model"),
+    [
+        ("two-armed-1", "EC4", PAPER),
+        ("two-armed-1", "EC4", FAILED_AT_ONCE),
+        ("two-armed-2", "EC2", PAPER),
+        ("two-armed-2", "EC4-subtask", FAILED_AT_ONCE),
+        ("ascending", "EC1-uncorrected", PAPER),
+    ],
+)
+def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
+    task = load_task(task)
+    seeds = [*range(SLOTS), 17, *range(SLOTS, SLOTS + 3)]  # more than there are slots, one twice
+    for trials in (1, 25):
+        options = {"trials": trials, "model": model}
+        together = learn_many(task, condition, seeds=seeds, jobs=1, **options)
+        assert [run.seed for run in together] == seeds
+        some = learn_many(task, condition, seeds=seeds[::-7], jobs=2, **options)
+        for run, same in zip(together[::-7], some, strict=True):
+            assert_same(run, same)
+        for run in together[5 :: SLOTS // 3]:
+            assert_same(run, learn(task, condition, seed=run.seed, **options))
+    if model is FAILED_AT_ONCE:
+        assert any(run.counters.failed_trials for run in together)

@@ -1,10 +1,8 @@
-"""Suites, and the runs they come to."""
+"""Plans performed: seeds, ids, failures and scores of runs, whoever performs them."""
 
 import hashlib
-import json
 import time
 from dataclasses import replace
-from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -17,27 +15,23 @@ from coartic import (
     execute,
     load_task,
 )
-from coartic.analysis.sections.rewards import published_and_ours
 from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform, plan_suite
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.suites import load_suite, suites
 from coartic.benchmarks.worker import fail, perform_job
-from coartic.learner.conditions import EVERY_CONDITION
-from coartic.method import Information, Meter, Session
-from coartic.runs.plan import Job, run_seed, size_of
+from coartic.method import Meter
+from coartic.motion.batch import SLOTS
+from coartic.runs.plan import Job, run_seed
 from coartic.runs.record import Outcome, Times, movements_from, too_long
-from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
 from tests.support.suites import (
     BROKEN,
     KNOWN,
     InProcess,
     cell_on,
-    cells_of,
     made_once,
     paper_cells,
     planned,
@@ -45,6 +39,56 @@ from tests.support.suites import (
     same_results,
     suite_of,
 )
+
+
+class Nobody(InProcess):
+    """Its processes end wherever runs are performed side by side."""
+
+    def perform(self, jobs):
+        for job, outcomes in super().perform(jobs):
+            lost = len(job.numbers) > 1
+            yield job, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
+
+
+LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
+
+
+ALONE = cell_on(load_task("ascending"), KNOWN["corrective-alone/given"])
+
+
+def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
+    tables = []
+    for number, executor in enumerate((InProcess(), Nobody())):
+        options = {"runs": SLOTS + 2, "trials": 3, "executor": executor}
+        tables.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
+    assert (tables[0].status == "ok").all()
+    assert tables[0].result.tolist() == tables[1].result.tolist()
+    assert [set(runs.together) for runs in tables] == [{1, 2, SLOTS}, {1}]
+
+
+class Forges(InProcess):
+    """Has two of many runs state what is no solution."""
+
+    def perform(self, jobs):
+        for job, outcomes in super().perform(jobs):
+            if len(outcomes) == SLOTS:
+                fifth, seventh = (outcomes[run].parts["solution"] for run in (5, 7))
+                fifth[0] = replace(fifth[0], target=fifth[0].target[1:])
+                seventh.pop()
+            yield job, outcomes
+
+
+def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):
+    """Of runs side by side each is executed by itself; those alone are performed again."""
+    forged, honest = (
+        run_and_write(tmp_path / each.__name__, [LEARNER], runs=SLOTS, trials=3, executor=each())
+        for each in (Forges, InProcess)
+    )
+    assert forged.runs.result.tolist() == honest.runs.result.tolist()
+    assert (forged.runs.status == "ok").all()
+    again = forged.runs.together == 1
+    assert again[again].index.tolist() == [5, 7]
+
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 
@@ -55,31 +99,6 @@ def results(tmp_path_factory):
         run_and_write(folder / "deep" / "er")
 
     return load(made_once(tmp_path_factory, "results", make) / "deep" / "er")
-
-
-def test_every_method_runs_in_some_suite():
-    studies = Path(__file__).parents[1].glob("studies/*/suite.toml")
-    every = [*suites().values(), *(load_suite(str(path)) for path in studies)]
-    blocks = [block for suite in every for block in suite.blocks]
-    patterns = {pattern for block in blocks for pattern in block.methods}
-    run = {name for name in KNOWN for pattern in patterns if fnmatch(name, pattern)}
-    assert run == set(KNOWN)
-
-
-def test_suite_ablations_frees_the_base():
-    cells = cells_of("ablations")
-    tasks = {cell.task.name: cell.task for cell in cells}
-    free, rail = tasks["two-armed-1.free-base"], tasks["two-armed-1"]
-    assert (free.locked_base, rail.locked_base) == ((), ("y",))
-    assert free.provenance["locked_base"].status == "chosen"
-    same = {"goals", "start", "hands", "radius", "initial_hands"}
-    assert free.model_dump(include=same) == rail.model_dump(include=same)
-    blocks = {
-        "blocks": [{"tasks": ["ascending"], "methods": ["dual-process/EC1"], "free_base": True}]
-    }
-    suite = load_suite("paper").model_validate(load_suite("paper").model_dump() | blocks)
-    with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
-        cells_of(suite)
 
 
 def test_long_runs_begin_first(tmp_path):
@@ -163,73 +182,6 @@ def test_failures_are_kept_as_data(tmp_path):
     assert study.sequences(stuck.name).reward.isna().all()
 
 
-def test_grid_and_fixed_parameters(tmp_path):
-    path = tmp_path / "own.toml"
-    path.write_text(
-        """
-        title = "Noise"
-        description = "Noise against trials"
-        runs = 1
-        [[blocks]]
-        tasks = ["ascending"]
-        methods = ["dual-process/EC1"]
-        parameters = { trials = 40 }
-        grid = { noise_sd = [0.02, 0.1], epsilon = [0.0, 0.5] }
-        """
-    )
-    cells = cells_of(path)
-    assert [cell.setting for cell in cells] == [
-        "trials=40, epsilon=0.0, noise_sd=0.02",
-        "trials=40, epsilon=0.5, noise_sd=0.02",
-        "trials=40, epsilon=0.0, noise_sd=0.1",
-        "trials=40, epsilon=0.5, noise_sd=0.1",
-    ]
-    runs = run_and_write(tmp_path / "out", cells, runs=1, trials=999).runs
-    asked = {"epsilon": 0.5, "noise_sd": 0.1, "trials": 40}  # the suite's own number stands
-    assert json.loads(runs.parameters[3]).items() >= asked.items()
-    assert (runs.trials == 40).all()
-
-
-def test_cells_are_distinguished_by_their_parameters(tmp_path):
-    """Different parameters are different cells, compared with the paper only as it had them."""
-    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-    asked = suite_of(
-        tmp_path,
-        ec1,
-        ec1 + "parameters = { noise_sd = 0.5 }",
-        ec1 + "parameters = { noise_sd = 0.05 }",  # the default: the first cell again
-        ec1 + "parameters = { trials = 20 }",
-        'tasks = ["*"]\nmethods = ["dual-process/EC1"]',
-    )
-    labels = [(cell.task.name, cell.setting) for cell in asked]
-    assert labels[:3] == [
-        ("ascending", ""),
-        ("ascending", "noise_sd=0.5"),
-        ("ascending", "trials=20"),
-    ]
-    assert len(labels) == len(set(labels)) == 6
-    study = run_and_write(tmp_path / "out", asked, runs=3, trials=30)
-    assert study.runs.run_id.is_unique
-    assert set(study.runs.groupby(["task", "setting"]).size()) == {3}
-    compared = {(row["cell"].task, row["cell"].label) for row in published_and_ours(study)}
-    assert ("ascending", "dual-process/EC1") in compared
-
-
-def test_a_cell_has_one_number_of_runs(tmp_path):
-    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-    with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
-        suite_of(tmp_path, ec1, ec1 + "runs = 7")
-    (job,) = plan_suite(tmp_path / "own.toml", runs=2)
-    assert job.numbers == range(2)
-    once = {"methods": ["corrective-alone/best-hands"], "tasks": ["two-armed-1"]}
-    assert size_of(plan_suite("paper", runs=20, **once)) == 1
-    task = tmp_path / "mine.toml"
-    task.write_text(GOOD, encoding="utf-8")
-    suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
-    own = plan_suite(tmp_path / "own.toml", tasks=[task])
-    assert {len(job.numbers) for job in own if job.cell.task.name == "mine"} == {7}
-
-
 def test_learner_columns_are_the_learners(tmp_path):
     """A method's details never pass for columns that mean something else."""
     methods = registry([BROKEN])
@@ -255,21 +207,6 @@ def test_every_method_makes_the_trials_that_it_is_told(tmp_path, goals, policy, 
     assert runs.status.unique().tolist() == ["ok"]
     assert runs.trials.unique().tolist() == [budget or 20]
     assert list(runs.initial_trials) == [searched] * 3 + [searched if goals > 3 else 0] * 4
-
-
-def test_a_session_counts_per_configuration():
-    session = Session(load_task("ascending"), 0, set(Information), trial_budget=2)
-    session.forward_kinematics(np.zeros((4, 5, 10)), "right")
-    session.jacobian(np.zeros((3, 10)), "right")
-    correction = session.correct(session.q0, "right", 1)
-    execution = session.trial([Movement(k, "right", "corrective") for k in (1, 2, 3)])
-    meter = session.meter
-    assert meter.forward_kinematics == 20 + correction.iterations + 1 + execution.evaluations
-    assert meter.jacobians == 3 + correction.iterations + execution.iterations
-    assert (meter.trials, meter.movement_ticks, meter.corrections) == (1, 319, 3)
-    assert session.trials_left == 1
-    with pytest.raises(ValueError, match="goals are numbered 1 to 3"):
-        session.correct(session.q0, "right", 4)
 
 
 def test_the_runs_of_a_batch_are_scored():
@@ -348,84 +285,6 @@ def test_robots_of_different_size_share_a_table(tmp_path):
         rows = study.solutions[study.solutions.run_id == run.run_id]
         task = study.tasks[run.task]
         assert execute(task, movements_from(task, rows.to_dict("records"))).reward == run.reward
-
-
-def test_own_task_runs_under_every_applicable_condition(tmp_path):
-    path, other = tmp_path / "mine.toml", tmp_path / "arm.toml"
-    path.write_text(GOOD, encoding="utf-8")
-    other.write_text('hands = ["right"]\n' + GOOD.replace("mine", "arm"), encoding="utf-8")
-
-    def methods(path, **selection):
-        cells = paper_cells(tasks=[path], **selection)
-        return [cell.method.name for cell in cells]
-
-    baseline = ["corrective-alone/best-hands"]
-    assert methods(path, methods=baseline) == baseline
-    assert methods(path) == [f"dual-process/EC{k}" for k in (1, 2, 3, 4)]
-    assert methods(other) == ["dual-process/EC1"]
-    both = paper_cells(tasks=["ascending", str(path)])
-    assert [cell.task.name for cell in both] == ["ascending"] + 4 * ["mine"]
-    made = [*map(load_task, ("two-armed-1", path, "two-armed/v1/i003"))]
-    again = paper_cells(tasks=made, methods=["EC4"])
-    assert [cell.task for cell in again] == made
-    for name in ("ascending", "two-armed/v1/i003"):
-        impostor = made[1].model_copy(update={"name": name})
-        with pytest.raises(CoarticError, match=f"{name}' is already taken by a shipped task: give"):
-            paper_cells(tasks=[impostor])
-    with pytest.raises(CoarticError, match="name 'arm' is already taken by another task: give"):
-        paper_cells(tasks=[made[1].model_copy(update={"name": "arm"}), str(other)])
-
-
-def test_ablations_of_the_learner_are_methods_of_their_own():
-    """Known by their short names, with the information that they use."""
-    cells = paper_cells(methods=["EC1-subtask"], tasks=["ascending"])
-    assert [cell.label for cell in cells] == ["dual-process/EC1-subtask"]
-    for name, entry in KNOWN.items():
-        if name.startswith("dual-process/") and name != "dual-process/custom":
-            condition = EVERY_CONDITION[name.partition("/")[2]]
-            for key, value in entry.complete({"trials": 1}).items():
-                assert key == "trials" or getattr(condition, key) == value
-            assert ("reward by subtask" in entry.information) == name.endswith("-subtask")
-    with pytest.raises(CoarticError, match="discount is an unknown key"):
-        # the information would no longer be right
-        KNOWN["dual-process/EC4"].complete({"discount": 0.1})
-
-
-def test_a_suite_can_move_one_goal(tmp_path):
-    cells = suite_of(
-        tmp_path,
-        'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-        "move = { goal = 2, by = [[0, -0.5], [0.25, 0]] }",
-    )
-    base = load_task("ascending")
-    assert [cell.task.name for cell in cells] == [
-        "ascending.goal2_0_-0.5",
-        "ascending.goal2_0.25_0",
-    ]
-    for cell, moved in zip(cells, ((6.0, 1.5), (6.25, 2.0)), strict=True):
-        assert cell.task.goals == (base.goals[0], moved, base.goals[2])
-        assert np.array_equal(cell.task.q0, base.q0)
-    with pytest.raises(CoarticError, match="out of reach|too far"):
-        suite_of(
-            tmp_path,
-            'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
-            "move = { goal = 2, by = [[0, 9]] }",
-        )
-
-
-def test_a_goal_that_an_own_task_lacks_is_not_moved_in_it(tmp_path):
-    (tmp_path / "mine.toml").write_text('hands = ["right"]\n' + GOOD, encoding="utf-8")
-    head = 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\n'
-    assert len(suite_of(tmp_path, head + "move = { goal = 3, by = [[0, 0.1]] }")) == 4
-    files = [str(tmp_path / "mine.toml")]
-    cells = cells_of(tmp_path / "own.toml", tasks=files)
-    assert [cell.task.name for cell in cells] == ["mine"]
-
-
-def test_a_block_may_be_for_tasks_of_so_many_goals(tmp_path):
-    block = 'tasks = ["*"]\nmethods = ["corrective-alone/given"]\ngoals = [3]'
-    cells = suite_of(tmp_path, block)
-    assert {cell.task.name for cell in cells} == {"ascending", "descending"}  # others have more
 
 
 def test_some_runs_of_every_cell_are_performed_again(results, monkeypatch):

@@ -27,7 +27,7 @@ from coartic.motion.trial import compiled_task
 from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, explored_joints
 from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import PAPER_CELLS, make_trials, sample, tiny_task, uneven_task
+from tests.support.strategies import PAPER_CELLS, make_trials, sample, uneven_task
 
 TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {
     "uneven": uneven_task(),
@@ -342,22 +342,3 @@ def test_a_batch_counts_as_so_many_trials():
     for count in {*Meter.COUNTS} - {"forward_kinematics"}:
         assert getattr(batch.meter, count) == getattr(single.meter, count), count
     assert 0 < batch.meter.forward_kinematics < single.meter.forward_kinematics
-
-
-def test_rows_of_a_trajectory_by_hand():
-    """A goal hit at the start, two lines of 3 and 2 steps, q + k m (target - q)/distance."""
-    task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
-    ahead = [Movement(n, "right", "planned", q_at(x)) for n, x in ((2, 0.06), (3, 0.08))]
-    path = trajectory(task, [Movement(1, "right", "corrective"), *ahead])
-    np.testing.assert_allclose(path.configurations[:, 0], np.array([0, 1, 2, 3, 3, 4, 5]) / 100)
-    np.testing.assert_allclose(path.hand_path("right")[:, 0], path.configurations[:, 0] + 4.5)
-    assert path.hits.tolist() == [0, 3, 6]
-    assert [len(path.subtask(goal)) for goal in (1, 2, 3)] == [1, 4, 4]
-    only = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
-    idle = trajectory(only, [Movement(1, "right", "corrective")])
-    assert (idle.configurations.shape, idle.hits.tolist()) == ((0, 10), [0])
-
-
-def q_at(x):
-    """Arms straight along +x, the base at (x, 0)."""
-    return np.array([x, *[0.0] * 9])

@@ -19,7 +19,7 @@ from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families
 from coartic.tasks.task import address_of, task_text
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
 STUDIES = [folder for folder in ALL if (folder / "suite.toml").exists()]
 """Studies of runs; the others have protocols of their own."""
