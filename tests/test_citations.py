@@ -1,9 +1,7 @@
 """The bibliography: well-formed, and what the methods say of themselves."""
 
 import re
-import sqlite3
 import unicodedata
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -19,8 +17,7 @@ from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.method_files import METHOD_NAME
 from coartic.benchmarks.registry import NAMES, built_in, registry
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.store import RUNS_FILE
-from tests.support.suites import BROKEN, cell_on, run_and_write
+from tests.support.suites import BROKEN, cell_on, edit, run_and_write
 
 ROOT = Path(__file__).parent.parent
 
@@ -124,11 +121,8 @@ def test_command(tmp_path, coartic):
     ]
     run_and_write(tmp_path / "results", cells, runs=1)
     commit = '{"id": "0123456789abcdef", "dirty": true}'
-    with closing(
-        sqlite3.connect(tmp_path / "results" / RUNS_FILE, isolation_level=None)
-    ) as plain_sql:
-        change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
-        plain_sql.execute(change, (commit,))
+    change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
+    edit(tmp_path / "results", change, commit)
     code, text, _ = coartic("cite", tmp_path / "results")
     assert code == 0
     assert ", commit 0123456789abcdef with changes}," in text

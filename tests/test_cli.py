@@ -2,11 +2,10 @@
 
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 from collections import Counter
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -19,11 +18,10 @@ from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, app, draw
 from coartic.cli.terminal import Display
 from coartic.runs.plan import run_seed
-from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session
-from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, cell_on
+from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, cell_on, edit
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
@@ -119,14 +117,11 @@ def test_reproduce(coartic, tmp_path):
     assert code == 0
     assert text.splitlines()[-1] == "Performed again: identical."
     assert "1 run performed again: none with another" in coartic("verify", out, "--again", 1)[1]
-    with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
-        change = "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?"
-        plain_sql.execute(change, (second,))
+    edit(out, "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?", second)
     code, text, _ = coartic("verify", out, "--again", 2)
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
-    with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
-        change = 'UPDATE movements SET right_1 = right_1 + 1e-15 WHERE "order" = 0 AND part = ?'
-        plain_sql.execute(change, ("replay",))
+    first_movement = """WHERE "order" = 0 AND part = 'replay'"""
+    edit(out, f"UPDATE movements SET right_1 = right_1 + 1e-15 {first_movement}")
     code, text, _ = coartic("reproduce", second, "--in", out)
     assert code == 1
     assert "- movement_ticks: " in text
@@ -134,8 +129,7 @@ def test_reproduce(coartic, tmp_path):
     code, _, error = coartic("reproduce", "", "--in", out)
     assert code == 2
     assert "is not a run id" in error
-    with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
-        plain_sql.execute("UPDATE cells SET code = 'other'")
+    edit(out, "UPDATE cells SET code = 'other'")
     code, _, error = coartic("verify", out, "--again", 1)
     assert code == 2
     assert "has no run of a method whose code is the same here" in error

@@ -21,7 +21,15 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.runner import perform
 from coartic.runs.plan import size_of
 from coartic.runs.store import RUNS_FILE, open_store, writing
-from tests.support.suites import KNOWN, InProcess, cell_on, planned, run_and_write, same_results
+from tests.support.suites import (
+    KNOWN,
+    InProcess,
+    cell_on,
+    edit,
+    planned,
+    run_and_write,
+    same_results,
+)
 
 EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "posture-qp/current-goal"
 OWN = Path(template.__file__)
@@ -110,12 +118,6 @@ def test_a_folder_is_read_in_one_state(parts, tmp_path):
 def test_runs_of_a_method_that_is_not_here_are_refused(parts, tmp_path):
     with open_store(parts[0]) as store, pytest.raises(CoarticError, match="with its method file"):
         perform(store.plan(), tmp_path / "out", executor=InProcess())
-
-
-def edit(folder, statement):
-    with closing(sqlite3.connect(folder / RUNS_FILE)) as db:
-        assert db.execute(statement).rowcount
-        db.commit()
 
 
 OF_EC1 = "(SELECT results.id FROM results JOIN cells ON cells.id = cell"

@@ -1,8 +1,6 @@
 """The pages of the site whose numbers come from stored results."""
 
-import importlib.util
 import re
-import sys
 import tomllib
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -15,12 +13,10 @@ from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.suites import Suite
 from coartic.tasks.families import Family
 from coartic.tasks.task import Task
+from tests.support.processes import program
 
 DOCS = Path(__file__).parent.parent / "docs"
-sys.path.append(str(DOCS))  # the program imports what is beside it
-_SPEC = importlib.util.spec_from_file_location("make_findings", DOCS / "make_findings.py")
-make_findings = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(make_findings)
+make_findings = program(DOCS / "make_findings.py")
 
 
 def test_pages_are_their_templates_filled_from_the_stored_tables():

@@ -71,23 +71,6 @@ def test_equals_every_step_many_times(robot, largest, hand):
         assert_equals_every_step(robot, q, target, hand, goal, 0.1, stops, models[model])
 
 
-@pytest.mark.parametrize("stops", [False, True])
-@pytest.mark.parametrize(
-    ("angle", "at_end", "offset", "radius"),
-    [
-        (2.5, False, (0.0, 0.25), 0.25),
-        (1.5, True, (0.0, 0.25), 0.25),
-        (0.0, False, (1.0, 0.0), 0.1),
-    ],
-)
-def test_equals_every_step_where_the_rim_runs_through_an_end(angle, at_end, offset, radius, stops):
-    """Through the start of a movement, through its end, and where there is no way to go."""
-    q = np.full(10, angle)
-    target = 0.75 * q
-    goal = ROBOT.forward_kinematics(target if at_end else q, "left") + offset
-    assert_equals_every_step(ROBOT, q, target, "left", goal, radius, stops)
-
-
 def test_grazing_a_goal():
     """Goals whose rim the hand's path only just touches, or only just misses."""
     rng = np.random.default_rng(8)

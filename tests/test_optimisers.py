@@ -175,7 +175,10 @@ def test_points_become_movements():
         costs = cost.many(points, hands)
         for point, due in zip(points, costs, strict=True):
             assert execute(task, cost.movements(point, hands)).reward == -due
-    assert cost.evaluations == 90
+    assert cost.many(points[:2], ["RRRR", "LLRL"]).tolist() == [
+        cost(points[0], "RRRR"), cost(points[1], "LLRL")
+    ]  # fmt: skip
+    assert cost.evaluations == 94
     model = MotionModel(max_iterations=100)
     fails = coartic.objective("ascending", model=model)
     points = fails.x0 + np.random.default_rng(0).standard_normal((200, fails.dim))
@@ -360,27 +363,6 @@ def test_what_is_no_point_is_refused_with_its_own_shape():
 
 
 FOUR = load_task("two-armed-2")
-
-
-def test_hands_may_come_with_points():
-    """Of all points, or of each; a joint that has no entry keeps still."""
-    problem = coartic.objective(FOUR, "LRLR")
-    targets = problem.configurations + 0.05 * np.random.default_rng(0).standard_normal((4, 10))
-    targets[~problem.joints] = np.nan
-    q = FOUR.q0
-    for goal, target in enumerate(targets):
-        targets[goal] = q = np.where(problem.joints[goal], target, q)
-    point = targets[problem.joints]
-
-    def cost_of(hands):
-        return -execute(FOUR, movements_of(hands, targets)).reward
-
-    assert problem(point) == cost_of("LRLR")
-    assert problem(point, "RRRR") == cost_of("RRRR")
-    assert problem.many([point] * 2, ["LLLL", "RLRR"]).tolist() == list(
-        map(cost_of, ("LLLL", "RLRR"))
-    )
-    assert problem.best_cost == -execute(FOUR, problem.solution).reward
 
 
 def test_what_is_known_of_a_task():

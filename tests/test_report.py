@@ -3,10 +3,8 @@
 import html.parser
 import re
 import shutil
-import sqlite3
 import subprocess
 import xml.etree.ElementTree as ElementTree
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +23,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
 from coartic.runs.store import RUNS_FILE
 from tests.support import made_up
-from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write, suite_of
+from tests.support.suites import KNOWN, cell_on, cells_of, edit, run_and_write, suite_of
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +80,8 @@ def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, coart
         assert {str(seed), f"−{-reward}"} <= set(line.split())
     listed = coartic("trace", "methods", "--in", results)[1].splitlines()
     assert [line.partition("  ")[0] for line in listed if not line.startswith(" ")] == names
-    change(results / RUNS_FILE, frame.run_ids.iloc[1].split()[0])  # of another row
+    of_another_row = frame.run_ids.iloc[1].split()[0]
+    edit(results, "UPDATE results SET result = 'other' WHERE run_id = ?", of_another_row)
     for command, said in (
         (("trace", "methods", "nothing", "--in", results), "unknown row 'nothing'"),
         (("trace", "methods", names[0], "--in", results), "the report is older than the runs of"),
@@ -90,12 +89,6 @@ def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, coart
     ):
         code, _, error = coartic(*command)
         assert (code, said in error) == (2, True), error
-
-
-def change(path, run_id):
-    with closing(sqlite3.connect(path)) as db:
-        db.execute("UPDATE results SET result = 'other' WHERE run_id = ?", (run_id,))
-        db.commit()
 
 
 def test_the_lowest_reward_of_a_task_is_first(traced):

@@ -31,6 +31,7 @@ from tests.support.suites import (
     Failing,
     InProcess,
     cell_on,
+    edit,
     paper_cells,
     planned,
     run_and_write,
@@ -312,11 +313,7 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
 
 
 def sql(statement):
-    def run(path):
-        with closing(sqlite3.connect(path, isolation_level=None)) as plain_sql:
-            plain_sql.execute(statement)
-
-    return run
+    return lambda path: edit(path.parent, statement)
 
 
 def foreign(path):

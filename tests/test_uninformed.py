@@ -13,7 +13,7 @@ from coartic.baselines.random_search import RandomSearchHands
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Meter, MethodError, Session
 from coartic.optimisers import OPTIMISER_INFORMATION
-from tests.support.strategies import tiny_task
+from tests.support.strategies import solve, tiny_task
 
 METHODS = (HillClimbing, CMAES, GoalByGoal)
 ONE_GOAL = tiny_task(
@@ -24,19 +24,11 @@ ONE_GOAL = tiny_task(
 )
 
 
-def solve(method, task, seed=0, budget=None, model=None, **parameters):
-    session = Session(
-        task, seed, method.information, trial_budget=budget, model=model or MotionModel()
-    )
-    result = method(method.Parameters(**parameters)).solve(session)
-    return session, result
-
-
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 @pytest.mark.parametrize("name", ["ascending", "two-armed-1"])
 def test_trials_counted_kept_and_made_again(method, name):
     task = load_task(name)
-    session, result = solve(method, task, trials=301)
+    result, _, session = solve(method, task, trials=301)
     assert session.meter.trials == len(session.rewards) == 301
     completed = [reward for reward in session.rewards if reward is not None]
     again = execute(task, result.solution)
@@ -44,14 +36,14 @@ def test_trials_counted_kept_and_made_again(method, name):
     assert session.rewards.index(again.reward) == result.details["best_trial"]
     assert -sum(completed) == session.meter.movement_ticks  # none failed
     for budget, trials in ((23, 301), (301, 23)):
-        limited, _ = solve(method, task, budget=budget, trials=trials)
+        *_, limited = solve(method, task, budget=budget, trials=trials)
         assert limited.meter.trials == 23
 
 
 def test_every_sequence_begins_with_its_corrective_trial():
     task = load_task("two-armed-2")
     alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
-    session, result = solve(CMAES, task, trials=500)
+    result, _, session = solve(CMAES, task, trials=500)
     assert session.rewards[0] == alone["RRRR"]
     assert sorted(session.rewards[:16]) == sorted(alone.values())
     spent = result.details["trials"]
@@ -61,14 +53,14 @@ def test_every_sequence_begins_with_its_corrective_trial():
 
 def test_hands_chosen_goal_by_goal():
     task = load_task("two-armed-2")
-    session, result = solve(GoalByGoal, task, trials=2000)
+    result, _, session = solve(GoalByGoal, task, trials=2000)
     assert session.rewards[0] == corrective_trial(task, "RRRR").reward
     assert result.details["sequences"] > 4
-    _, narrow = solve(GoalByGoal, task, trials=100, epsilon=0.0)
+    narrow, *_ = solve(GoalByGoal, task, trials=100, epsilon=0.0)
     assert narrow.details["sequences"] == 1  # nothing else is worth more than what was tried
     assert {movement.hand for movement in narrow.solution} == {"right"}
     many = task.model_copy(update={"goals": task.goals[:2] * 7, "initial_hands": "R" * 14})
-    session, result = solve(GoalByGoal, many, trials=400)
+    result, _, session = solve(GoalByGoal, many, trials=400)
     assert result.details["sequences"] > 4  # of 16,384, which are too many to try
     assert execute(many, result.solution).reward == max(filter(None, session.rewards))
 
@@ -76,25 +68,25 @@ def test_hands_chosen_goal_by_goal():
 def test_random_search_with_every_hand_sequence():
     """Each sequence has its corrective trial and as many random trials; the best of all is kept."""
     task = load_task("two-armed-2")
-    session, result = solve(RandomSearchHands, task, trials=165)
+    result, _, session = solve(RandomSearchHands, task, trials=165)
     assert session.meter.trials == 165
     alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
     starts = [165 * n // 16 for n in range(16)]
     assert sorted(session.rewards[n] for n in starts) == sorted(alone.values())
     completed = [reward for reward in session.rewards if reward is not None]
     assert execute(task, result.solution).reward == max(completed)
-    far, _ = solve(RandomSearchHands, task, trials=165, half_width=3.0)
+    *_, far = solve(RandomSearchHands, task, trials=165, half_width=3.0)
     assert max(filter(None, far.rewards)) == max(alone.values())  # no such random trial is better
-    assert solve(RandomSearchHands, task, trials=301, budget=20)[0].meter.trials == 20
+    assert solve(RandomSearchHands, task, trials=301, budget=20)[2].meter.trials == 20
 
 
 def test_the_bandit_exploits_explores_and_goes_where_rewards_are():
     task = load_task("two-armed-1")
-    _, greedy = solve(CMAES, task, trials=300, exploration=0.0)
+    greedy, *_ = solve(CMAES, task, trials=300, exploration=0.0)
     assert greedy.details["trials"]["LRLR"] == 300 - 15  # -532 at first; the next one has -574
-    _, even = solve(CMAES, task, trials=480, exploration=100.0)
+    even, *_ = solve(CMAES, task, trials=480, exploration=100.0)
     assert min(even.details["trials"].values()) > 18
-    _, balanced = solve(CMAES, task, trials=800)
+    balanced, *_ = solve(CMAES, task, trials=800)
     spent = balanced.details["trials"]
     assert spent["LRLR"] > 400
     assert spent["LRLR"] == max(spent.values())
@@ -140,7 +132,7 @@ def one_by_one(task, seed, parameters):
 
 @pytest.mark.parametrize("task", [load_task("two-armed-2"), SECOND_FOR_THE_RIGHT])
 def test_trials_made_together_are_those_made_one_by_one(task):
-    session, _ = solve(HillClimbing, task, trials=300)
+    *_, session = solve(HillClimbing, task, trials=300)
     alone = one_by_one(task, 0, UninformedParameters(trials=300))
     assert session.rewards == alone.rewards
     together, single = vars(session.meter), vars(alone.meter)
@@ -150,7 +142,7 @@ def test_trials_made_together_are_those_made_one_by_one(task):
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_sequences_that_cannot_be_completed_are_left(method):
     task = SECOND_FOR_THE_RIGHT
-    session, result = solve(method, task, trials=150)
+    result, _, session = solve(method, task, trials=150)
     assert session.meter.trials == 150
     assert session.rewards.count(None) == session.meter.failed_trials == 2
     assert execute(task, result.solution).hands[1] == "R"
@@ -212,7 +204,7 @@ def test_a_single_joint_to_explore():
         robot={"right_links": [1.0]},
         start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.5]},
     )
-    session, _ = solve(CMAES, task, trials=60)
+    *_, session = solve(CMAES, task, trials=60)
     # Turns by pi/2 - 0.5 less the angle under which half the disc's chord is seen.
     turn = math.pi / 2 - 0.5 - 2 * math.asin(0.1 / 2)
     assert max(session.rewards) == -(math.ceil(turn / 0.01) + 1)

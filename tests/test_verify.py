@@ -29,6 +29,7 @@ from coartic.runs.record import PARTS, Outcome, Run, Score
 from coartic.runs.store import RUNS_FILE, writing
 from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task, uneven_task
+from tests.support.suites import edit
 
 NARROW = {5: {"other_arm": "still"}, 6: {"base": "y"}}
 
@@ -90,9 +91,7 @@ def true_folder(tmp_path_factory):
 def edited(true_folder, tmp_path, statement):
     """A copy in which somebody made a change by hand."""
     folder = shutil.copytree(true_folder, tmp_path / "edited")
-    with closing(sqlite3.connect(folder / RUNS_FILE)) as db:
-        assert db.execute(statement).rowcount
-        db.commit()
+    edit(folder, statement)
     return folder
 
 

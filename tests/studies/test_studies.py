@@ -6,9 +6,7 @@ one verdict of dose there is now undecided, as it hangs on one of five tasks.
 """
 
 import hashlib
-import importlib.util
 import lzma
-import sys
 from pathlib import Path
 
 import pandas as pd
@@ -18,6 +16,7 @@ from coartic.analysis import figures, fill_page, load, write_study
 from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families
 from coartic.tasks.task import address_of, task_text
+from tests.support.processes import program
 
 ROOT = Path(__file__).parents[2]
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
@@ -39,14 +38,6 @@ INSTANCES = {
 """Hashes of instances of the studies' own families, as version 1.1.0 drew them."""
 
 
-def program(folder):
-    sys.path.insert(0, str(folder))  # as where it is run
-    spec = importlib.util.spec_from_file_location(f"study_{folder.name}", folder / "study.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def read(path):
     return pd.read_csv(path, index_col=0)
 
@@ -65,7 +56,7 @@ def measured(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     content = lzma.decompress((SMALL / request.param.name / "runs.sqlite.xz").read_bytes())
     (folder / "runs.sqlite").write_bytes(content)
-    study = program(request.param)
+    study = program(request.param / "study.py")
     return request.param, study, study.measure(load(folder))
 
 

@@ -1,6 +1,7 @@
 """Processes as Linux shows them, none elsewhere; and what is done in one of its own."""
 
 import contextlib
+import importlib.util
 import multiprocessing
 import os
 import sys
@@ -56,6 +57,16 @@ def apart(what, *arguments):
 
 def _say(answers, what, arguments):
     answers.send(what(*arguments))
+
+
+def program(path):
+    """The module of a file beside which it imports others, as where it is run."""
+    sys.path.insert(0, str(path.parent))
+    spec = importlib.util.spec_from_file_location(f"{path.parent.name}_{path.stem}", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 def forget(*packages):

@@ -79,9 +79,10 @@ def sample(task, count, noise=0.3, seed=0):
     return hands, targets + noise * np.array(free) * rng.standard_normal(targets.shape)
 
 
-def solve(method, task, seed=0, **parameters):
+def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):
     """What a method of this project finds, the execution of it, and the session."""
-    session = Session(task, seed, method.information, trusted=True)
+    options = {"trial_budget": budget, "model": model, "trusted": True}
+    session = Session(task, seed, method.information, **options)
     result = method(method.Parameters(**parameters)).solve(session)
     return result, execute(task, result.solution), session
 

@@ -2,6 +2,8 @@
 
 import contextlib
 import os
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pandas as pd
@@ -14,6 +16,7 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
 from coartic.benchmarks.worker import fail, perform_job
 from coartic.runs.plan import Job, cell_of
+from coartic.runs.store import RUNS_FILE
 
 ROOT = Path(__file__).parents[2]
 BROKEN = ROOT / "tests" / "methods" / "broken.py"
@@ -95,6 +98,13 @@ def made_once(tmp_path_factory, name, make):
             make(folder)
             made.touch()
     return folder
+
+
+def edit(folder, statement, *values):
+    """A change of a results folder by hand."""
+    with closing(sqlite3.connect(folder / RUNS_FILE)) as database:
+        assert database.execute(statement, values).rowcount
+        database.commit()
 
 
 def same_results(a, b):

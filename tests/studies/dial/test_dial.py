@@ -1,25 +1,17 @@
 """The dial: gains, and verdicts, of runs that nobody ran."""
 
-import importlib.util
-import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from tests.support.processes import program
+
 FOLDER = Path(__file__).parents[3] / "studies" / "dial"
 
 
-def program(name):
-    spec = importlib.util.spec_from_file_location(f"dial_{name}", FOLDER / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-STUDY, PROTOCOLS = program("study"), program("protocols")
+STUDY, PROTOCOLS = (program(FOLDER / f"{name}.py") for name in ("study", "protocols"))
 
 
 def planted(gains, quarters=None):

@@ -1,6 +1,5 @@
 """The practised policy: what it sees, draws, learns and keeps, beside slow or exact checks."""
 
-import importlib.util
 import math
 from pathlib import Path
 
@@ -14,11 +13,9 @@ from coartic import PAPER, Robot, correct, execute, move
 from coartic.method import Session
 from coartic.tasks.families import broken_rule, draft, instance_of, read_family
 from coartic.tasks.task import address_of
+from tests.support.processes import program
 
-FILE = Path(__file__).parents[3] / "studies" / "practice" / "policy.py"
-SPEC = importlib.util.spec_from_file_location("practised_policy", FILE)
-practice = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(practice)
+practice = program(Path(__file__).parents[3] / "studies" / "practice" / "policy.py")
 ROBOT, RIGHT, TRIALS = Robot(), slice(6, 10), 40 * practice.BATCH
 
 

@@ -9,29 +9,18 @@ import pytest
 
 from coartic import Movement, learn, load_task
 from coartic.analysis import figures
+from coartic.tasks.task import hands_of
+from tests.support.processes import program
 from tests.support.reference import correct, execute
 
 FOLDER = Path(__file__).parents[3] / "studies" / "tell-apart"
 
 
-@pytest.fixture
-def protocols(monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    import protocols
-
-    return protocols
+study = program(FOLDER / "study.py")
+protocols = sys.modules["protocols"]  # which the study imports
 
 
-@pytest.fixture
-def study(protocols, monkeypatch):
-    monkeypatch.delitem(sys.modules, "study", raising=False)  # another folder's
-    import study
-
-    yield study
-    del sys.modules["study"]
-
-
-def test_tables_and_figure_of_some_of_the_tasks(study, monkeypatch):
+def test_tables_and_figure_of_some_of_the_tasks(monkeypatch):
     monkeypatch.setattr(study, "EXPERIMENTS", 200)
     raw = [pd.read_csv(FOLDER / f"{name}.csv") for name in ("changes", "starts", "steps")]
     few = raw[0].task.drop_duplicates()[:6]
@@ -47,7 +36,7 @@ def test_tables_and_figure_of_some_of_the_tasks(study, monkeypatch):
     assert figures.picture(study.draw(tables["results"]), ".svg").count(b"<path") > 20
 
 
-def test_learner_that_is_logged_is_the_papers(protocols):
+def test_learner_that_is_logged_is_the_papers():
     postures, rewards = protocols.series(load_task("one-armed/v1/d000"), "learner", 7)
     run = learn("one-armed/v1/d000", "EC1", seed=7, trials=len(rewards))
     assert rewards.tolist() == run.rewards.tolist()
@@ -60,14 +49,14 @@ def corrected(task, q, hand, goal):
 
 
 @pytest.mark.parametrize("name", ["one-armed/v1/i002", "two-armed/v1/i001"])
-def test_share_at_once_by_other_code(protocols, monkeypatch, name):
+def test_share_at_once_by_other_code(monkeypatch, name):
     """By the step-by-step reference, one movement after the other."""
     monkeypatch.setattr(protocols, "AFTER", [1, 300])
     monkeypatch.setattr(protocols, "EVOLVED", 2)
     monkeypatch.setattr(protocols, "PLANNERS", {})
     task, practised = load_task(name), learn(name, protocols.condition(load_task(name)), seed=0)
     cases = [case for case in protocols.moves(task, 0) if case[1] == 0.5]
-    hands = [{"L": "left", "R": "right"}[letter] for letter in practised.hands]
+    hands = hands_of(practised.hands)
     rows = [row for row in protocols.change_goals(task, 0) if row["distance"] == 0.5]
     for n, (g, _, after) in enumerate(cases):
         run = learn(after, practised.condition, seed=1, trials=300, start=practised.solution)
