@@ -18,6 +18,7 @@ from coartic.analysis.sections import FIGURES, TABLES, costs, own, ranking
 from coartic.analysis.sections.rewards import changed_hands
 from coartic.analysis.statistics import running_times
 from coartic.estimates import RESAMPLES, SEED
+from tests.support.golden import golden
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 from tests.support.made_up import study_of_rewards as study
 
@@ -105,47 +106,6 @@ def test_two_methods_differ_by_the_difference_of_their_gaps():
     found = ranking.difference_of_gaps(seen, both, "my-plan")
     ends = rows.loc[both, ["gap", "gap_low", "gap_high"]] - rows.gap["my-plan"]
     assert [found.value, found.low, found.high] == pytest.approx(list(ends), abs=3e-4)
-    there, back = (
-        np.array(re.findall(r"[\d.]+", text), float)
-        for text in (ranking.differences(seen)[a][b] for a, b in
-                     itertools.permutations(ranking.differences(seen), 2))
-    )  # fmt: skip
-    assert sorted(there) == sorted(back)
-    assert len(there) == 3
-
-
-def test_the_learners_place_is_said():
-    both = study(TEN | strangers(("mine", 2), ("yours", -3), runs=10))
-    assert "of the three that learn (3.5 %); the learner is number 2 (" in ranking.nearest(both)
-    last = study(TEN | strangers(("mine", 2), runs=10))
-    assert re.search(
-        r"of the two that learn \(.*?\); the learner is last \(", ranking.nearest(last)
-    )
-
-
-def alike(**better):
-    """Methods by their beginnings, with -300 and so many ticks more on ascending."""
-    names = {"learner": "dual-process/EC1", "cma": "cma-es/bandit",
-             "random_search": "random-search", "climbing": "hill-climbing",
-             "alone": "corrective-alone/given"}  # fmt: skip
-    rewards = {("ascending", names[name]): [-300 + more] * 3 for name, more in better.items()}
-    return ranking.nearest(study(rewards))
-
-
-def test_ties_are_said():
-    text = alike(learner=0, cma=0, random_search=0)
-    assert text.startswith("The learner and CMA-ES have the same gap to the optimum (2.7 %).")
-    assert "Gap of random search: 2.7 %, the same as the learner's." in text
-    text = alike(learner=0, cma=0, climbing=-1)
-    assert "have the same gap to the optimum (2.7 %), the smallest of the three that learn" in text
-    text = alike(learner=0, cma=0, climbing=1, random_search=1)
-    assert "the learner is number 2 (2.7 %)" in text
-    assert "Gap of random search: 2.4 %, smaller than the learner's." in text
-
-
-def test_who_tries_hands_alone_does_not_learn():
-    """Its trials are two, to choose the hands."""
-    assert "of the two that learn" in alike(learner=0, cma=1, alone=0)
 
 
 def test_the_learner_stands_by_the_form_that_explores_most():
@@ -274,14 +234,12 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     )
     plot, sentence = FIGURES["ranking"](unknown), ranking.nearest(unknown)
     assert "best of folder" in plot.figure.axes[0].get_xlabel()
-    assert sentence.startswith("The learner comes nearest to the best of this folder (1.6 %).")
     for words in (sentence, plot.alt, *columns_of(TABLES["ranking"], ranked).values()):
         assert not re.search("optimum|known", words)
     assert "Two-armed 1 † is known: gaps there are" in about.notes_of(unknown, ranked)[0]
     assert TABLES["tasks"](unknown).source.tolist() == ["mine", "dual-process/EC4"]
     one = MadeUp(seen, optima=made_up_optima("ascending"))
     assert TABLES["ranking"](one).loc["mine", "on ascending"] == pytest.approx(4.5 / 292)
-    assert "Gap of mine to the optimum: 1.5 %" in ranking.nearest(one)  # of ascending alone
 
 
 def test_the_ranking_figure_names_every_method_inside():
@@ -307,108 +265,72 @@ def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
     seen = study(rewards)
     optima = made_up_optima("ascending", "two-armed-1")
     assert standings.common_tasks(MadeUp(seen, optima=optima)) == ("ascending", "two-armed-1")
-    alone = own.own_in_words(MadeUp(seen, optima=optima))
-    assert alone == "mine is the only method on Two-armed 2 †: name others, too."
     both = study(rewards | {("two-armed-2", "theirs"): [-300]})
     optima |= {"two-armed-2": BestKnown(-300, None, only_here=True)}
     both = MadeUp(both, optima=optima)
     assert standings.common_tasks(both) == ("ascending", "two-armed-1")
-    first, *others = own.own_in_words(both).split("\n")
-    assert first == "theirs ran on 1 of 3 tasks: gap of 0.0 % there."
-    assert others[1].startswith("Gap of mine to the best of this folder on Two-armed 2 †: 3.0 %.")
+    assert standings.gaps_on(both, ("two-armed-2",)).gap.tolist() == pytest.approx([0, 0.03])
 
 
-def test_what_a_method_did_not_run_on_is_said():
-    """With its gap, and that of others, on what it ran on: in words, ranking and running times."""
-    some = {("ascending", "mine"): [-300, -301, -302]}
-    seen = study(LEARNER | CMA | some)
-    first, more = own.own_in_words(seen).split("\n")
-    assert first == "mine ran on 1 of 2 tasks: gap of 3.1 % there; CMA-ES 0.5 % on the same task."
-    assert more.startswith("Gap of mine to the optimum on Ascending: 3.1 % [")
-    assert "; of CMA-ES there: 0.5 %; of the learner there: 3.3 %." in more
+ON_ONE = {("ascending", "mine"): [-300, -301, -302]}
+
+
+def test_what_a_method_did_not_run_on_leaves_it_its_gap_there():
+    """And in running times what it ran on."""
+    seen = study(LEARNER | CMA | ON_ONE)
     ranked = TABLES["ranking"](seen)
     assert ranked.index.tolist()[:2] == ["mine", "cma-es/bandit"]
     assert ranked.gap["mine"] == pytest.approx(9 / 292)
     assert ranked.tasks[:3].tolist() == [1, 2, 2]
     texts = [text.get_text() for text in FIGURES["ranking"](seen).figure.axes[0].texts]
     assert any("mine (1 of 2 tasks)" in text for text in texts)
-    assert ranking.nearest(seen).startswith("CMA-ES comes nearest of the two that learn (0.4 %)")
     cells = costs.cells_with_targets(seen)
     assert [cell.task for cell in cells["mine"]] == ["ascending"]
     assert len(cells["cma-es/bandit"]) == 2
 
 
-def test_a_method_that_ran_on_all_is_said_beside_the_learner():
-    seen = study(TEN | strangers(("mine", 2), ("yours", 3), runs=10))
-    first, *_ = own.own_in_words(seen).split("\n")
-    assert first == "yours: gap of 3.2 %, better than the learner on 2 of 2 tasks."
-    assert own.own_methods(seen) == ["yours", "mine"]
-    few = study(
-        {key: rewards[:1] for key, rewards in (CMA | strangers(("mine", 2), runs=1)).items()}
-    )
-    assert own.own_in_words(few).split("\n")[0] == "mine: gap of 3.2 % (CMA-ES 0.3 %)."
-    assert own.own_in_words(study(TEN)) == ""
-
-
-def test_a_failed_run_leaves_its_task_out():
-    mine = {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
-    first, *_, last = own.own_in_words(study(LEARNER | mine)).split("\n")
-    assert first.startswith("mine ran on 1 of 2 tasks: gap of 5.5 % there; the learner 3.5 %")
-    assert last == "1 of 4 runs of mine failed, and these tasks do not count."
-
-
-@pytest.mark.parametrize(("runs", "better", "words"), [
-    (3, math.nan, "learner's on 2 of 2 tasks (the runs are too few, or too alike, for a test)."),
-    (10, 2, "significantly better than the learner on 2 tasks and worse on 0."),
-])  # fmt: skip
-def test_runs_without_spread_are_tested_by_their_number(runs, better, words):
+def without_spread(runs):
     """A plan that is run once, and the learner's runs all alike, 3 ticks behind it."""
     tasks = ("ascending", "dual-process/EC1", -303), ("two-armed-1", "dual-process/EC4", -485)
     learned = {(task, learner): [reward] * runs for task, learner, reward in tasks}
     planned = {(task, "mine"): [reward + 3] for task, _, reward in tasks}
-    seen = study(learned | planned, deterministic=["mine"])
-    row_of = TABLES["ranking"](seen).loc["mine"]
+    return study(learned | planned, deterministic=["mine"])
+
+
+@pytest.mark.parametrize(("runs", "better"), [(3, math.nan), (10, 2)])
+def test_runs_without_spread_are_tested_by_their_number(runs, better):
+    row_of = TABLES["ranking"](without_spread(runs)).loc["mine"]
     assert row_of.better == pytest.approx(better, nan_ok=True)
-    assert words in own.own_in_words(seen)
+
+
+def shorter():
+    """A method of more trials than the learner, on one of its tasks."""
+    seen = study(TEN | {("ascending", "mine"): [-309, -301]})
+    seen.runs.loc[seen.runs.method == "mine", "trials"] = 500
+    return seen
 
 
 def test_on_one_task_a_method_stands_beside_the_learners_reward():
-    few = {("ascending", "mine"): [-309, -301]}
-    sentence = own.own_in_words(study(TEN | few))
-    assert f"−305.0, the learner's −303.0 (p{chr(160)}=" in sentence
-    once = own.own_in_words(study(TEN | {("ascending", "mine"): [-309]}))
-    assert "−303.0 (the runs are too few, or too alike, for a test)." in once
-    shorter = study(TEN | few)
-    shorter.runs.loc[shorter.runs.method == "mine", "trials"] = 500
-    assert "It made 500 trials (the learner: 10)." in own.own_in_words(shorter)
-    rows = TABLES["own"](shorter)
+    rows = TABLES["own"](shorter())
     assert rows.nearest.tolist() == ["dual-process (EC1, EC4)"]
     assert rows[["gap", "nearest_gap", "learner"]].iloc[0].tolist() == pytest.approx(
         [13 / 292, 11 / 292, -303]
     )
 
 
-def test_a_method_from_a_file_stands_with_its_parameters():
-    """In ranking, tests and sentence, as a setting of a built-in method without its defaults."""
-    rewards = TEN | strangers(("mine", 2), ("hill-climbing", -5), runs=10)
-    seen = study(rewards)
+def with_parameters():
+    """A method from a file, and a built-in one without its defaults, beside the learner."""
+    seen = study(TEN | strangers(("mine", 2), ("hill-climbing", -5), runs=10))
     learns = seen.runs.method.str.contains("/EC")
     runs = seen.runs.assign(setting=np.where(learns, "", "width=0.2"))
-    again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
-    ranked = TABLES["ranking"](again)
+    return study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
+
+
+def test_a_method_from_a_file_stands_with_its_parameters():
+    ranked = TABLES["ranking"](with_parameters())
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert "hill-climbing width=0.2" in ranked.index
     assert ranked.better["mine width=0.2"] == 2
-    assert own.own_in_words(again).startswith("mine (width=0.2): gap of 3.5 %, better than the")
-    assert "as its author declares" in ranking.nearest(again)
-    assert "declares" not in ranking.nearest(study(TEN))
-
-
-def test_the_condition_with_the_highest_mean_says_which_hands_are_learned():
-    learned = {"EC2": (-670, "RRRR"), "EC4": (-645, "LRLR"), "EC3": (-650, "RRLR")}
-    rows = [row(f"dual-process/{name}", reward, hands=hands, initial_hands="RRRR")
-            for name, (reward, hands) in learned.items()]  # fmt: skip
-    assert changed_hands(study_of(rows)).endswith("on Two-armed 1 † from RRRR to LRLR.")
 
 
 def test_learners_over_all_tasks_stand_for_their_conditions():
@@ -426,3 +348,65 @@ def test_learners_over_all_tasks_stand_for_their_conditions():
     assert headline_methods(learned.methods) == together
     titles = ["learner (EC1, EC4)", "informed learner (EC1, EC4)"]
     assert learned.methods.title[together].tolist() == titles
+
+
+def alike(**better):
+    """Methods by their beginnings, with -300 and so many ticks more on ascending."""
+    names = {"learner": "dual-process/EC1", "cma": "cma-es/bandit",
+             "random_search": "random-search", "climbing": "hill-climbing",
+             "alone": "corrective-alone/given"}  # fmt: skip
+    return study({("ascending", names[n]): [-300 + more] * 3 for n, more in better.items()})
+
+
+def hands_of_conditions():
+    learned = {"EC2": (-670, "RRRR"), "EC4": (-645, "LRLR"), "EC3": (-650, "RRLR")}
+    return study_of([row(f"dual-process/{name}", reward, hands=hands, initial_hands="RRRR")
+                     for name, (reward, hands) in learned.items()])  # fmt: skip
+
+
+def beside(*methods, runs=10, **more):
+    return study(TEN | strangers(*methods, runs=runs) | more)
+
+
+NEAREST = {
+    "the learner is second of three": lambda: beside(("mine", 2), ("yours", -3)),
+    "the learner is last of two": lambda: beside(("mine", 2)),
+    "three are alike": lambda: alike(learner=0, cma=0, random_search=0),
+    "two are alike, and one is behind": lambda: alike(learner=0, cma=0, climbing=-1),
+    "two are alike, and two are ahead": lambda: alike(
+        learner=0, cma=0, climbing=1, random_search=1
+    ),
+    "who tries hands alone does not learn": lambda: alike(learner=0, cma=1, alone=0),
+    "a method ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
+    "a method from a file has parameters": with_parameters,
+    "the learner is alone": lambda: study(TEN),
+}
+OWN = {
+    "it ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
+    "it is alone on a task": lambda: study(LEARNER | CMA | {("two-armed-2", "mine"): [-310, -308]}),
+    "two ran on all": lambda: beside(("mine", 2), ("yours", 3)),
+    "one run of each, and no learner": lambda: study(
+        {key: rewards[:1] for key, rewards in (CMA | strangers(("mine", 2), runs=1)).items()}
+    ),
+    "there is none": lambda: study(TEN),
+    "a run failed": lambda: study(
+        LEARNER | {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
+    ),
+    "three runs without spread": lambda: without_spread(3),
+    "ten runs without spread": lambda: without_spread(10),
+    "on one task, with more trials": shorter,
+    "on one task, once": lambda: study(TEN | {("ascending", "mine"): [-309]}),
+    "it has parameters": with_parameters,
+}
+HANDS = {"the highest mean says which hands are learned": hands_of_conditions}
+SENTENCES = {
+    name: (words, made)
+    for words, of in ((ranking.nearest, NEAREST), (own.own_in_words, OWN), (changed_hands, HANDS))
+    for name, made in of.items()
+}
+
+
+@pytest.mark.parametrize("name", SENTENCES)
+def test_sentences_are_those_of_the_golden_page(name):
+    words, made = SENTENCES[name]
+    assert words(made()) == golden(name)
