@@ -45,8 +45,11 @@ def catch_signals() -> None:
 
 
 def _interrupt_again(lost: UnraisableHookArgs) -> None:
-    """Repeat an interruption that Python could not pass on, soon: an exception ends no callback of a
-    library, such as LLVM's, and no destructor. Other such exceptions are printed as ever."""
+    """Repeat an interruption that Python could not pass on, after 10 ms.
+
+    No exception leaves a destructor or the callback of a library, such as the callback by which
+    LLVM loads a kernel. Python hands the exception to this hook and goes on.
+    """
     if lost.exc_type is not KeyboardInterrupt or not _heard:
         sys.__unraisablehook__(lost)
         return
