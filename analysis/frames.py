@@ -80,7 +80,8 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
 
 
 def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
-    """Return checked columns with the ``gap`` of each row.
+    """Return checked columns with the ``gap`` and, of frames with :data:`ZERO`, the ``share`` of
+    each row.
 
     Raises CoarticError for rewards above 0 or above the best known reward, and for a best known
     reward of 0.
@@ -91,9 +92,14 @@ def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     share = "a gap is a share of the best known reward, which has to be below 0"
     refuse_rows(columns, "best_known", columns.best_known == 0, share)
     excess = columns.reward - columns.best_known
-    known = "it is above best_known, which is to be the highest reward of the task"
-    refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), known)
-    return columns.assign(gap=gap_share(columns.reward, columns.best_known))
+    highest = "it is above best_known, which is to be the highest reward of the task"
+    refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
+    columns = columns.assign(gap=gap_share(columns.reward, columns.best_known))
+    if ZERO not in columns:
+        return columns
+    possible = columns.best_known - columns[ZERO]
+    refuse_rows(columns, ZERO, possible < 0, highest)
+    return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
 
 
 def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
@@ -105,8 +111,8 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     :func:`with_gaps` do, and for a task with several best known rewards.
     """
     has_zero = isinstance(frame, pd.DataFrame) and ZERO in frame.columns
-    columns = checked(frame, names=("method", "task"), numbers=(*SCORES, *[ZERO] * has_zero, *more))
-    columns = with_shares(columns) if has_zero else with_gaps(columns)
+    numbers = (*SCORES, *[ZERO] * has_zero, *more)
+    columns = with_gaps(checked(frame, names=("method", "task"), numbers=numbers))
     number, tasks = pd.factorize(columns.task)
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     several = columns.best_known.groupby(task).transform("nunique") > 1
@@ -179,17 +185,7 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     >>> shares(frame).round(2).tolist()
     [0.0, 0.7]
     """
-    return with_shares(checked(frame, numbers=(*SCORES, ZERO))).share
-
-
-def with_shares(columns: pd.DataFrame) -> pd.DataFrame:
-    """Return checked columns with the ``gap`` and, of frames with :data:`ZERO`, the ``share`` of
-    each row."""
-    columns = with_gaps(columns)
-    possible = columns.best_known - columns[ZERO]
-    highest = "it is above best_known, which is to be the highest reward of the task"
-    refuse_rows(columns, ZERO, possible < 0, highest)
-    return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
+    return with_gaps(checked(frame, numbers=(*SCORES, ZERO))).share
 
 
 def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:

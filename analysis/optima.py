@@ -11,24 +11,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from coartic import NotApplicableError, Task, hand_sequences
+from coartic import Task
 from coartic.analysis.methods import SEARCHES
 from coartic.analysis.solutions import initial_solution
-from coartic.motion.trial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
-
-SHIPPED = "shipped"
-"""Source of a shipped reward that no run of the folder exceeds."""
 
 
 @dataclass(frozen=True)
 class BestKnown(KnownOptimum):
     """The best known reward of a task, and its source."""
 
-    source: str = SHIPPED
-    """:data:`SHIPPED`, or the label of the method with the best run."""
+    source: str = "shipped"
+    """``shipped`` if no run of the folder exceeds a shipped reward, or else the label of the method
+    with the best run."""
     run_id: str = ""
     """Id of the best run; empty if the reward is shipped."""
     only_here: bool = False
@@ -99,23 +96,3 @@ def initial_reward(task: Task) -> float:
     """Return the reward of the initial solution of a task; NaN without an initial solution."""
     solution = initial_solution(task)
     return math.nan if solution is None else float(-solution.ticks)
-
-
-def corrective_best(task: Task) -> float:
-    """Return the reward of the corrective process alone with its best hands.
-
-    With the task's initial hands where there are over 4,096 hand sequences; NaN where it completes
-    the task with none.
-    """
-    try:
-        sequences = hand_sequences(task)
-    except NotApplicableError:
-        return initial_reward(task)
-    (_, reward, *_), *_ = ranked_sequences(task, sequences)
-    return math.nan if reward is None else float(reward)
-
-
-def from_runs(runs: pd.DataFrame) -> KnownOptimum:
-    """Return the best reward of solved runs, with the lowest bound that they prove."""
-    bounds = runs.proven_bound.dropna()
-    return KnownOptimum(int(runs.reward.max()), int(bounds.min()) if len(bounds) else None)

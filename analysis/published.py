@@ -39,9 +39,8 @@ class Summary(NamedTuple):
     derived_runs: bool = False
     """True if the number of runs is computed from another published number."""
 
-    @property
-    def in_words(self) -> str:
-        """The mean, followed by "(derived)" if it is computed from other numbers."""
+    def __str__(self) -> str:
+        """Write the mean, followed by "(derived)" if it is computed from other numbers."""
         return f"{number(self.mean)}{' (derived)' * self.derived}"
 
 

@@ -38,7 +38,7 @@ def random_search_on(study: Study, task: str, trials: float = 0) -> list[str]:
     """
     labels = study.methods.index[study.methods.algorithm == "random search"]
     trials_by_label = {
-        label: trials_of(study, task, label)
+        label: most_trials(study, task, label)
         for label in labels
         if (task, label) in study.cells and len(study.cells[task, label].good)
     }
@@ -48,7 +48,7 @@ def random_search_on(study: Study, task: str, trials: float = 0) -> list[str]:
     return [label for label, made in trials_by_label.items() if made == fewest]
 
 
-def trials_of(study: Study, task: str, label: str) -> float:
+def most_trials(study: Study, task: str, label: str) -> float:
     """Return the most trials that a run of a method made on a task."""
     return float(study.cells[task, label].runs.trials.fillna(0).max())
 
@@ -64,7 +64,7 @@ def beside_random_search(
     """
     of_method = study.signature_by_hands(signature, task, label)
     total = sum(map(len, of_method.values()))
-    trials = trials_of(study, task, label)
+    trials = most_trials(study, task, label)
     return {
         hands: (values, most_of_random_search(study, signature, task, hands, trials))
         for hands, values in of_method.items()
@@ -111,7 +111,7 @@ def excess_on_instance(study: Study, signature: str, task: str, label: str) -> f
 
     The mean over the runs of the method with whose hands random search has a run; NaN without any.
     """
-    trials = trials_of(study, task, label)
+    trials = most_trials(study, task, label)
     most = most_in_family(study, signature, str(study.tasks[task].family), trials)
     if (task, most) not in study.cells:
         return math.nan
@@ -142,7 +142,7 @@ def every_random_search_for(study: Study, contexts: TwoContexts) -> list[TwoCont
     trials as the method, where each context has three of them."""
     names, pairs = [task.name for task in contexts.tasks], []
     first, second = (
-        random_search_on(study, name, trials_of(study, name, contexts.method)) for name in names
+        random_search_on(study, name, most_trials(study, name, contexts.method)) for name in names
     )
     for label in (each for each in first if each in second):
         runs, others = (study.executed(name, label).improved() for name in names)

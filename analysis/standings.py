@@ -42,7 +42,7 @@ def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
     for method, parts in rows.parts[rows.kind != "optimum search"].items():
         keys = [(task, part) for part in parts for task in study.tasks]
         by_task = {key[0]: study.cells[key] for key in keys if key in study.cells}
-        cells = {task: cell for task, cell in by_task.items() if cell.has_best_known}
+        cells = {task: cell for task, cell in by_task.items() if cell.runs.best_known.notna().any()}
         if len({cell.label for cell in cells.values()}) == len(parts):
             by_method[str(method)] = cells
     return by_method

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from pathlib import Path
@@ -22,10 +22,11 @@ from coartic.analysis.method_frame import methods_of
 from coartic.analysis.optima import (
     BestKnown,
     best_known,
-    corrective_best,
     gap_share,
+    initial_reward,
     restrictions,
 )
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
@@ -85,11 +86,6 @@ class CellRuns:
         """Gap of the mean reward to the best known reward; NaN if one of them is missing."""
         best = self.good.best_known.dropna().unique()
         return float(gap_share(self.rewards.mean(), best[0])) if len(best) else math.nan
-
-    @property
-    def has_best_known(self) -> bool:
-        """True if there are runs with a best known reward, to which they have gaps."""
-        return bool(self.runs.best_known.notna().any())
 
 
 UNITS = {
@@ -157,37 +153,6 @@ def load(folder: str | Path) -> Study:
         return Study(folder, plan, store.made_with(), runs)
 
 
-def tidy(
-    runs: pd.DataFrame, tasks: Mapping[str, Task], optima: Mapping[str, BestKnown]
-) -> pd.DataFrame:
-    """Return stored runs with columns for their tasks, parameters and gaps.
-
-    Stored columns take precedence over parameters of the same name: ``trials`` is the number of
-    trials made, ``hands`` the hands of the solution.
-    """
-    parameters = {text: json.loads(text) for text in runs.parameters.unique()}
-    best = {name: each.reward for name, each in optima.items()}
-    rows = [
-        {
-            **parameters[text],
-            "family": tasks[name].family,
-            "split": tasks[name].split,
-            "goals": len(tasks[name].goals),
-            "arms": len(tasks[name].hands),
-        }
-        for name, text in zip(runs.task, runs.parameters, strict=True)
-    ]
-    more = pd.DataFrame(rows, runs.index)
-    runs = runs.join(more[[name for name in more if name not in runs]])
-    as_it_is = restrictions(runs).base == BASE  # other runs solve another task
-    runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
-    runs["corrective_best"] = runs.task.map({name: corrective_best(tasks[name]) for name in best})
-    rewards = runs[["reward", "best_known"]].astype("Float64")
-    runs["gap"] = gap_share(*rewards.to_numpy(np.float64, na_value=np.nan).T)
-    runs.attrs["units"] = UNITS
-    return runs
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
     """The stored results of a folder."""
@@ -232,10 +197,39 @@ class Study:
 
         Further columns: ``family``, ``split``, number of ``goals``, of ``arms`` (1 or 2),
         ``best_known`` reward of the task and ``corrective_best``, the reward of the corrective
-        process alone with its best hands; parameters by name; ``gap``, a share of the best known
-        reward.
+        process alone with its best hands (with the task's initial hands where there are over 4,096
+        hand sequences; NaN if it completes the task with none); ``gap``, a share of the best known
+        reward; and parameters by name, but for names that are taken: ``trials`` is the number of
+        trials made, ``hands`` the hands of the solution.
         """
-        return tidy(self.stored, self.tasks, self.optima)
+        runs, tasks = self.stored, self.tasks
+        parameters = {text: json.loads(text) for text in runs.parameters.unique()}
+        rows = [
+            {
+                **parameters[text],
+                "family": tasks[name].family,
+                "split": tasks[name].split,
+                "goals": len(tasks[name].goals),
+                "arms": len(tasks[name].hands),
+            }
+            for name, text in zip(runs.task, runs.parameters, strict=True)
+        ]
+        more = pd.DataFrame(rows, runs.index)
+        runs = runs.join(more[[name for name in more if name not in runs]])
+        as_it_is = restrictions(runs).base == BASE  # other runs solve another task
+        best = {name: each.reward for name, each in self.optima.items()}
+        runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
+        alone = {
+            name: max(of_hands.dropna(), default=math.nan)
+            if len(of_hands := self.sequences(name).reward)
+            else initial_reward(tasks[name])
+            for name in best
+        }
+        runs["corrective_best"] = runs.task.map(alone).astype(np.float64)
+        rewards = runs[["reward", "best_known"]].astype("Float64")
+        runs["gap"] = gap_share(*rewards.to_numpy(np.float64, na_value=np.nan).T)
+        runs.attrs["units"] = UNITS
+        return runs
 
     @cached_property
     def methods(self) -> pd.DataFrame:
@@ -378,8 +372,6 @@ class Study:
             By the index of :attr:`runs`; NaN for runs without the signature, and for runs after the
             first 500 of a method on a task.
         """
-        from coartic.analysis.signatures.measures import SIGNATURES
-
         if name not in SIGNATURES:
             raise CoarticError(unknown("signature", name, SIGNATURES))
         values = pd.Series(np.nan, self.runs.index, name=name)
@@ -392,8 +384,6 @@ class Study:
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
         """Return a signature of the runs of a method on a task that have it, shape ``(n,)``."""
-        from coartic.analysis.signatures.measures import SIGNATURES
-
         return SIGNATURES[name].of(self.executed(task, method, replay=replay))
 
     @cached
@@ -406,8 +396,6 @@ class Study:
         hands; ``every``: of all runs. Arrays have shape ``(n,)``; runs without the signature are
         left out. Signature ``hand``, the choice of hands itself, is of all hand sequences together.
         """
-        from coartic.analysis.signatures.measures import SIGNATURES
-
         executed = self.executed(task, method)
         executed = executed if every else executed.improved()
         values = SIGNATURES[name].each(executed)

@@ -30,16 +30,11 @@ def task_or_name(value: Any) -> Task | str:
     raise error_saying(f"{value!r} is no task; it should be a name, a path or a task")
 
 
-def number_of_python(value: Any) -> Any:
-    """Return a NumPy number as a Python number, and any other value unchanged."""
-    return value.item() if isinstance(value, np.number) else value
-
-
 JobOf = Callable[..., Job]
 """Function :func:`job_of` for a suite and a request."""
 _Tasks = tuple[Annotated[Any, PlainValidator(task_or_name)], ...]
 _Files = tuple[Path, ...]
-_plain = BeforeValidator(number_of_python)
+_plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.number) else value)
 
 
 class Request(FileData):

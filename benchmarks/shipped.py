@@ -26,7 +26,6 @@ SHIPPED = "shipped"
 _FOLDER = Path(__file__).with_name("shipped")
 _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"
-_SHOWN = 20  # differences of a folder that are printed
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
@@ -55,7 +54,7 @@ def shipped_hashes() -> dict[str, str]:
     return {name.removesuffix(_ENDING): digits for digits, name in pairs}
 
 
-def differences(folder: Path) -> Iterator[str]:
+def changed_runs(folder: Path) -> Iterator[str]:
     """Yield a sentence for each shipped run that a folder lacks or that has another result there,
     whatever the version of its code.
 
@@ -105,12 +104,12 @@ def main() -> int:
     parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")
     given = parser.parse_args()
     try:
-        changes = {folder: list(differences(folder)) for folder in given.folders}
+        changes = {folder: list(changed_runs(folder)) for folder in given.folders}
     except CoarticError as error:
         parser.error(str(error))
     for folder, sentences in changes.items():
         print(f"{folder}: {len(sentences) or 'no'} differences to what is shipped")
-        for sentence in sentences[:_SHOWN]:
+        for sentence in sentences[:20]:
             print(f"- {sentence}")
     if any(changes.values()) and not given.changed:
         print("Nothing is packed. If results change on purpose, add --changed.")

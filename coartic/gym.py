@@ -46,8 +46,7 @@ if TYPE_CHECKING:
 
 REACH = 0.5
 """Half the width of the box of targets, length unit (base) and rad (angles)."""
-Rows = NDArray[np.int64] | slice
-MOST_SEED = 2**128 - 1
+RowIndex = NDArray[np.int64] | slice
 
 
 class Recorded:
@@ -62,18 +61,12 @@ class Recorded:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = spec and replace(spec, kwargs=plain_options(spec.kwargs))
-
-
-def plain_options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options of an environment as plain data, from which the same environment can be
-    made."""
-    plain = dict(options)
-    if isinstance(task := plain.get("task"), Task | Path):
-        plain["task"] = str(task) if isinstance(task, Path) else task.model_dump(mode="json")
-    if isinstance(model := plain.get("model"), MotionModel):
-        plain["model"] = model._asdict()
-    return plain
+        plain = dict(spec.kwargs) if spec else {}
+        if isinstance(task := plain.get("task"), Task | Path):
+            plain["task"] = str(task) if isinstance(task, Path) else task.model_dump(mode="json")
+        if isinstance(model := plain.get("model"), MotionModel):
+            plain["model"] = model._asdict()
+        self._spec = spec and replace(spec, kwargs=plain)
 
 
 class Scope(NamedTuple):
@@ -238,7 +231,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
         return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self.widest.most_links + right])
 
-    def begin(self, rows: Rows, numbers: ArrayLike) -> None:
+    def begin(self, rows: RowIndex, numbers: ArrayLike) -> None:
         """Put robots at the start of the tasks of these numbers."""
         state = self.state
         state.task[rows], state.goal[rows], state.going[rows] = numbers, 0, True
@@ -247,7 +240,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         state.q[rows] = self.starts[state.task[rows]]
         observe(self.state)
 
-    def move(self, actions: ArrayLike, rows: Rows = slice(None)) -> None:
+    def move(self, actions: ArrayLike, rows: RowIndex = slice(None)) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
         of these rows.
 
@@ -392,7 +385,7 @@ def whole_seed(seed: Any) -> int | None:
     """A seed as Gymnasium takes it. Raises ValueError for anything else."""
     if seed is None:
         return None
-    check_limits("seed", seed, 0, MOST_SEED)
+    check_limits("seed", seed, 0, 2**128 - 1)
     return int(seed)
 
 
@@ -496,7 +489,7 @@ def score(
     )
     rewards["corrective process"] = column(initial_reward(task, model) for task in tasks)
     shipped = [best_shipped(task) if model == PAPER else None for task in tasks]
-    return gaps(rewards, column(None if each is None else each.reward for each in shipped))
+    return compare(rewards, column(None if each is None else each.reward for each in shipped))
 
 
 def column(rewards: Iterable[float | None]) -> Array:
@@ -537,7 +530,7 @@ def rollout(
     return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
 
 
-def gaps(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
+def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
     """Compare rewards of policies, shapes ``(K, trials)``, with the best known rewards, shape
     ``(K, 1)``, as :func:`score` returns them."""
     rows = {}

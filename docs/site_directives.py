@@ -13,7 +13,7 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
-from coartic.play.page import figure, play_page, preset_of, text_of, up_or_down
+from coartic.play.page import part_of_page, play_page, player_figure, preset_of, up_or_down
 from coartic.tasks.task import shipped_tasks
 
 
@@ -82,8 +82,8 @@ def columns() -> Iterator[str]:
 def play() -> Iterator[str]:
     """The figure to play with, its text and its styles; ``play.html`` is its page."""
     yield "```{raw} html"
-    yield f"<style>{text_of('play.css')}</style>"
-    yield figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
+    yield f"<style>{part_of_page('play.css')}</style>"
+    yield player_figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
     yield '<p><a href="play.html">On a page of its own</a>; with a task of yours:'
     yield " <code>coartic play TASK</code></p>"
     yield "```"

@@ -38,7 +38,7 @@ def first_movement_sacrificed(read: Reader) -> Finding:
     for task in ONE_ARMED:
         first = read.signature("first", task, EC1)
         comparisons += [
-            Higher(first, by=margins.TICKS),
+            Higher(first, by=margins.ROUNDING_TICKS),
             *(Higher(*both) for both in read.beside_random_search("first", task, EC1)),
             Higher(first, read.signature("first", task, EC1_BY_SUBTASK)),
             Higher(read.signature("whole", task, EC1)),
@@ -105,7 +105,7 @@ def overall_reward(read: Reader) -> Finding:
         first = read.signature("first", task, EC1, replay=True)
         comparisons += [
             Higher(read.replay(task, EC1), read.replay(task, EC1_BY_SUBTASK)),
-            Higher(first, read.signature("first", task, EC1_BY_SUBTASK), by=margins.TICKS),
+            Higher(first, read.signature("first", task, EC1_BY_SUBTASK), by=margins.ROUNDING_TICKS),
         ]
     return all_higher(comparisons)
 
@@ -117,7 +117,7 @@ def arm_coarticulation(read: Reader) -> Finding:
         for label in (EC3, EC4):
             arm = read.signature("arm", task, label)
             comparisons += [
-                Higher(arm, by=margins.TICKS),
+                Higher(arm, by=margins.ROUNDING_TICKS),
                 *(Higher(*both) for both in read.beside_random_search("arm", task, label)),
             ]
             if label == EC4:

@@ -181,7 +181,7 @@ CLAIMS_ON_FAMILIES = [
             in_every_family,
             OF_ONE_ARM,
             [
-                shows("first", by=margins.TICKS),
+                shows("first", by=margins.ROUNDING_TICKS),
                 shows("first", beyond=RANDOM_SEARCH),
                 shows("whole"),
             ],
@@ -216,7 +216,7 @@ CLAIMS_ON_FAMILIES = [
         judge=partial(
             in_every_family,
             EVERY_FAMILY,
-            [shows("arm", by=margins.TICKS), shows("arm", beyond=RANDOM_SEARCH)],
+            [shows("arm", by=margins.ROUNDING_TICKS), shows("arm", beyond=RANDOM_SEARCH)],
         ),
     ),
     on_families(

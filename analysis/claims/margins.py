@@ -20,7 +20,7 @@ without a number. The evidence gives the largest excess, for any other margin.""
 HALFWAY = 0.5
 """Share of the distance between the initial solution and a plan beyond which a solution is similar
 to the plan."""
-TICKS = 1
+ROUNDING_TICKS = 1
 """Ticks that a movement can lose to rounding alone. Every claim about ticks of single movements
 needs a larger difference. Rewards of whole tasks have no margin: rounding is the same on both
 sides.

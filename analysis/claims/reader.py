@@ -43,8 +43,8 @@ class Measurement:
     """Values, shape ``(runs,)``; shape ``()`` of a single number, which is exact."""
     quantity: str = ""
     """Measured quantity in words; empty for rewards."""
-    published: str = ""
-    """Reward that the paper publishes, in words; empty if the paper publishes no such reward."""
+    published: Summary | None = None
+    """Reward that the paper publishes; None if the paper publishes no such reward."""
 
     @property
     def name(self) -> str:
@@ -146,7 +146,7 @@ class Reader:
     def initial(self, task: str) -> Measurement:
         """Return the reward of a task's initial solution."""
         reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
-        published = in_words(published_alone(task, "initial hands"))
+        published = published_alone(task, "initial hands")
         return Measurement(self.title(task), "initial", reward, published=published)
 
     def best(self, task: str) -> Measurement:
@@ -157,11 +157,8 @@ class Reader:
             raise MissingError(
                 f"the corrective process alone completes {title} with no hand sequence"
             )
-        published, best = (
-            published_alone(task, "best of all sequences"),
-            np.array(np.nanmax(rewards)),
-        )
-        return Measurement(self.title(task), "best", best, published=in_words(published))
+        published, best = published_alone(task, "best of all sequences"), np.nanmax(rewards)
+        return Measurement(self.title(task), "best", np.array(best), published=published)
 
     def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
         """Return a signature of coarticulation of the runs that have this signature."""
@@ -244,15 +241,9 @@ def who_is(label: str) -> str:
     return CONDITION_OF.get(label) or title_of(label)
 
 
-def in_words(published: Summary | None) -> str:
-    """Write a published reward; empty without it."""
-    return published.in_words if published else ""
-
-
-def published_reward(task: str, label: str) -> str:
-    """Write the mean reward of runs in the paper; empty if the paper does not publish it."""
-    cell = published_cell(task, CONDITION_OF.get(label, ""))
-    return in_words((cell or {}).get(""))
+def published_reward(task: str, label: str) -> Summary | None:
+    """Return the mean reward of runs in the paper; None if the paper does not publish it."""
+    return (published_cell(task, CONDITION_OF.get(label, "")) or {}).get("")
 
 
 def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:

@@ -34,7 +34,7 @@ from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Table
 from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, make_folder, publish
-from coartic.play.page import text_of
+from coartic.play.page import part_of_page
 
 HERE = Path(__file__).parent
 NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "claims": [], "finding": [], "figure": None}
@@ -157,7 +157,7 @@ def page(study: Study, home: str) -> str:
     return environment.get_template("page.html.jinja").render(
         title=f"Coarticulation of a simulated robot: suite {study.suite}",
         description=" ".join(text for _, text in cards),
-        styles=(HERE / "page.css").read_text("utf-8") + text_of("play.css"),
+        styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
         player=about.attempt(study, "Film", player) or "",
         script=(HERE / "page.js").read_text("utf-8"),
         cards=cards,

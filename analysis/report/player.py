@@ -16,7 +16,7 @@ from coartic.analysis.sections.coarticulation import shared_goal
 from coartic.analysis.sections.own import own_methods
 from coartic.analysis.standings import compared
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, typical_run
-from coartic.play.page import figure, preset_of
+from coartic.play.page import player_figure, preset_of
 from coartic.robot import HANDS
 
 
@@ -47,7 +47,7 @@ def player(study: Study) -> str:
         return ""
     begin = first_shown(study, presets, first)
     where = {name: presets.index(preset) for name, preset in alone.items()}
-    return figure(
+    return player_figure(
         presets,
         still="<p>The movements are played by a script, and scripts are switched off here.</p>",
         page=None,

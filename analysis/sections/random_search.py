@@ -7,9 +7,9 @@ import numpy as np
 from coartic.analysis.random_search import (
     beside_random_search,
     most_of_random_search,
+    most_trials,
     random_search_on,
     selects,
-    trials_of,
 )
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, one_by_one
@@ -45,7 +45,7 @@ def list_beside_random_search(study: Study) -> Rows:
                     continue
                 if not random_search_on(study, task):
                     continue
-                trials = trials_of(study, task, label)
+                trials = most_trials(study, task, label)
                 for hands, both in beside_random_search(study, signature, task, label).items():
                     values, improved = both
                     there = signature, task, hands

@@ -19,7 +19,7 @@ from coartic.internal.text import counted
 
 BEST, IDENTICAL, LARGER = "smallest gap", "identical in every run", "larger gap"
 UNSURE, UNTESTED = "no significant difference", "the runs are too few, or too alike, to tell"
-FAILED = "some runs failed"
+SOME_FAILED = "some runs failed"
 
 
 def settings_of(study: Study) -> Iterator[tuple[str, dict[str, list[CellRuns]]]]:
@@ -62,7 +62,7 @@ def list_settings(study: Study) -> Rows:
                 "method": base,
                 "setting": names[label],
                 "tasks": len(tasks),
-                "comparison": comparison.get(label, FAILED),
+                "comparison": comparison.get(label, SOME_FAILED),
                 "p_holm": p.get(label, math.nan),
                 "runs": sum(len(cell.runs) for cell in cells[label]),
             }

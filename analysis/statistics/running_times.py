@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from coartic.estimates import FEWER_RESAMPLES, FEWEST, IN_CACHE, SEED, TAILS, Estimate, slices
 from coartic.robot import Array
 
-_MOST_DRAWN = 20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
+_MOST_RUNS_DRAWN = (
+    20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
+)
 RunningTimes = Sequence[Array]
 """Running times of a method: for each task the cost at which each run reaches each target, shape
 ``(runs, targets)``; infinite for a target that the run does not reach."""
@@ -81,7 +83,7 @@ def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     A byte is enough: no run is drawn 256 times.
     """
     rng = np.random.default_rng(SEED)
-    resamples = min(FEWER_RESAMPLES, max(_MOST_DRAWN // sum(sizes), 200))
+    resamples = min(FEWER_RESAMPLES, max(_MOST_RUNS_DRAWN // sum(sizes), 200))
     drawn = [np.empty((resamples, size), dtype=np.uint8) for size in sizes]
     for of_task, size in zip(drawn, sizes, strict=True):
         even = np.full(size, 1 / size)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
 
 
-def path(what: str, metavar: str, *names: str) -> Any:
+def place(metavar: str, what: str, *names: str) -> Any:
     """Return an option for a file or a folder."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
@@ -28,11 +28,11 @@ def option(metavar: str, what: str, *names: str) -> Any:
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
-Results = Annotated[
+ResultsFolder = Annotated[
     Path, typer.Argument(parser=folder_named, metavar="FOLDER", help="Results folder.")
 ]
-In = Annotated[Path, path("Where to look for the run.", "FOLDER", "--in")]
-Out = Annotated[Path | None, path("File to write.", "FILE")]
+In = Annotated[Path, place("FOLDER", "Where to look for the run.", "--in")]
+Out = Annotated[Path | None, place("FILE", "File to write.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 MethodFiles = Annotated[
     list[Path] | None, option("FILE", "Methods of your own (Python).", "--method-file")
@@ -57,7 +57,7 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
     return typer.Option(option, parser=read, metavar=unit, help=what)
 
 
-def listed(text: str | None) -> list[str]:
+def names_in(text: str | None) -> list[str]:
     """Return the names in an option that are separated by commas."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 

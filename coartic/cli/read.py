@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.terminal import complain, say, say_pairs, show_frame
+from coartic.cli.terminal import complain, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 def report(
-    folder: given.Results,
+    folder: given.ResultsFolder,
     out: Annotated[
-        Path | None, given.path("Folder to write; FOLDER/report if not given.", "FOLDER")
+        Path | None, given.place("FOLDER", "Folder to write; FOLDER/report if not given.")
     ] = None,
     for_paper: Annotated[
         bool, typer.Option("--for-paper", help="Also figures as SVG and PDF, and tables as LaTeX.")
@@ -82,7 +82,7 @@ def exit_if_parts_failed(study: Study) -> None:
 def trace(
     table: Annotated[str | None, typer.Argument(metavar="TABLE", help="Id of a table.")] = None,
     row: Annotated[str | None, typer.Argument(metavar="ROW", help="Name of a row.")] = None,
-    folder: Annotated[Path, given.path("A report or its results.", "FOLDER", "--in")] = Path(
+    folder: Annotated[Path, given.place("FOLDER", "A report or its results.", "--in")] = Path(
         "results"
     ),
 ) -> None:
@@ -126,7 +126,8 @@ def trace(
     known = {*registry(), "dual-process"}
     file = "" if known >= {*behind.method} else " --method-file FILE"
     say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
-    show_frame(traced.runs_behind(study, ids))
+    table_of_runs = traced.runs_behind(study, ids).astype(str).map(one_line)
+    say(*table_of_runs.to_string(index=False).splitlines())
     where = f"--in {quote(str(results))}"
     say_pairs(
         [
@@ -137,7 +138,7 @@ def trace(
 
 
 def verify(
-    folder: given.Results,
+    folder: given.ResultsFolder,
     again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
     method_file: given.MethodFiles = None,
 ) -> None:

@@ -89,11 +89,11 @@ def run(
     if suite is None:
         raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
     chosen, registered = load_suite(suite), registry(method_file or ())
-    names = given.methods_meant(given.listed(methods), registered)
+    names = given.methods_meant(given.names_in(methods), registered)
     if include and not names:  # the user's own methods alone
         names = [name for name, info in registered.items() if info.where.endswith(".py")]
     request = request_for(
-        tasks=given.tasks_meant(given.listed(tasks)),
+        tasks=given.tasks_meant(given.names_in(tasks)),
         methods=names,
         family_files=family_file or (),
         **{"runs": runs, "trials": trials, "seed": seed},

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, TextIO
 from coartic.internal.text import counted, one_line
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from coartic.benchmarks.runner import Progress
     from coartic.runs.plan import Cell
 
@@ -40,11 +38,6 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
         lines = textwrap.wrap(together, width - indent, break_on_hyphens=False) or [""]
         for number, line in enumerate(lines):
             say(f"{'' if number else word:{indent}}{line}".replace("\xa0", " ").rstrip())
-
-
-def show_frame(frame: pd.DataFrame) -> None:
-    """Print a table."""
-    say(*frame.astype(str).map(one_line).to_string(index=False).splitlines())
 
 
 class Display:

@@ -30,14 +30,14 @@ def play_page(task: Task | None = None) -> str:
         templates()
         .get_template("page.html.jinja")
         .render(
-            styles=text_of("page.css") + text_of("play.css"),
-            figure=figure(presets),
+            styles=part_of_page("page.css") + part_of_page("play.css"),
+            figure=player_figure(presets),
             version=coartic.__version__,
         )
     )
 
 
-def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -> str:
+def player_figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -> str:
     """The figure as a part of a page, which has the styles of ``play.css`` and defines the colours
     that these name.
 
@@ -52,10 +52,10 @@ def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -
         templates()
         .get_template("figure.html.jinja")
         .render(
-            still=still or text_of("still.svg"),
+            still=still or part_of_page("still.svg"),
             data=data.replace("<", "\\u003c"),
-            model="\n".join(map(text_of, ("model.js", "worker.js"))),
-            script="\n".join(map(text_of, ("picture.js", "play.js", "begin.js"))),
+            model="\n".join(map(part_of_page, ("model.js", "worker.js"))),
+            script="\n".join(map(part_of_page, ("picture.js", "play.js", "begin.js"))),
         )
     )
 
@@ -74,7 +74,7 @@ def up_or_down() -> dict[str, Any]:
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:]}
 
 
-def text_of(name: str) -> str:
+def part_of_page(name: str) -> str:
     """A file beside this one, as a part of a page."""
     return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
 

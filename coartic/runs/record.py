@@ -255,7 +255,7 @@ class Run:
         return run
 
 
-class Column(NamedTuple):
+class RunColumn(NamedTuple):
     """A column of view ``runs``, which has a row for each run of the plan."""
 
     name: str
@@ -269,7 +269,7 @@ class Column(NamedTuple):
 
 
 COLUMNS = tuple(
-    Column(*row)
+    RunColumn(*row)
     for row in (
         ("run_id", "TEXT NOT NULL UNIQUE", "id",
          "hash of all that the result depends on: task, method, parameters, seed and code"),

@@ -62,7 +62,7 @@ _CELL, _JOB = TypeAdapter(Cell), TypeAdapter(Job)
 _JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
 _OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # end of a journal that names another file
 _STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
-_SHOWN = ", ".join(f'"{column.name}"' for column in COLUMNS)
+_IN_VIEW = ", ".join(f'"{column.name}"' for column in COLUMNS)
 _SCHEMA = f"""
 CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
     environment INTEGER);
@@ -91,7 +91,7 @@ CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, meth
     JOIN environments ON environments.id = results.environment;
 CREATE VIEW solved AS SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
     FROM asked WHERE status = 'ok';
-CREATE VIEW runs AS SELECT {_SHOWN} FROM asked ORDER BY position, run;
+CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run;
 CREATE VIEW solutions AS SELECT run_id, movements.* FROM asked
     JOIN movements ON result_id = asked.id AND part = 'solution' ORDER BY position, run, "order";
 CREATE VIEW paths AS SELECT run_id, waypoints.* FROM asked
@@ -287,7 +287,7 @@ class Store:
     def runs(self) -> pd.DataFrame:
         """Return view ``runs`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            return check_runs(self._frame("runs"))
+            return checked_runs(self._frame("runs"))
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions`` as a data frame, with nullable types."""
@@ -692,7 +692,7 @@ def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:
     return np.frombuffer(content, dtype="<i4")
 
 
-def check_runs(runs: pd.DataFrame) -> pd.DataFrame:
+def checked_runs(runs: pd.DataFrame) -> pd.DataFrame:
     """Return view ``runs`` unchanged. Raises ValueError for a value that no run can have."""
     solved = runs.status == "ok"
     rules = {"status": runs.status.isin(STATUSES)}

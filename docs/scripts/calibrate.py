@@ -150,7 +150,10 @@ def rates_of_random_search(study: Study) -> Iterator[tuple[str, float]]:
             (t[p[:RANDOM_SEARCH_RUNS]], t[p[RANDOM_SEARCH_RUNS:]])
             for t, p in zip(slower, picks, strict=True)
         ]
-        first = [bootstrap_test(a, margins.TICKS, resamples=RESAMPLES).p < LEVEL for a, _ in ticks]
+        first = [
+            bootstrap_test(a, margins.ROUNDING_TICKS, resamples=RESAMPLES).p < LEVEL
+            for a, _ in ticks
+        ]
         more = [bootstrap_test(a, b, resamples=RESAMPLES).p < LEVEL for a, b in ticks]
         passed.append({
             "context, without random search": differ,

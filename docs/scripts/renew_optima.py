@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from coartic import CoarticError
-from coartic.analysis.optima import from_runs, restrictions
+from coartic.analysis.optima import restrictions
 from coartic.analysis.study import Study, load
 from coartic.internal.files import write_atomically
 from coartic.internal.text import one_line
@@ -36,12 +36,12 @@ def collect(study: Study) -> list[dict[str, Any]]:
         good = group[group.status == "ok"]
         facts: dict[str, Any] = {"infeasible": group.reason.iloc[0]}
         if len(good):
-            optimum, best = from_runs(good), good.iloc[int(good.reward.astype(int).argmax())]
+            best, bounds = good.iloc[int(good.reward.astype(int).argmax())], good.proven_bound
             rows = study.solutions[study.solutions.run_id == best.run_id].drop(columns="run_id")
             facts = {
-                "reward": optimum.reward,
+                "reward": int(best.reward),
                 "hands": str(best.hands),
-                "bound": optimum.bound,
+                "bound": int(bounds.min()) if bounds.notna().any() else None,
                 "searches": good.groupby("method").reward.max().astype(int).to_dict(),
                 "solution": rows.to_dict("records"),
             }
