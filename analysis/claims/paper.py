@@ -216,16 +216,15 @@ def most_do(words: str, does: Sequence[bool], *, claimed: bool = True) -> Findin
     return Finding(fewer.value < 0, words, (fewer,), (more,))
 
 
-def runs_that(title: str, label: str, what: str, does: Sequence[bool], hands: list[str]) -> str:
+def runs_that(read: Reader, task: str, label: str, what: str, does: Sequence[bool]) -> str:
     """Say how many runs do something, with the hand sequences of all runs."""
-    each = tally(Counter(hands))
-    return f"{title} {who_is(label)} {what}: {sum(does)} of {len(does)} runs ({each})"
+    each, who = tally(Counter(read.hands(task, label))), f"{read.title(task)} {who_is(label)}"
+    return f"{who} {what}: {sum(does)} of {len(does)} runs ({each})"
 
 
 def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
     """Test that neither few nor most runs learn these hands, against the published share."""
-    learned = read.hands(task, label)
-    does = [each == hands for each in learned]
+    does = [each == hands for each in read.hands(task, label)]
     count, total = sum(does), len(does)
     share = count / total
     low, high = stats.binomtest(count, total).proportion_ci()
@@ -242,7 +241,7 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
         n=(total, of_published),
         p=float(stats.fisher_exact(table).pvalue),
     )
-    words = runs_that(read.title(task), label, hands, does, learned)
+    words = runs_that(read, task, label, hands, does)
     return Finding(
         margins.FEW < share < margins.MOST,
         f"{words}, {low:.0%} to {high:.0%} of all (95 %); "
@@ -254,23 +253,20 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
 
 def no_reversal(read: Reader) -> Finding:
     """Test that the base only moves right in most runs that learn RRLR."""
-    learned, q0 = read.hands(TASK_1, EC2), read.task(TASK_1).q0
+    q0 = read.task(TASK_1).q0
     runs = [run for run in read.cell(TASK_1, EC2).runs if run.hands == "RRLR"]
     if not runs:
         raise MissingError(f"no run of EC2 on {read.title(TASK_1)} learned RRLR")
     along = [np.append(q0[0], run.configurations[:, 0]) for run in runs]  # the base, length unit
     rightward = [bool((np.diff(x) > 0).all()) for x in along]
-    words = runs_that(read.title(TASK_1), EC2, "RRLR rightward", rightward, learned)
-    return most_do(words, rightward)
+    return most_do(runs_that(read, TASK_1, EC2, "RRLR rightward", rightward), rightward)
 
 
 def ec4_mixed(read: Reader) -> Finding:
     """Count the runs without the commonest hand sequence; the claim is that there are some."""
     learned = read.hands(TASK_2, EC4)
     others = [hands != mode(learned) for hands in learned]
-    return Finding(
-        any(others), runs_that(read.title(TASK_2), EC4, "not commonest", others, learned)
-    )
+    return Finding(any(others), runs_that(read, TASK_2, EC4, "not commonest", others))
 
 
 def proficiency_rises(read: Reader) -> Finding:
@@ -288,7 +284,7 @@ def rail(read: Reader) -> Finding:
     for task, consistent in ((TASK_1, True), (FREE_BASE, False)):
         learned = read.hands(task, EC3)
         does = [hands == mode(learned) for hands in learned]
-        words = runs_that(read.title(task), EC3, "commonest", does, learned)
+        words = runs_that(read, task, EC3, "commonest", does)
         findings.append(most_do(words, does, claimed=consistent))
     return all_of(*findings)
 

@@ -94,7 +94,8 @@ def own_in_words(study: Study) -> str:
 
 def card(study: Study, method: str) -> str:
     """Say the gap of a method from a file in a line, with its tasks and the nearest other one."""
-    row, title = standing(study, method), study.methods.title[method]
+    row: Any = ranking.list_ranking(study).loc[method]
+    title = study.methods.title[method]
     text, nearest = f"gap of {percent(row['gap'])}", ""
     for other, gap in [*nearest_others(study, method).items()][:1]:
         nearest = f"{other} {percent(gap)}"
@@ -113,7 +114,8 @@ def card(study: Study, method: str) -> str:
 def details(study: Study, method: str) -> str:
     """Say the gap of a method from a file with its interval, gaps of other methods on the same
     tasks, its number of trials if the learner made another number, and tests."""
-    row, tests = standing(study, method), against_learner(study, method)
+    row: Any = ranking.list_ranking(study).loc[method]
+    tests = against_learner(study, method)
     tasks = standings.solved_tasks(study, method)
     is_partial = bool(standings.coverage(study, method))
     gap = f"Gap of {study.methods.title[method]} to the {standings.reference(study, tasks)}"
@@ -161,9 +163,3 @@ def trials_made(study: Study, method: str) -> str:
     if study.methods.information[method] != BY_TRIAL or learned in (0, made):
         return ""
     return f"It made {number(made)} trials (the learner: {number(learned)})"
-
-
-def standing(study: Study, method: str) -> dict[str, Any]:
-    """Return the row of a method in the ranking."""
-    (row,) = ranking.list_ranking(study).loc[[method]].to_dict("records")
-    return {str(name): value for name, value in row.items()}

@@ -44,7 +44,7 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
     """Return the values of a column by family and instance, without missing values."""
     rows = rows[rows[column].notna()]
     return {
-        str(family): [(values,) for values in of_family[column]]
+        str(family): [*of_family[column]]
         for family, of_family in rows.groupby("family", sort=False)
     }
 

@@ -23,10 +23,8 @@ from coartic import estimates
 from coartic.estimates import FEWER_RESAMPLES, Estimate
 from coartic.robot import Array
 
-Runs = tuple[Array, ...]
-"""Scores of the runs on an instance, shape ``(n,)``; two arrays for a difference of two methods."""
-Scores = Mapping[str, Sequence[Runs]]
-"""Scores of each instance, by family."""
+Scores = Mapping[str, Sequence[Array]]
+"""Scores of the runs on each instance, shape ``(n,)``, by family."""
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
@@ -38,19 +36,13 @@ def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     return estimates.bootstrap_estimate(tuple(map(estimates.vector, values)), statistic)
 
 
-def value(runs: Runs) -> float:
-    """Return the score of an instance: the mean over its runs, or the difference of two means."""
-    return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
-
-
 def other_tasks(scores: Scores) -> Estimate:
     """Return the mean over families, instances and runs, with its interval for other tasks.
 
     Parameters
     ----------
-    scores : mapping of str to sequence of tuples of arrays
-        For each family, and each instance, the scores of its runs: a tuple of one array, shape
-        ``(runs,)``, or of two arrays for the difference of two methods, first less second.
+    scores : mapping of str to sequence of arrays, shape (runs,)
+        For each family, the scores of the runs on each instance.
 
     Returns
     -------
@@ -64,7 +56,7 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Examples
     --------
-    >>> gaps = [(np.array([0.1, 0.2]),), (np.array([0.3]),), (np.array([0.2, 0.4]),)]
+    >>> gaps = [np.array([0.1, 0.2]), np.array([0.3]), np.array([0.2, 0.4])]
     >>> gap = other_tasks({"field": gaps})
     >>> round(gap.value, 3), gap.n
     (0.25, (3,))
@@ -79,7 +71,10 @@ def other_tasks(scores: Scores) -> Estimate:
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
-    values = {family: np.array(list(map(value, instances))) for family, instances in scores.items()}
+    values = {
+        family: np.array([runs.mean() for runs in instances])
+        for family, instances in scores.items()
+    }
     mean = float(np.mean([instances.mean() for instances in values.values()]))
     n = tuple(map(len, values.values()))
     if min(n) < estimates.FEWEST:
@@ -90,24 +85,17 @@ def other_tasks(scores: Scores) -> Estimate:
         count = len(instances)
         which = rng.integers(count, size=(FEWER_RESAMPLES, count))
         drawn = values[family][which]
-        for number, samples in enumerate(instances):
+        for number, runs in enumerate(instances):
             chosen = which == number
-            for sign, runs in zip((1, -1), samples, strict=False):
-                if np.ptp(runs):
-                    places = rng.integers(len(runs), size=(int(chosen.sum()), len(runs)))
-                    drawn[chosen] += sign * (runs[places].mean(axis=1) - runs.mean())
+            if np.ptp(runs):
+                places = rng.integers(len(runs), size=(int(chosen.sum()), len(runs)))
+                drawn[chosen] += runs[places].mean(axis=1) - runs.mean()
         wider = math.sqrt(count / (count - 1))
         deviations += (drawn.mean(axis=1) - values[family].mean()) * wider
     if np.abs(deviations).max() <= estimates.NEGLIGIBLE * abs(mean):
         return Estimate(mean, mean, mean, n=n)
     low, high = mean + np.quantile(deviations / len(values), estimates.TAILS)
     families = scores.values()
-    least = np.mean([min(-greatest_value(runs, -1) for runs in family) for family in families])
-    most = np.mean([max(greatest_value(runs, 1) for runs in family) for family in families])
+    least = np.mean([min(runs.min() for runs in family) for family in families])
+    most = np.mean([max(runs.max() for runs in family) for family in families])
     return Estimate(mean, max(float(low), float(least)), min(float(high), float(most)), n=n)
-
-
-def greatest_value(runs: Runs, sign: int) -> float:
-    """Return the greatest score of an instance by single runs; minus the least for ``sign`` -1."""
-    signs = (sign, -sign)
-    return math.fsum(float((s * of_runs).max()) for s, of_runs in zip(signs, runs, strict=False))

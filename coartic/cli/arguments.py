@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
 
 
-def place(metavar: str, what: str, *names: str) -> Any:
+def file_or_folder(metavar: str, what: str, *names: str) -> Any:
     """Return an option for a file or a folder."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
@@ -31,8 +31,8 @@ def option(metavar: str, what: str, *names: str) -> Any:
 ResultsFolder = Annotated[
     Path, typer.Argument(parser=folder_named, metavar="FOLDER", help="Results folder.")
 ]
-In = Annotated[Path, place("FOLDER", "Where to look for the run.", "--in")]
-Out = Annotated[Path | None, place("FILE", "File to write.")]
+In = Annotated[Path, file_or_folder("FOLDER", "Where to look for the run.", "--in")]
+Out = Annotated[Path | None, file_or_folder("FILE", "File to write.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 MethodFiles = Annotated[
     list[Path] | None, option("FILE", "Methods of your own (Python).", "--method-file")

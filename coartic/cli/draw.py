@@ -22,9 +22,9 @@ def draw(
         list[str] | None,
         typer.Argument(metavar="TASK", help="Tasks, task files, or long/v1/i000..i003."),
     ] = None,
-    out: Annotated[Path, given.place("FILE", "Picture (.png, .svg, .pdf), or a folder.")] = Path(
-        "tasks.svg"
-    ),
+    out: Annotated[
+        Path, given.file_or_folder("FILE", "Picture (.png, .svg, .pdf), or a folder.")
+    ] = Path("tasks.svg"),
     replace: given.Replace = False,
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
@@ -54,7 +54,9 @@ def draw(
 
 def animate(
     run: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
-    out: Annotated[Path, given.place("FILE", "Film to write: .gif or .mp4.")] = Path("film.gif"),
+    out: Annotated[Path, given.file_or_folder("FILE", "Film to write: .gif or .mp4.")] = Path(
+        "film.gif"
+    ),
     other: Annotated[
         str | None, typer.Argument(metavar="OTHER", help="Another run to show next to it.")
     ] = None,

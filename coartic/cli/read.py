@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def report(
     folder: given.ResultsFolder,
     out: Annotated[
-        Path | None, given.place("FOLDER", "Folder to write; FOLDER/report if not given.")
+        Path | None, given.file_or_folder("FOLDER", "Folder to write; FOLDER/report if not given.")
     ] = None,
     for_paper: Annotated[
         bool, typer.Option("--for-paper", help="Also figures as SVG and PDF, and tables as LaTeX.")
@@ -82,9 +82,9 @@ def exit_if_parts_failed(study: Study) -> None:
 def trace(
     table: Annotated[str | None, typer.Argument(metavar="TABLE", help="Id of a table.")] = None,
     row: Annotated[str | None, typer.Argument(metavar="ROW", help="Name of a row.")] = None,
-    folder: Annotated[Path, given.place("FOLDER", "A report or its results.", "--in")] = Path(
-        "results"
-    ),
+    folder: Annotated[
+        Path, given.file_or_folder("FOLDER", "A report or its results.", "--in")
+    ] = Path("results"),
 ) -> None:
     """Name the runs behind a row of a report's table: run `coartic report` first."""
     from coartic.analysis.report import trace as traced

@@ -95,7 +95,7 @@ def of_postures(rng: np.random.Generator, n: int) -> dict[str, bool]:
 def of_instances(rng: np.random.Generator, n: int) -> dict[str, bool]:
     """Whether the interval over n random tasks, five runs each, holds the mean of skewed gaps."""
     centres = rng.exponential(0.1, n)
-    mean = other_tasks({"a": [(centre + rng.exponential(0.02, 5),) for centre in centres]})
+    mean = other_tasks({"a": [centre + rng.exponential(0.02, 5) for centre in centres]})
     return {"interval over random tasks": holds(mean, 0.12)}
 
 

@@ -106,7 +106,7 @@ def tabulate_others(study):
     rows = {}
     for method in OTHERS:
         for family, of_family in runs[runs.method == method].groupby("family"):
-            gaps = [(of_task.gap.to_numpy(),) for _, of_task in of_family.groupby("task")]
+            gaps = [of_task.gap.to_numpy() for _, of_task in of_family.groupby("task")]
             gap = other_tasks({family: gaps})
             row = {"family": family, "method": method, "tasks": len(gaps)}
             row |= {"gap": gap.value, "gap_low": gap.low, "gap_high": gap.high}
