@@ -58,7 +58,7 @@ shipped: $(READY)
 	$(BIN)/coartic run comparison --out $(OUT)/shipped/comparison
 	$(BIN)/coartic run families --runs 3 --out $(OUT)/shipped/families \
 	  --tasks $(shell echo $(FAMILIES:%=%/v1/i000..i009) | tr ' ' ,)
-	$(BIN)/python -m coartic.benchmarks.shipped $(if $(CHANGED),--changed) \
+	$(BIN)/python docs/scripts/pack_shipped.py $(if $(CHANGED),--changed) \
 	  $(OUT)/shipped/comparison $(OUT)/shipped/families
 
 # The suites behind docs/findings.md, their reports, and the pages made from them.

@@ -80,13 +80,6 @@ def vector(values: ArrayLike) -> Array:
     return sample
 
 
-def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]:
-    """Two samples; one sample of differences where ``second`` is a number."""
-    if np.ndim(second) == 0:
-        return (np.subtract(vector(first), second, dtype=np.float64),)
-    return vector(first), vector(second)
-
-
 def slices(count: int, most: int) -> Iterator[slice]:
     """Slices of at most ``most`` places that cover ``count`` places, in their order."""
     for start in range(0, count, most):
@@ -115,20 +108,14 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
 
 
 def difference_of_means(
-    first: ArrayLike, second: ArrayLike | float, *, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike, *, resamples: int = RESAMPLES
 ) -> Estimate:
-    """Mean of ``first`` less mean of ``second``, independent samples, or a sample and a number.
-
-    Of pairs it is the mean of their differences, ``difference_of_means(first - second, 0)``.
-    """
-    samples = samples_of(first, second)
-    if len(samples) == 1:
-        return bootstrap_estimate(samples, np.mean, resamples)
+    """Return the mean of ``first`` less the mean of ``second``, two independent samples."""
 
     def difference(a: Array, b: Array, axis: int) -> Array:
         return np.asarray(a.mean(axis) - b.mean(axis))
 
-    return bootstrap_estimate(samples, difference, resamples)
+    return bootstrap_estimate((vector(first), vector(second)), difference, resamples)
 
 
 def bootstrap_estimate(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -35,7 +35,7 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import robot_parameters
 from coartic.motion.solution import execute, initial_reward
 from coartic.optimisers import FAILED
-from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Hand, Robot
+from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.families import LOCKED, instance_names, shipped_families
 from coartic.tasks.optima import best_shipped
@@ -67,40 +67,6 @@ class Recorded:
         if isinstance(model := plain.get("model"), MotionModel):
             plain["model"] = model._asdict()
         self._spec = spec and replace(spec, kwargs=plain)
-
-
-class Scope(NamedTuple):
-    """The tasks of an environment, and what their robots have in common."""
-
-    tasks: list[Task | str]
-    """Tasks, or names of instances."""
-    goals: int
-    """Most goals of a task."""
-    links: int
-    """Most links of an arm."""
-    hands: tuple[Hand, ...]
-    locked: tuple[str, ...]
-    """Base coordinates that no robot can move."""
-    differs: bool
-    """True if the robots differ in links."""
-
-
-def scope_of(
-    task: Task | str | Path, split: Split | None, count: int | None, year: int | None
-) -> Scope:
-    """The scope of a task, or of a family with a split of its instances. Raises ValueError for a
-    split of a task."""
-    if isinstance(task, str) and task in shipped_families():
-        family = shipped_families()[task]
-        names = instance_names(task, split or "development", count, year)
-        locked = tuple(set.intersection(*({*LOCKED[base]} for base in family.base)))
-        (fewest, links), hands = family.links, family.hands
-        return Scope([*names], family.goals[1], links, hands, locked, fewest < links)
-    if (split, count, year) != (None, None, None):
-        raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
-    only = as_task(task)
-    links = only.robot.most_links
-    return Scope([only], len(only.goals), links, only.hands, only.locked_base, False)
 
 
 class TaskVectorEnv(Recorded, VectorEnv):
@@ -172,23 +138,34 @@ class TaskVectorEnv(Recorded, VectorEnv):
         model = MotionModel(**model) if isinstance(model, dict) else model
         self.num_envs, self.model = num_envs, check_model(model)
         self.options = {"task": task, "ahead": ahead, "model": model}
-        scope = scope_of(task, split, count, year)
-        self.tasks = scope.tasks
+        self.tasks: list[Task | str]  # or names of instances
+        if isinstance(task, str) and task in shipped_families():
+            family = shipped_families()[task]
+            self.tasks = [*instance_names(task, split or "development", count, year)]
+            locked = set.intersection(*({*LOCKED[base]} for base in family.base))
+            (fewest, links), hands, goals = family.links, family.hands, family.goals[1]
+        elif (split, count, year) != (None, None, None):
+            raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
+        else:
+            only = as_task(task)
+            self.tasks, locked = [only], {*only.locked_base}
+            fewest = links = only.robot.most_links
+            hands, goals = only.hands, len(only.goals)
         self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
         # All robots are taken for the widest, some of whose links have no length.
-        self.widest = Robot((1.0,) * scope.links, (1.0,) * scope.links)
+        self.widest = Robot((1.0,) * links, (1.0,) * links)
         self.starts = np.zeros((len(self.tasks), self.widest.dof))
         self.kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
-        base = [place for place, axis in enumerate("xy") if axis not in scope.locked]
-        arms = [np.arange(self.widest.dof)[self.widest.joints(hand)] for hand in scope.hands]
+        base = [place for place, axis in enumerate("xy") if axis not in locked]
+        arms = [np.arange(self.widest.dof)[self.widest.joints(hand)] for hand in hands]
         joints, view = np.concatenate([base, *arms]).astype(np.int64), ahead + 1
-        sizes = [view, 2 * view + len(joints), len(joints) * scope.differs]
+        sizes = [view, 2 * view + len(joints), len(joints) * (fewest < links)]
         high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
         self.state = VectorState.empty(
             self.widest,
-            (num_envs, len(self.tasks), scope.goals),
+            (num_envs, len(self.tasks), goals),
             joints,
-            np.array([HANDS.index(hand) for hand in scope.hands]),
+            np.array([HANDS.index(hand) for hand in hands]),
             len(high),
             ahead=ahead,
             reach=REACH,

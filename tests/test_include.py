@@ -9,6 +9,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import pack_shipped
 import pytest
 
 from coartic import CoarticError, load_task
@@ -242,7 +243,7 @@ def test_shipped_results(monkeypatch, tmp_path):
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped, but of comparison, "):
         shipped.open_shipped("quick")
     copy = shutil.copytree(Path(shipped.__file__).with_name("shipped"), tmp_path / "copy")
-    monkeypatch.setattr(shipped, "_FOLDER", copy)
+    monkeypatch.setattr(shipped, "FOLDER", copy)
     (copy / "families.sqlite.xz").write_bytes(lzma.compress(b"something else"))
     with pytest.raises(CoarticError, match="not as it was shipped"):
         shipped.open_shipped("families")
@@ -255,7 +256,7 @@ def test_shipped_results(monkeypatch, tmp_path):
 
 
 def test_packed_results_say_the_same(parts, tmp_path):
-    shipped.pack(parts[0], tmp_path)
+    pack_shipped.pack(parts[0], tmp_path)
     content = (tmp_path / "paper.sqlite.xz").read_bytes()
     assert (tmp_path / "SHA256SUMS").read_text().split()[0] == hashlib.sha256(content).hexdigest()
     (tmp_path / "downsampled").mkdir()
@@ -272,8 +273,8 @@ def test_packed_results_say_the_same(parts, tmp_path):
 def packed(parts, tmp_path, monkeypatch):
     """The right part of suite ``paper``, as if it were shipped."""
     (tmp_path / "packed").mkdir()
-    shipped.pack(parts[1], tmp_path / "packed")
-    monkeypatch.setattr(shipped, "_FOLDER", tmp_path / "packed")
+    pack_shipped.pack(parts[1], tmp_path / "packed")
+    monkeypatch.setattr(shipped, "FOLDER", tmp_path / "packed")
     return parts[1]
 
 
@@ -284,7 +285,7 @@ def test_results_are_packed_again_where_they_have_not_changed(
 
     def pack(folder, *options):
         monkeypatch.setattr(sys, "argv", ["shipped", *options, str(folder)])
-        return shipped.main(), capsys.readouterr().out
+        return pack_shipped.main(), capsys.readouterr().out
 
     before = (tmp_path / "packed" / "SHA256SUMS").read_text()
     for number, (change, said) in enumerate(

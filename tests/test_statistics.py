@@ -117,14 +117,6 @@ def test_intervals_of_many_normal_values_are_the_usual_ones(sizes):
     assert (alone.low, alone.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
 
 
-def test_a_difference_to_a_known_number_is_of_one_sample():
-    rng = np.random.default_rng(10)
-    a = rng.normal(0, 1, 12)
-    to_number = statistics.difference_of_means(a, -7)
-    alone = statistics.mean(a + 7)
-    assert (to_number.low, to_number.high, to_number.n) == (alone.low, alone.high, (12,))
-
-
 def test_degenerate_samples():
     columns = statistics.Estimate(2.0, 1.0, 3.0).columns("gap")
     assert columns == {"gap": 2.0, "gap_low": 1.0, "gap_high": 3.0}

@@ -26,10 +26,10 @@ from coartic.estimates import (
     TAILS,
     Estimate,
     centred,
-    samples_of,
     slices,
     vector,
 )
+from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
 MARGIN = 0.01
@@ -56,7 +56,9 @@ def bootstrap_test(
     Without spread in any sample, p is the p-value of the exact test of as many values, by signs or
     by exchange. NaN with fewer than two values in a sample, or without spread and difference.
     """
-    samples = samples_of(first, second)
+    samples: tuple[Array, ...] = vector(first), vector(np.atleast_1d(second))
+    if np.ndim(second) == 0:  # a number without error
+        samples = (samples[0] - samples[1],)
     difference = float(samples[0].mean() - sum(other.mean() for other in samples[1:]))
     n = tuple(map(len, samples))
     shifted = list(map(centred, samples))

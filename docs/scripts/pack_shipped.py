@@ -1,0 +1,89 @@
+"""Pack shipped results: ``python docs/scripts/pack_shipped.py FOLDER`` packs a results folder whose
+runs have the same results as the shipped runs.
+
+The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`): 5 MB in place of
+150 MB.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import lzma
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from coartic.benchmarks import shipped
+from coartic.benchmarks.registry import built_in
+from coartic.benchmarks.reproduce import compare_runs
+from coartic.errors import CoarticError
+from coartic.internal.files import folder_named
+from coartic.runs.store import RUNS_FILE, open_store, writing
+
+
+def changed_runs(folder: Path) -> Iterator[str]:
+    """Yield a sentence for each shipped run that a folder lacks or that has another result there,
+    whatever the version of its code.
+
+    Raises CoarticError if another version of the code made the folder.
+    """
+    with open_store(folder) as made:
+        plan = made.plan()
+        for method in (job.cell.method for job in plan):
+            if method.name not in built_in() or built_in()[method.name].code != method.code:
+                raise CoarticError(
+                    f"{folder}: other code of {method.name} made it: run the suite again"
+                )
+        if (suite := plan[0].suite) not in shipped.shipped_hashes():
+            return
+        ids = {run_id.partition("-")[0]: run_id for run_id in made.runs().run_id}
+        with shipped.open_shipped(suite) as before:
+            for run_id in before.runs().run_id:
+                if (asked := run_id.partition("-")[0]) not in ids:
+                    yield f"run {run_id} is missing"
+                    continue
+                for change in compare_runs(before.run(run_id), made.run(ids[asked])):
+                    yield f"run {run_id}: {change}"
+
+
+def pack(folder: Path, out: Path) -> None:
+    """Write the downsampled results of a folder, and the hashes of all results, into ``out``."""
+    with open_store(folder) as source, tempfile.TemporaryDirectory() as made:
+        plan, made_with = source.plan(), source.made_with()
+        ran, date = made_with.pop("command"), made_with.pop("date")
+        with writing(Path(made)) as target:
+            target.replace_plan(plan, made_with, ran, date)
+            target.write(source.run(run_id).downsample() for run_id in source.runs().run_id)
+        content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
+    (out / f"{plan[0].suite}{shipped.ENDING}").write_bytes(content)
+    packed = sorted(out.glob(f"*{shipped.ENDING}"))
+    lines = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in packed]
+    (out / shipped.HASHES).write_text("".join(lines), encoding="ascii")
+
+
+def main() -> int:
+    """Pack the folders of the command line, unless a shipped result would change."""
+    parser = argparse.ArgumentParser(prog="python docs/scripts/pack_shipped.py")
+    parser.add_argument("--changed", action="store_true", help="pack results that have changed")
+    parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")
+    given = parser.parse_args()
+    try:
+        changes = {folder: list(changed_runs(folder)) for folder in given.folders}
+    except CoarticError as error:
+        parser.error(str(error))
+    for folder, sentences in changes.items():
+        print(f"{folder}: {len(sentences) or 'no'} differences to what is shipped")
+        for sentence in sentences[:20]:
+            print(f"- {sentence}")
+    if any(changes.values()) and not given.changed:
+        print("Nothing is packed. If results change on purpose, add --changed.")
+        return 1
+    for folder in given.folders:
+        pack(folder, shipped.FOLDER)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
