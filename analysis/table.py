@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ import pandas as pd
 
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.words import id_of, marked
+from coartic.estimates import standard_deviation
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -111,6 +113,24 @@ def shown_names(study: Study) -> dict[Hashable | None, Any]:
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
         "known": any(not best.only_here for best in study.optima.values()),
+    }
+
+
+def cell_row(study: Study, cell: CellRuns) -> Row:
+    """Return what tables with a row for each cell say: task, method, numbers of runs and of solved
+    runs, mean and SD of the reward, gap, and the ids of the runs.
+
+    A table leaves out what it has no column for.
+    """
+    return {
+        "task": marked(study.tasks[cell.task]),
+        "method": cell.label,
+        "runs": len(cell.runs),
+        "solved": len(cell.good),
+        "reward": cell.rewards.mean() if len(cell.good) else math.nan,
+        "reward_sd": standard_deviation(cell.rewards),
+        "gap": cell.gap,
+        **runs_of(cell),
     }
 
 

@@ -29,8 +29,8 @@ from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.standings import failed_runs, is_learner
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import marked, number, p_value
+from coartic.analysis.table import Row, Rows, cell_row, runs_of, table
+from coartic.analysis.words import number, p_value
 from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL
 from coartic.internal.text import counted
@@ -113,16 +113,14 @@ def list_signatures(study: Study) -> Rows:
         if cell is None or not len(cell.good):
             continue
         runs = study.executed(name, label)
-        row: Row = {
-            "task": marked(study.tasks[name]),
-            "method": label,
+        row = cell_row(study, cell) | {
             "runs": len(cell.good),
             "first": mean_of_goals(runs.against_same_hands[:, :1]),
             "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),
             "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
             "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),
         }
-        yield f"{name} {label}", row | runs_of(cell)
+        yield f"{name} {label}", row
 
 
 def mean_of_goals(values: Array) -> float:

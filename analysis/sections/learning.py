@@ -15,7 +15,7 @@ from coartic.analysis.methods import EC1, LEARNERS, most_exploring
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.sections.costs import improvements
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.table import Rows, cell_row, table
 from coartic.analysis.words import marked, number
 
 BUDGETS = (100, 1_000, 10_000)
@@ -44,12 +44,7 @@ def list_learning(study: Study) -> Rows:
         if cell.runs.trials.min() < BUDGETS[0]:  # a try or two, no learning
             continue
         initial = initial_reward(study.tasks[task])
-        row: Row = {
-            "task": marked(study.tasks[task]),
-            "method": label,
-            "runs": len(runs),
-            "initial": initial,
-        }
+        row = cell_row(study, cell) | {"initial": initial}
         for budget in (each for each in BUDGETS if each <= cell.runs.trials.min()):
             best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
             row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan
@@ -61,7 +56,7 @@ def list_learning(study: Study) -> Rows:
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         names = (f"trials_to_half_gain{end}" for end in ("", "_low", "_high"))
         row |= dict(zip(names, quartiles, strict=True))
-        yield f"{task} {label}", row | runs_of(cell)
+        yield f"{task} {label}", row
 
 
 @figure(

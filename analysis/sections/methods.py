@@ -6,10 +6,9 @@ import math
 from collections import Counter
 
 from coartic.analysis.sections.costs import solve_times
-from coartic.analysis.study import Study, one_by_one, typical_run
-from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
-from coartic.analysis.words import marked, tally
-from coartic.estimates import standard_deviation
+from coartic.analysis.study import CellRuns, Study, one_by_one, typical_run
+from coartic.analysis.table import SHORT_ID, Rows, cell_row, table
+from coartic.analysis.words import tally
 
 
 @table(
@@ -24,19 +23,15 @@ def list_methods(study: Study) -> Rows:
     """
     places = {task: place for place, task in enumerate(one_by_one(study))}
     cells = [cell for cell in study.cells.values() if cell.task in places]
-    means = {id(cell): cell.rewards.mean() if len(cell.good) else -math.inf for cell in cells}
     is_search = study.methods.kind == "optimum search"
-    cells.sort(key=lambda c: (places[c.task], not is_search[c.label], -means[id(c)]))
-    for cell in cells:
+
+    def place(cell: CellRuns) -> tuple[int, bool, float]:
+        mean = cell.rewards.mean() if len(cell.good) else -math.inf
+        return places[cell.task], not is_search[cell.label], -mean
+
+    for cell in sorted(cells, key=place):
         good, runs = cell.good, cell.runs
-        row = {
-            "task": marked(study.tasks[cell.task]),
-            "method": cell.label,
-            "runs": len(runs),
-            "solved": len(good),
-            "reward": means[id(cell)] if len(good) else math.nan,
-            "reward_sd": standard_deviation(cell.rewards),
-            "gap": cell.gap,
+        row = cell_row(study, cell) | {
             "hands": tally(Counter(good.hands)) if len(good) > 1 else "".join(good.hands),
             "trials": runs.trials.astype(float).median(),
             "forward_kinematics": runs.forward_kinematics.astype(float).median(),
@@ -44,4 +39,4 @@ def list_methods(study: Study) -> Rows:
         }
         if len(good):
             row["median_run"] = typical_run(good)[:SHORT_ID]
-        yield f"{cell.task} {cell.label}", row | runs_of(cell)
+        yield f"{cell.task} {cell.label}", row

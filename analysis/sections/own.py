@@ -12,9 +12,8 @@ from coartic.analysis.method_frame import BY_TRIAL, GROUPS
 from coartic.analysis.methods import most_exploring
 from coartic.analysis.sections import ranking
 from coartic.analysis.study import Study
-from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.table import Rows, cell_row, table
 from coartic.analysis.words import MOST_NAMED, listed, marked, number, p_value, percent
-from coartic.estimates import standard_deviation
 from coartic.internal.text import counted
 
 NO_TEST = " (the runs are too few, or too alike, for a test)"
@@ -50,7 +49,7 @@ def list_own(study: Study) -> Rows:
     """List methods from files on each task, with the nearest built-in method and the learner."""
     compared, tested = standings.compared(study), ranking.list_against_learner(study)
     rows = study.methods
-    for task, title in ((name, marked(task)) for name, task in study.tasks.items()):
+    for task in study.tasks:
         cells = {method: of[task] for method, of in compared.items() if task in of}
         gaps = {
             cell.gap: method
@@ -60,20 +59,13 @@ def list_own(study: Study) -> Rows:
         for method, cell in cells.items():
             if rows.built_in[method]:
                 continue
-            row: Row = {
-                "task": title,
-                "method": method,
-                "runs": len(cell.runs),
-                "solved": len(cell.good),
-                "reward": cell.rewards.mean() if len(cell.good) else math.nan,
-                "reward_sd": standard_deviation(cell.rewards),
-                "gap": cell.gap,
+            row = cell_row(study, cell) | {
                 "nearest": gaps[min(gaps)] if gaps else None,
                 "nearest_gap": min(gaps, default=math.nan),
             }
             if (name := f"{task} {method}") in tested.index:
                 row |= {column: tested[column][name] for column in ("learner", "p_holm")}
-            yield name, row | runs_of(cell)
+            yield name, row
 
 
 def own_in_words(study: Study) -> str:

@@ -13,8 +13,7 @@ from coartic.analysis.random_search import (
 )
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import marked
+from coartic.analysis.table import Rows, cell_row, table
 from coartic.robot import Array
 
 SHOWN = {
@@ -50,10 +49,8 @@ def list_beside_random_search(study: Study) -> Rows:
                     values, improved = both
                     there = signature, task, hands
                     enough = len(improved) > 0
-                    row: Row = {
+                    row = cell_row(study, cell) | {
                         "signature": SHOWN[signature],
-                        "task": marked(study.tasks[task]),
-                        "method": label,
                         "hands": hands,
                         "runs": len(values),
                         "value": values.mean(),
@@ -63,7 +60,7 @@ def list_beside_random_search(study: Study) -> Rows:
                         "every": mean_of(most_of_random_search(study, *there, trials, every=True)),
                         "more_trials": mean_of(most_of_random_search(study, *there, MORE * trials)),
                     }
-                    yield f"{signature} {task} {label} {hands}", row | runs_of(cell)
+                    yield f"{signature} {task} {label} {hands}", row
 
 
 def mean_of(values: Array) -> float:

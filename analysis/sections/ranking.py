@@ -16,13 +16,12 @@ from coartic.analysis.method_frame import GROUPS
 from coartic.analysis.methods import RANDOM_SEARCH, most_exploring
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.table import Row, Rows, cell_row, runs_of, table
 from coartic.analysis.words import (
     capital,
     in_brackets,
     interval,
     listed,
-    marked,
     number,
     p_value,
     percent,
@@ -71,11 +70,7 @@ def list_against_learner(study: Study) -> Rows:
                 cells.append((cell, learner))
         p = holm([test.p for test in tests])
         for (cell, learner), test, adjusted in zip(cells, tests, p, strict=True):
-            row: Row = {
-                "task": marked(study.tasks[cell.task]),
-                "method": label,
-                "runs": len(cell.runs),
-                "reward": cell.rewards.mean(),
+            row = cell_row(study, cell) | {
                 "learner": learner.rewards.mean(),
                 "p_holm": adjusted,
                 "least_p": test.least_p,
