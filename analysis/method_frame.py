@@ -60,12 +60,7 @@ def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) ->
         rows[label]["look"] = look
     place = {name: number for number, name in enumerate(KNOWN_METHODS)}
     ordered = sorted(rows, key=lambda label: place.get(rows[label]["base"], len(place)))
-    columns = [
-        "base", "condition", "setting", "parts", "title", "algorithm", "kind", "information",
-        "built_in", "stochastic", "headline", "under", "look",
-    ]  # fmt: skip
-    frame = pd.DataFrame([rows[label] for label in ordered], ordered, columns)
-    return frame.rename_axis("method")
+    return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
 
 
 def method_row(

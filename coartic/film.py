@@ -12,20 +12,20 @@ import tempfile
 from collections.abc import Callable, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
 from coartic.internal.files import check_output, write_output
-from coartic.robot import Array, Hand
-from coartic.tasks.task import Task
+
+if TYPE_CHECKING:
+    from coartic.trajectories import Trajectory
 
 FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
@@ -40,27 +40,8 @@ _COUNTER: Any = {"fontsize": 13, "fontweight": "bold", "va": "bottom"}
 _BESIDE, _BELOW, _ABOVE = 0.08, 0.05, 0.65  # inches beside the axes
 
 
-class Filmed(Protocol):
-    """A movement that a film shows, such as a :class:`coartic.Trajectory`."""
-
-    @property
-    def task(self) -> Task:
-        """The task."""
-
-    @property
-    def configurations(self) -> Array:
-        """Configurations tick by tick, shape ``(ticks, dof)``, length unit and rad."""
-
-    @property
-    def hits(self) -> NDArray[np.int64]:
-        """Row of ``configurations`` in which each goal is hit, shape ``(G,)``."""
-
-    def hand_path(self, hand: Hand) -> Array:
-        """Positions of a hand tick by tick, shape ``(ticks, 2)``, length unit."""
-
-
 def write_film(
-    movements: Sequence[tuple[str, Filmed]],
+    movements: Sequence[tuple[str, Trajectory]],
     path: Path,
     *,
     width: int = 800,
@@ -118,7 +99,7 @@ def check_film(path: Path, *, replace: bool = False) -> None:
     check_output(path, replace=replace)
 
 
-def set_scene(axes: Axes, movement: Filmed, colour: str) -> Callable[[int], None]:
+def set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
     """Draw what moves in one picture.
 
     Returns a function that shows the state at a row of the movement, or at its last one: artists
@@ -143,7 +124,7 @@ def set_scene(axes: Axes, movement: Filmed, colour: str) -> Callable[[int], None
 
 
 def set_stage(
-    movements: Sequence[tuple[str, Filmed]], width: int
+    movements: Sequence[tuple[str, Trajectory]], width: int
 ) -> tuple[Figure, list[Callable[[int], None]]]:
     """A figure ``width`` pixels wide with a scene per movement, all showing the same place, and
     the functions that show their rows."""

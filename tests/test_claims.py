@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, load_task
-from coartic.analysis.claims.claim import Claim, Higher, all_higher
+from coartic.analysis.claims.claim import Claim, all_higher
 from coartic.analysis.claims.coarticulation import chosen_slower
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
@@ -21,7 +21,7 @@ from coartic.analysis.claims.paper import (
     shortest_reach,
     some_of,
 )
-from coartic.analysis.claims.reader import Measurement, MissingError, Reader
+from coartic.analysis.claims.reader import Higher, Measurement, MissingError, Reader
 from coartic.analysis.sections import TABLES
 from coartic.analysis.sections.claims import counts, verdicts_in_words
 from coartic.analysis.solutions import Solutions

@@ -168,10 +168,6 @@ def test_holm_leaves_out_what_was_not_tested():
     assert hypotheses.holm([]) == []
     planned = hypotheses.holm([0.01, math.nan, 0.02], 4)  # those that are missing count as p = 1
     assert planned == pytest.approx([0.04, math.nan, 0.06], nan_ok=True)
-    with pytest.raises(ValueError, match="fewer tests planned than made"):
-        hypotheses.holm([0.01, 0.02, 0.03], 2)
-    with pytest.raises(ValueError, match="between 0 and 1"):
-        hypotheses.holm([0.5, 1.5])
 
 
 def test_rounding_is_no_spread():

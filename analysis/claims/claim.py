@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from coartic.analysis.claims.judging import Finding
-from coartic.analysis.claims.reader import Measurement, Reader
+from coartic.analysis.claims.reader import Higher, Measurement, Reader
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.words import capital, estimate, number
 from coartic.estimates import Estimate, difference_of_means
@@ -45,15 +45,6 @@ class Claim:
     """True if at most half of these sets support the claim, on some task."""
     short: str = ""
     """A few words for sentences; empty but for the three central claims."""
-
-
-class Higher(NamedTuple):
-    """A claimed order of means: the first mean exceeds the second mean, or 0, by a margin."""
-
-    first: Measurement
-    second: Measurement | None = None
-    by: float = 0.0
-    """Margin, in the unit of the measurements."""
 
 
 def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ()) -> Finding:

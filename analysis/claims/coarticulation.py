@@ -10,9 +10,9 @@ import numpy as np
 from scipy import stats
 
 from coartic.analysis.claims import margins
-from coartic.analysis.claims.claim import Claim, Higher, all_higher
+from coartic.analysis.claims.claim import Claim, all_higher
 from coartic.analysis.claims.judging import Finding
-from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
+from coartic.analysis.claims.reader import Higher, MissingError, Reader, there, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, RANDOM_SEARCH
 from coartic.analysis.random_search import random_search_for
 from coartic.analysis.signatures.context_tests import posture_difference_below
@@ -39,7 +39,7 @@ def first_movement_sacrificed(read: Reader) -> Finding:
         first = read.signature("first", task, EC1)
         comparisons += [
             Higher(first, by=margins.ROUNDING_TICKS),
-            *(Higher(*both) for both in read.beside_random_search("first", task, EC1)),
+            *read.beside_random_search("first", task, EC1),
             Higher(first, read.signature("first", task, EC1_BY_SUBTASK)),
             Higher(read.signature("whole", task, EC1)),
         ]
@@ -118,7 +118,7 @@ def arm_coarticulation(read: Reader) -> Finding:
             arm = read.signature("arm", task, label)
             comparisons += [
                 Higher(arm, by=margins.ROUNDING_TICKS),
-                *(Higher(*both) for both in read.beside_random_search("arm", task, label)),
+                *read.beside_random_search("arm", task, label),
             ]
             if label == EC4:
                 comparisons.append(Higher(arm, read.signature("arm", task, EC4_BY_SUBTASK)))
@@ -130,7 +130,7 @@ def other_arm_coarticulation(read: Reader) -> Finding:
     """Test that the idle arm brings its hand nearer to the next goal of this hand."""
     arm = read.signature("other arm", TASK_1, EC4)
     by_subtask = read.signature("other arm", TASK_1, EC4_BY_SUBTASK)
-    beyond = [Higher(*both) for both in read.beside_random_search("other arm", TASK_1, EC4)]
+    beyond = read.beside_random_search("other arm", TASK_1, EC4)
     shown = [
         partial(read.signature, "other arm", TASK_1, EC4, replay=True),
         partial(read.signature, "other arm", TASK_1, EC3),

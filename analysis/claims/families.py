@@ -8,9 +8,9 @@ from dataclasses import replace
 from functools import partial
 
 from coartic.analysis.claims import margins
-from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_fails
+from coartic.analysis.claims.claim import Claim, all_positive, no_trial_fails
 from coartic.analysis.claims.judging import Finding, all_of, mean_beyond
-from coartic.analysis.claims.reader import MissingError, Reader, who_is
+from coartic.analysis.claims.reader import Higher, MissingError, Reader, who_is
 from coartic.analysis.methods import (
     CONDITION_OF,
     EC1,

@@ -16,7 +16,7 @@ from scipy import optimize, stats
 
 from coartic import Execution, Hand, Task
 from coartic.analysis.claims import margins
-from coartic.analysis.claims.claim import Claim, Higher, all_higher, all_positive, no_trial_fails
+from coartic.analysis.claims.claim import Claim, all_higher, all_positive, no_trial_fails
 from coartic.analysis.claims.coarticulation import (
     CLAIMS_OF_COARTICULATION,
     ONE_ARMED,
@@ -26,7 +26,7 @@ from coartic.analysis.claims.coarticulation import (
     TWO_ARMED,
 )
 from coartic.analysis.claims.judging import Finding, all_of
-from coartic.analysis.claims.reader import Measurement, MissingError, Reader, who_is
+from coartic.analysis.claims.reader import Higher, Measurement, MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4
 from coartic.analysis.published import published_cell
 from coartic.analysis.signatures.two_contexts import movable

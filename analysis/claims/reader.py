@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -61,6 +62,15 @@ class Measurement:
         if not self.numbers.ndim:
             return number(float(self.numbers))
         return estimate(mean(self.numbers), 1 if self.in_ticks else 3)
+
+
+class Higher(NamedTuple):
+    """A claimed order of means: the first mean exceeds the second mean, or 0, by a margin."""
+
+    first: Measurement
+    second: Measurement | None = None
+    by: float = 0.0
+    """Margin, in the unit of the measurements."""
 
 
 @dataclass
@@ -166,10 +176,8 @@ class Reader:
         values = self.study.signature_of(name, task, label, replay=replay)
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
-    def beside_random_search(
-        self, name: str, task: str, label: str
-    ) -> list[tuple[Measurement, Measurement]]:
-        """Return a signature of a method and of random search, for each hand sequence.
+    def beside_random_search(self, name: str, task: str, label: str) -> list[Higher]:
+        """Return the order of a signature of a method and of random search, for each hand sequence.
 
         The rule is that of :mod:`coartic.analysis.random_search`: equal hands, runs that improved,
         as many trials, and the width of the box that shows most.
@@ -185,11 +193,12 @@ class Reader:
                     f"fewer than {FEWEST} runs of {RANDOM_SEARCH} on {task} with hands {hands} "
                     "improved on the corrective process alone"
                 )
-            first, second = (
-                self.shown(name, task, who, values, words)
-                for who, values in zip((label, RANDOM_SEARCH), both, strict=True)
+            pairs.append(
+                Higher(
+                    self.shown(name, task, label, both[0], words),
+                    self.shown(name, task, RANDOM_SEARCH, both[1], words),
+                )
             )
-            pairs.append((first, second))
         if not pairs:
             raise MissingError(
                 f"no run of {who_is(label)} on {task} improved on the corrective process alone"

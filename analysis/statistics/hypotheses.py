@@ -137,16 +137,10 @@ def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
 
     Rejecting adjusted p-values at or below α has a family-wise error rate of α at most, whatever
     the dependence. NaN, a missing test, stays NaN and does not count, unless ``family`` says the
-    number of planned tests: then missing tests count as p = 1. Raises ValueError for a p-value
-    outside 0 to 1, and for fewer planned tests than p-values.
+    number of planned tests: then missing tests count as p = 1.
     """
     p = np.asarray(p_values, dtype=np.float64)
-    if ((p < 0) | (p > 1)).any():
-        raise ValueError("a p-value lies between 0 and 1")
-    tested = int((~np.isnan(p)).sum())
-    planned = tested if family is None else family
-    if planned < tested:
-        raise ValueError(f"fewer tests planned than made: {planned} of {tested}")
+    planned = int((~np.isnan(p)).sum()) if family is None else family
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))
     adjusted = np.empty_like(p)
