@@ -116,7 +116,7 @@ def shown_names(study: Study) -> dict[Hashable | None, Any]:
     }
 
 
-def cell_row(study: Study, cell: CellRuns) -> Row:
+def row_of_cell(study: Study, cell: CellRuns) -> Row:
     """Return what tables with a row for each cell say: task, method, numbers of runs and of solved
     runs, mean and SD of the reward, gap, and the ids of the runs.
 

@@ -13,15 +13,15 @@ from coartic.runs.store import Store, open_content
 
 SHIPPED = "shipped"
 """Name of the shipped results, in place of a folder."""
-FOLDER = Path(__file__).with_name("shipped")
+SHIPPED_FOLDER = Path(__file__).with_name("shipped")
 HASHES = "SHA256SUMS"
-ENDING = ".sqlite.xz"
+PACKED = ".sqlite.xz"
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
     """Open the shipped results of a suite, unpacked in memory. Raises CoarticError if the suite has
     no shipped results, or if their file was changed."""
-    path = FOLDER / f"{suite}{ENDING}"
+    path = SHIPPED_FOLDER / f"{suite}{PACKED}"
     try:
         hashes = shipped_hashes()
         content = path.read_bytes() if suite in hashes else b""
@@ -39,6 +39,6 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
 
 def shipped_hashes() -> dict[str, str]:
     """Return the SHA-256 of the shipped results of each suite."""
-    lines = (FOLDER / HASHES).read_text(encoding="ascii").splitlines()
+    lines = (SHIPPED_FOLDER / HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
-    return {name.removesuffix(ENDING): digits for digits, name in pairs}
+    return {name.removesuffix(PACKED): digits for digits, name in pairs}

@@ -243,7 +243,7 @@ def test_shipped_results(monkeypatch, tmp_path):
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped, but of comparison, "):
         shipped.open_shipped("quick")
     copy = shutil.copytree(Path(shipped.__file__).with_name("shipped"), tmp_path / "copy")
-    monkeypatch.setattr(shipped, "FOLDER", copy)
+    monkeypatch.setattr(shipped, "SHIPPED_FOLDER", copy)
     (copy / "families.sqlite.xz").write_bytes(lzma.compress(b"something else"))
     with pytest.raises(CoarticError, match="not as it was shipped"):
         shipped.open_shipped("families")
@@ -274,7 +274,7 @@ def packed(parts, tmp_path, monkeypatch):
     """The right part of suite ``paper``, as if it were shipped."""
     (tmp_path / "packed").mkdir()
     pack_shipped.pack(parts[1], tmp_path / "packed")
-    monkeypatch.setattr(shipped, "FOLDER", tmp_path / "packed")
+    monkeypatch.setattr(shipped, "SHIPPED_FOLDER", tmp_path / "packed")
     return parts[1]
 
 

@@ -106,10 +106,10 @@ def sections(study: Study) -> list[dict[str, Any]]:
     failed, with their ``failure`` in words."""
     allowed = []
     for section in about.visible_sections(study):
-        parts = about.attempt(study, section.short, partial(parts_of, section))
+        parts = about.attempt(study, section.short, partial(parts_of, section)) or NO_PARTS
         failure = about.failures(study).get(section.short, "")
-        if failure or (parts and (parts["figure"] or parts["rows"])):
-            allowed.append({**vars(section), **NO_PARTS, **(parts or {}), "failure": failure})
+        if failure or parts["figure"] or parts["rows"]:
+            allowed.append({**vars(section), **parts, "failure": failure})
     return allowed
 
 

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from fnmatch import fnmatch
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from coartic.analysis.table import Table
@@ -109,12 +108,9 @@ def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
     _, _, header, digits = table.column(name)
     decimals, is_p = int(digits) if digits.isdigit() else None, digits == "p"
     columns = [f"{name}{ending}" for ending in ("", "_low", "_high", "_sd")]
-    none = pd.Series(math.nan, frame.index)
-    parts = [pd.to_numeric(frame.get(each, none)).to_numpy(float, na_value=math.nan)
-             for each in columns]  # fmt: skip
-    scaled = (100.0 if "(%)" in header else 1.0) * np.column_stack(parts)
+    values = frame.reindex(columns=columns).apply(pd.to_numeric).to_numpy(float, na_value=math.nan)
     texts = []
-    for value, low, high, sd in scaled.tolist():
+    for value, low, high, sd in ((100.0 if "(%)" in header else 1.0) * values).tolist():
         spread = "" if math.isnan(sd) else f" ± {number(sd, decimals)}"
         interval = in_brackets(low, high, decimals)
         text = number(value, 3 if is_p else decimals)

@@ -29,7 +29,7 @@ from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.standings import failed_runs, is_learner
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.table import Row, Rows, cell_row, runs_of, table
+from coartic.analysis.table import Row, Rows, row_of_cell, runs_of, table
 from coartic.analysis.words import number, p_value
 from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL
@@ -113,7 +113,7 @@ def list_signatures(study: Study) -> Rows:
         if cell is None or not len(cell.good):
             continue
         runs = study.executed(name, label)
-        row = cell_row(study, cell) | {
+        row = row_of_cell(study, cell) | {
             "runs": len(cell.good),
             "first": mean_of_goals(runs.against_same_hands[:, :1]),
             "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),

@@ -15,7 +15,7 @@ from coartic.analysis.methods import EC1, LEARNERS, most_exploring
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.sections.costs import improvements
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Rows, cell_row, table
+from coartic.analysis.table import Rows, row_of_cell, table
 from coartic.analysis.words import marked, number
 
 BUDGETS = (100, 1_000, 10_000)
@@ -44,7 +44,7 @@ def list_learning(study: Study) -> Rows:
         if cell.runs.trials.min() < BUDGETS[0]:  # a try or two, no learning
             continue
         initial = initial_reward(study.tasks[task])
-        row = cell_row(study, cell) | {"initial": initial}
+        row = row_of_cell(study, cell) | {"initial": initial}
         for budget in (each for each in BUDGETS if each <= cell.runs.trials.min()):
             best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
             row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan

@@ -7,7 +7,7 @@ from collections import Counter
 
 from coartic.analysis.sections.costs import solve_times
 from coartic.analysis.study import CellRuns, Study, one_by_one, typical_run
-from coartic.analysis.table import SHORT_ID, Rows, cell_row, table
+from coartic.analysis.table import SHORT_ID, Rows, row_of_cell, table
 from coartic.analysis.words import tally
 
 
@@ -31,7 +31,7 @@ def list_methods(study: Study) -> Rows:
 
     for cell in sorted(cells, key=place):
         good, runs = cell.good, cell.runs
-        row = cell_row(study, cell) | {
+        row = row_of_cell(study, cell) | {
             "hands": tally(Counter(good.hands)) if len(good) > 1 else "".join(good.hands),
             "trials": runs.trials.astype(float).median(),
             "forward_kinematics": runs.forward_kinematics.astype(float).median(),

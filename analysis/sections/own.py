@@ -12,7 +12,7 @@ from coartic.analysis.method_frame import BY_TRIAL, GROUPS
 from coartic.analysis.methods import most_exploring
 from coartic.analysis.sections import ranking
 from coartic.analysis.study import Study
-from coartic.analysis.table import Rows, cell_row, table
+from coartic.analysis.table import Rows, row_of_cell, table
 from coartic.analysis.words import MOST_NAMED, listed, marked, number, p_value, percent
 from coartic.internal.text import counted
 
@@ -59,7 +59,7 @@ def list_own(study: Study) -> Rows:
         for method, cell in cells.items():
             if rows.built_in[method]:
                 continue
-            row = cell_row(study, cell) | {
+            row = row_of_cell(study, cell) | {
                 "nearest": gaps[min(gaps)] if gaps else None,
                 "nearest_gap": min(gaps, default=math.nan),
             }

@@ -13,7 +13,7 @@ from coartic.analysis.random_search import (
 )
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Rows, cell_row, table
+from coartic.analysis.table import Rows, row_of_cell, table
 from coartic.robot import Array
 
 SHOWN = {
@@ -49,7 +49,7 @@ def list_beside_random_search(study: Study) -> Rows:
                     values, improved = both
                     there = signature, task, hands
                     enough = len(improved) > 0
-                    row = cell_row(study, cell) | {
+                    row = row_of_cell(study, cell) | {
                         "signature": SHOWN[signature],
                         "hands": hands,
                         "runs": len(values),

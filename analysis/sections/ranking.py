@@ -16,7 +16,7 @@ from coartic.analysis.method_frame import GROUPS
 from coartic.analysis.methods import RANDOM_SEARCH, most_exploring
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.table import Row, Rows, cell_row, runs_of, table
+from coartic.analysis.table import Row, Rows, row_of_cell, runs_of, table
 from coartic.analysis.words import (
     capital,
     in_brackets,
@@ -70,7 +70,7 @@ def list_against_learner(study: Study) -> Rows:
                 cells.append((cell, learner))
         p = holm([test.p for test in tests])
         for (cell, learner), test, adjusted in zip(cells, tests, p, strict=True):
-            row = cell_row(study, cell) | {
+            row = row_of_cell(study, cell) | {
                 "learner": learner.rewards.mean(),
                 "p_holm": adjusted,
                 "least_p": test.least_p,

@@ -57,8 +57,8 @@ def pack(folder: Path, out: Path) -> None:
             target.replace_plan(plan, made_with, ran, date)
             target.write(source.run(run_id).downsample() for run_id in source.runs().run_id)
         content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
-    (out / f"{plan[0].suite}{shipped.ENDING}").write_bytes(content)
-    packed = sorted(out.glob(f"*{shipped.ENDING}"))
+    (out / f"{plan[0].suite}{shipped.PACKED}").write_bytes(content)
+    packed = sorted(out.glob(f"*{shipped.PACKED}"))
     lines = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in packed]
     (out / shipped.HASHES).write_text("".join(lines), encoding="ascii")
 
@@ -81,7 +81,7 @@ def main() -> int:
         print("Nothing is packed. If results change on purpose, add --changed.")
         return 1
     for folder in given.folders:
-        pack(folder, shipped.FOLDER)
+        pack(folder, shipped.SHIPPED_FOLDER)
     return 0
 
 
