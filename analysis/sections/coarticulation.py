@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from operator import attrgetter
 from statistics import fmean
 from typing import Any
 
@@ -69,9 +70,9 @@ def shared_goal(study: Study) -> TwoContexts | None:
 
 
 @table(
-    "method; place: where; runs; distance: posture difference .2; "
-    "standardised_difference: standardised (SD of the runs) .1; p_holm: p (corrected) .p; "
-    "p_random_search: p beyond random search .p; "
+    "method; place: goal; runs; distance: posture difference .2; "
+    "standardised_difference: standardised posture difference (SD of the runs) .1; "
+    "p_holm: p (corrected) .p; p_random_search: p beyond random search .p; "
     "equivalent: difference that keeps the hand in place (null space, per dimension) .3; "
     "other: difference that moves the hand (per dimension) .3"
 )
@@ -213,15 +214,12 @@ def next_goal(study: Study) -> str:
     beyond = context_beyond_p(study, shared)
     drawn, who = method.stochastic, "The learner" if is_learner(method) else method.title
     runs, p = counted(shared.n, "run"), p_value(shared.p)
-    in_sd = not math.isnan(shared.standardised_posture_difference)
-
-    def distance(contexts: TwoContexts) -> float:
-        return contexts.standardised_posture_difference if in_sd else contexts.posture_difference
-
-    digits, unit = (1, "SD") if in_sd else (2, "length units and rad")
+    distance, digits, unit = attrgetter("standardised_posture_difference"), 1, "SD"
+    if math.isnan(shared.standardised_posture_difference):
+        distance, digits, unit = attrgetter("posture_difference"), 2, "length units and rad"
     posture_difference = f"{number(distance(shared), digits)} {unit}"
-    by_chance = [distance(each) for each in every_random_search_for(study, shared)]
-    by_chance = [each for each in by_chance if not math.isnan(each)]
+    differences = map(distance, every_random_search_for(study, shared))
+    by_chance = [each for each in differences if not math.isnan(each)]
     chance = f"random search: {number(max(by_chance), digits)}" if by_chance else ""
     both_differences = f"{posture_difference} ({chance})" if chance else posture_difference
     if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):

@@ -175,7 +175,7 @@ def runtimes(
 
 
 @table(
-    "method; reached: targets reached (%) .0; tasks: over tasks; "
+    "method; reached: targets reached (%) .0; tasks: number of tasks; "
     "trials_to_quarter[]: trials to a quarter of the targets; "
     "trials_to_half[]: trials to half of the targets; "
     "forward_kinematics_to_half[]: forward-kinematics evaluations to half of the targets; "

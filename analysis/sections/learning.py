@@ -27,8 +27,8 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 
 
 @table(
-    "task; method; runs; initial .1; after_100: after 100 trials .1; after_1000: after 1000 .1; "
-    "after_10000: after 10\u202f000 .1; "
+    "task; method; runs; initial .1; after_100: after 100 trials .1; "
+    "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1; "
     "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]"
 )
 def list_learning(study: Study) -> Rows:

@@ -13,7 +13,7 @@ from coartic.analysis.words import tally
 
 @table(
     "task; method; runs; solved: -; reward± .1; gap: gap (%) .1; hands; trials; "
-    "forward_kinematics: forward-kinematics evaluations; solve_s: seconds; median_run"
+    "forward_kinematics: forward-kinematics evaluations; solve_s: solving time (s); median_run"
 )
 def list_methods(study: Study) -> Rows:
     """List every method on every task: mean reward, gap, hands and costs (medians).

@@ -43,7 +43,7 @@ def nearest_others(study: Study, method: str) -> dict[str, float]:
 
 @table(
     "task; method; runs; solved: -; reward± .1; gap: gap (%) .1; nearest; "
-    "nearest_gap: its gap (%) .1; learner: learner's reward .1; p_holm: p (corrected) .p"
+    "nearest_gap: gap of the nearest (%) .1; learner: learner's reward .1; p_holm: p (corrected) .p"
 )
 def list_own(study: Study) -> Rows:
     """List methods from files on each task, with the nearest built-in method and the learner."""

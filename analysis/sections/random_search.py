@@ -28,7 +28,7 @@ MORE = 10
 
 @table(
     "signature; task; method; hands; runs; value: mean .2; "
-    "improved: random search, runs that improved .2; random_runs: their number; "
+    "improved: random search, runs that improved .2; random_runs: number of these runs; "
     "p: p that the method has more .p; "
     "every: random search, all runs .2; "
     "more_trials: random search, ten times the trials, runs that improved .2"

@@ -79,7 +79,7 @@ def list_against_learner(study: Study) -> Rows:
 
 
 @table(
-    "method; gap[]: gap (%) .1; tasks: over tasks; information: use of the reward; "
+    "method; gap[]: gap (%) .1; tasks: number of tasks; information: use of the reward; "
     "better: better on; worse: worse on; on *: {} (%) .1; runs"
 )
 def list_ranking(study: Study) -> Rows:

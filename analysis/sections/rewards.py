@@ -98,8 +98,8 @@ def list_published(study: Study) -> Rows:
 
 
 @table(
-    "task; condition; hands; published_runs; runs; of_runs: of; published± .1; ours± .1; "
-    "difference[] .1"
+    "task; condition; hands; published_runs; runs: our runs; of_runs: of our runs; "
+    "published± .1; ours± .1; difference[] .1"
 )
 def list_hands(study: Study) -> Rows:
     """List learned rewards by hand sequence, published and ours, for cells with several."""

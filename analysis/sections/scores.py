@@ -58,7 +58,7 @@ def scores(study: Study) -> dict[str, pd.DataFrame]:
     "share_one_armed[]: share, one arm (%) .0; gap_one_armed: gap, one arm (%) .1; "
     "share_two_armed[]: share, two arms (%) .0; gap_two_armed: gap, two arms (%) .1; "
     "share_early[]: share after 1000 trials (%) .0; gap_early: gap after 1000 trials (%) .1; "
-    "tasks: over tasks; without_gain: tasks without possible gain; "
+    "tasks: number of tasks; without_gain: tasks without possible gain; "
     "forward_kinematics: forward-kinematics evaluations (mean of runs) .0; "
     "cpu_s: CPU seconds (mean of runs)"
 )

@@ -37,8 +37,8 @@ def settings_of(study: Study) -> Iterator[tuple[str, dict[str, list[CellRuns]]]]
 
 
 @table(
-    "method; setting; gap[]: gap (%) .1; tasks: over tasks; "
-    "comparison: compared with the smallest; p_holm: p (corrected) .p; runs"
+    "method; setting; gap[]: gap (%) .1; tasks: number of tasks; "
+    "comparison: compared with the smallest gap; p_holm: p (corrected) .p; runs"
 )
 def list_settings(study: Study) -> Rows:
     """List the mean gap of each setting of a method, the smallest gap first.
