@@ -219,12 +219,11 @@ class Study:
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: each.reward for name, each in self.optima.items()}
         runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
-        alone = {
-            name: max(of_hands.dropna(), default=math.nan)
-            if len(of_hands := self.sequences(name).reward)
-            else initial_reward(tasks[name])
-            for name in best
-        }
+        alone = dict[str, float]()
+        for name in best:
+            of_hands = self.sequences(name).reward
+            highest = max(of_hands.dropna(), default=math.nan)
+            alone[name] = highest if len(of_hands) else initial_reward(tasks[name])
         runs["corrective_best"] = runs.task.map(alone).astype(np.float64)
         rewards = runs[["reward", "best_known"]].astype("Float64")
         runs["gap"] = gap_share(*rewards.to_numpy(np.float64, na_value=np.nan).T)
