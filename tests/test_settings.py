@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from coartic.analysis.sections import TABLES, settings
-from coartic.analysis.sections.settings import BEST, FAILED, IDENTICAL, LARGER, UNSURE, UNTESTED
+from coartic.analysis.sections.settings import (
+    BEST,
+    IDENTICAL,
+    LARGER,
+    SOME_FAILED,
+    UNSURE,
+    UNTESTED,
+)
 from tests.support.made_up import made_up_optima, runs_of, study_of
 
 EC1, OWN = "dual-process/EC1", "mine"
@@ -92,7 +99,7 @@ def test_a_setting_with_a_failed_run_has_no_gap():
     runs = study(rewards).stored
     runs.loc[runs.setting == "noise_sd=0.1", "status"] = ["timeout"] + ["ok"] * 7
     rows = TABLES["settings"](study_of(runs, optima=made_up_optima("ascending")))
-    assert rows.comparison.tolist() == [BEST, LARGER, FAILED]
+    assert rows.comparison.tolist() == [BEST, LARGER, SOME_FAILED]
     assert rows.gap.isna().tolist() == [False, False, True]
 
 
