@@ -70,7 +70,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
 
 
 @table(
-    "method; place: goal; runs; distance: posture difference .2; "
+    "method; place: shared goal; runs; distance: posture difference .2; "
     "standardised_difference: standardised posture difference (SD of the runs) .1; "
     "p_holm: p (corrected) .p; p_random_search: p beyond random search .p; "
     "equivalent: difference that keeps the hand in place (null space, per dimension) .3; "
