@@ -186,12 +186,16 @@ def suite_jobs(
         is_open = WILDCARD in "".join((*block.methods, *block.tasks))  # skip what does not apply
         for task in tasks_of(suite, block, own, task_named):
             for method in map(registered.__getitem__, ids):
-                reason = method.why_not(task, block.parameters)
-                if reason is not None and not is_open:
-                    raise CoarticError(f"suite {suite.name!r}: {reason}")
-                for values in itertools.product(*block.grid.values()) if reason is None else ():
+                for values in itertools.product(*block.grid.values()):
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
-                    yield job(task, method, parameters, block.runs)
+                    reason = method.why_not(task, parameters)
+                    if reason is None:
+                        yield job(task, method, parameters, block.runs)
+                    elif not is_open:
+                        raise CoarticError(
+                            f"suite {suite.name!r}: {reason}; give what fits together a block of "
+                            "its own"
+                        )
 
 
 def extra_jobs(

@@ -28,6 +28,7 @@ from coartic import (
 )
 from coartic.analysis import load
 from coartic.benchmarks import run_suite
+from coartic.benchmarks.planning import plan_suite
 from coartic.learner import learning
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
@@ -464,7 +465,8 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
     [
         ('{ direction = "stay" }', "nothing goes by: set drift or pull above 0"),
         ('{ credit = "subtask" }', "set learned to 'replay'"),
-        ("{ drift = -1 }", "drift"),
+        ("{ drift = -1 }", "drift is -1; it should be a number from 0 to 10"),
+        ("{ drift = [0.1, 11] }", "it should be a number from 0 to 10, or a list"),
         ("{ drift = [] }", "list of finite numbers"),
         ('{ base = "EC9" }', "'EC1', 'EC2', 'EC3' or 'EC4'"),
         ("{ sigma = 0.1 }", "unknown"),
@@ -520,3 +522,15 @@ def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
             assert_same(run, learn(task, condition, seed=run.seed, **options))
     if model is FAILED_AT_ONCE:
         assert any(run.counters.failed_trials for run in together)
+
+
+def test_a_grid_counts_in_what_applies(tmp_path):
+    suite = tmp_path / "mine.toml"
+    one_arm = OWN_SUITE.replace("two-armed-1", "ascending").replace(
+        "parameters = {PARAMETERS}", "grid = {GRID}"
+    )
+    suite.write_text(one_arm.replace("{GRID}", '{ base = ["EC1"], drift = [0.0, 0.3] }'))
+    assert [job.cell.parameters["drift"] for job in plan_suite(suite)] == [0.0, 0.3]
+    suite.write_text(one_arm.replace("{GRID}", '{ base = ["EC1", "EC4"] }'))
+    with pytest.raises(CoarticError, match="no left hand; give what fits together a block"):
+        plan_suite(suite)

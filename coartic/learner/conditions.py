@@ -19,15 +19,21 @@ measures what each does to learning.
 from __future__ import annotations
 
 from dataclasses import MISSING, fields, replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import (
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+)
 from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import short_repr, unknown
-from coartic.internal.validation import in_sentences
+from coartic.internal.validation import error_saying, in_sentences
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -46,7 +52,24 @@ Learned = Literal["best", "replay"]
 Credit = Literal["overall", "subtask"]
 Direction = Literal["next-goal", "stay", "start"]
 Drift = Annotated[float, Field(ge=0, le=10)]
-Drifts = Drift | Annotated[tuple[Drift, ...], Field(min_length=1, strict=False)]
+
+
+def one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+    """Return drifts that are valid. Raises a validation error of one sentence for others, in place
+    of a sentence for each form that a drift may have."""
+    try:
+        return validate(value)
+    except ValidationError:
+        raise error_saying(
+            f"drift is {brief_value(value)}; it should be a number from 0 to 10, or a list of such "
+            "numbers"
+        ) from None
+
+
+Drifts = Annotated[
+    Drift | Annotated[tuple[Drift, ...], Field(min_length=1, strict=False)],
+    WrapValidator(one_or_several),
+]
 
 
 @in_sentences

@@ -439,7 +439,7 @@ def check_point(task: Task, point: Any) -> Array:
     if not usual or point.shape != task.q0.shape or not point @ point <= LARGEST_ENTRY:
         point = configuration(task.robot, point)
     held: Array = point
-    if any(held[k] != task.q0[k] for k in map("xy".index, task.locked_base)):
+    if task.locked_base and any(held[k] != task.q0[k] for k in map("xy".index, task.locked_base)):
         held = hold_base(task, held.copy())
     return held
 

@@ -463,12 +463,20 @@ class CompiledTask(NamedTuple):
     model: MotionModel
 
 
+_last_compiled: CompiledTask | None = None
+
+
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
-    """Return a task for the kernels. Raises ValueError for a task or a model that no trial can be
-    made with: a copy of a task with changed fields is unchecked."""
+    """Return a task for the kernels; the last one is kept, as tasks do not change. Raises
+    ValueError for a task or a model that no trial can be made with: a copy of a task with changed
+    fields is unchecked."""
+    global _last_compiled
+    last = _last_compiled  # another thread may replace it
+    if last is not None and last.task is task and last.model is model:
+        return last
     check_model(model, radius=task.radius)
     goals = [check_goal(goal, task.radius) for goal in task.goals]
-    return CompiledTask(
+    _last_compiled = compiled = CompiledTask(
         task=task,
         starts=configuration(task.robot, task.q0)[None],
         goals=np.array([goals], dtype=np.float64),
@@ -477,6 +485,7 @@ def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
         ),
         model=model,
     )
+    return compiled
 
 
 def make_trials(

@@ -49,7 +49,7 @@ def main(*, is_long: bool = False) -> None:
     show_ways()
     warm_up(load_task("ascending"))
     print(f"{'experiment':20}{'one run':>12}{f'{SLOTS} runs':>12}   microseconds of a core a trial")
-    for cell in plan_suite("paper").cells:
+    for cell in (job.cell for job in plan_suite("paper")):
         task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, SLOTS))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
