@@ -163,18 +163,16 @@ def has_encoding(call):
     name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
     keywords = {keyword.arg: keyword.value for keyword in call.keywords}
     if keywords.keys() & {"encoding", "errors"} or name not in (
-        "open", "read_text", "write_text", "run", "check_output", "Popen"
+        "open", "read_text", "write_text",
     ):  # fmt: skip
         return True
     if name in ("read_text", "write_text"):
         return len(call.args) > (name == "write_text")
-    if name == "open":
-        if ast.unparse(call.func) in ("os.open", "webbrowser.open"):
-            return True
-        place = 1 if isinstance(call.func, ast.Name) else 0
-        mode = call.args[place] if len(call.args) > place else keywords.get("mode")
-        return isinstance(mode, ast.Constant) and "b" in str(mode.value)
-    return "text" not in keywords and "universal_newlines" not in keywords
+    if ast.unparse(call.func) in ("os.open", "webbrowser.open"):
+        return True
+    place = 1 if isinstance(call.func, ast.Name) else 0
+    mode = call.args[place] if len(call.args) > place else keywords.get("mode")
+    return isinstance(mode, ast.Constant) and "b" in str(mode.value)
 
 
 def test_texts_are_read_and_written_in_an_encoding_that_is_named():

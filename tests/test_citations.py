@@ -7,12 +7,7 @@ from pathlib import Path
 import pytest
 
 from coartic import load_task
-from coartic.analysis.citations import (
-    STATISTICS,
-    THE_PAPER,
-    bibliography,
-    references,
-)
+from coartic.analysis.citations import STATISTICS, THE_PAPER, bibliography, references
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.method_files import METHOD_NAME
 from coartic.benchmarks.registry import NAMES, built_in, registry

@@ -302,16 +302,16 @@ import os, signal, sys
 if sys.argv[1] == "blocked":
     signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())
 else:
-    os.close(int(sys.argv[1]))
+    os.closerange(0, 3)
 os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 """
 
 
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and streams of POSIX")
-@pytest.mark.parametrize("what", ["blocked", "0", "1", "2"])
+@pytest.mark.parametrize("what", ["blocked", "closed"])
 def test_a_command_ends_well_whatever_started_it(tmp_path, what):
-    """With all signals blocked, or without input, output or errors."""
+    """With all signals blocked, or without input, output and errors."""
     mine = tmp_path / "mine.py"
     mine.write_text(Path(template.__file__).read_text())
     command = ("-m", "coartic", *SMALL, "--methods", "EC1,NAME", "--method-file", mine, "--out")
@@ -414,14 +414,9 @@ def test_play(coartic, tmp_path, monkeypatch):
 
 
 @pytest.mark.process
-def test_entry_points():
-    """The installed script and ``python -m coartic``, in processes of their own."""
-    for command in (
-        [str(Path(sys.executable).parent / "coartic")],
-        [sys.executable, "-m", "coartic"],
-    ):
-        text = subprocess.check_output([*command, "--version"], text=True)
-        assert text == f"coartic {__version__}\n"
+def test_the_installed_script():
+    command = [Path(sys.executable).parent / "coartic", "--version"]
+    assert subprocess.check_output(command, text=True) == f"coartic {__version__}\n"
 
 
 @pytest.mark.process

@@ -179,11 +179,7 @@ def test_shipped_tasks_keep_every_law(methods, path):
             "methods",
             "methods can run on it, such as dual-process/EC1",
         ),
-        (
-            'hands = ["left"]' + GOOD.replace('"RR"', '"LL"'),
-            "methods",
-            "corrective-alone/given",
-        ),
+        ('hands = ["left"]' + GOOD.replace('"RR"', '"LL"'), "methods", "corrective-alone/given"),
     ],
 )
 def test_laws_of_a_task_file(methods, text, law, finding, tmp_path):

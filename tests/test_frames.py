@@ -15,10 +15,11 @@ from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics import instances
 from coartic.analysis.words import p_value
 from coartic.benchmarks import run_suite
+from coartic.learner import learning
 from tests.support.made_up import row, study_of
 
 
-@pytest.mark.parametrize("module", [context_tests, frames, instances, judging, pages])
+@pytest.mark.parametrize("module", [context_tests, frames, instances, judging, learning, pages])
 def test_examples(module):
     options = doctest.NORMALIZE_WHITESPACE
     assert doctest.testmod(module, optionflags=options) == (0, doctest.testmod(module).attempted)

@@ -1,6 +1,5 @@
 """The learner against the paper's loop, the published results, and itself beside other runs."""
 
-import doctest
 import itertools
 import math
 import re
@@ -17,30 +16,24 @@ from coartic import (
     CoarticError,
     ExplorationCondition,
     MotionModel,
-    Movement,
     NotApplicableError,
     SolutionError,
     execute,
     learn,
     learn_many,
     load_task,
+    movements_of,
     parse_task,
 )
 from coartic.analysis import load
 from coartic.benchmarks import run_suite
 from coartic.benchmarks.planning import plan_suite
-from coartic.learner import learning
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
 from coartic.motion.batch import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
-from tests.support.strategies import (
-    PAPER_CELLS,
-    make_trials,
-    tiny_task,
-    uneven_task,
-)
+from tests.support.strategies import PAPER_CELLS, make_trials, tiny_task, uneven_task
 
 
 def _tenths(values):
@@ -204,12 +197,6 @@ def test_without_information_an_informed_condition_is_the_papers():
         assert np.array_equal(run.targets, paper.targets, equal_nan=True) == equal
 
 
-def planned(hands, configurations):
-    """A planner's solution: one movement to each goal."""
-    rows = enumerate(zip(hands, configurations, strict=True), 1)
-    return [Movement(goal, hand, "planned", q) for goal, (hand, q) in rows]
-
-
 @pytest.mark.parametrize(
     ("away", "condition"), [(0.0, "EC4"), (0.5, "EC4"), (0.5, "EC4-uncorrected")]
 )
@@ -217,7 +204,7 @@ def test_from_a_first_solution_it_equals_the_slow_learner(away, condition):
     """From one that hits its goals, and from one that misses them and is corrected: in trial 0 also
     where no later trial is."""
     hits = learn("two-armed-2", "EC4", seed=1, trials=50).execute().configurations
-    start = planned(["right", "left", "right", "right"], hits + away)
+    start = movements_of("RLRR", hits + away)
     task = load_task("two-armed-2")
     rules = (CONDITIONS | ABLATIONS)[condition]
     slow = assert_equals_reference(task, rules, trials=5, seed=3, start=start)
@@ -234,17 +221,13 @@ def test_from_a_first_solution_it_equals_the_slow_learner(away, condition):
 def test_a_first_solution_that_breaks_the_rules_is_refused():
     q = np.zeros(Robot().dof)
     with pytest.raises(SolutionError, match="movements for goals"):
-        learn("ascending", "EC1", seed=0, trials=5, start=planned(["right"], [q]))
-    left = planned(["left"] * 3, [q] * 3)
+        learn("ascending", "EC1", seed=0, trials=5, start=movements_of("R", [q]))
+    left = movements_of("LLL", [q] * 3)
     with pytest.raises(SolutionError, match="no left hand"):
         learn("ascending", "EC1", seed=0, trials=5, start=left)
     both = load_task("ascending").model_copy(update={"hands": HANDS})
     with pytest.raises(NotApplicableError, match="EC1 uses only the right hand, the first .* left"):
         learn(both, "EC1", seed=0, trials=5, start=left)
-
-
-def test_the_example_of_the_learner():
-    assert doctest.testmod(learning).failed == 0
 
 
 @pytest.mark.parametrize(
@@ -283,10 +266,7 @@ def test_closest_hand_and_its_ties(shift, visited):
     task = tiny_task(
         goals=[[0.0, 6.0]],
         initial_hands="R",
-        start={
-            "left": [math.acos(0.125), 0, 0, 0],
-            "right": [math.pi - math.acos(0.125), 0, 0, 0],
-        },
+        start={"left": [math.acos(0.125), 0, 0, 0], "right": [math.pi - math.acos(0.125), 0, 0, 0]},
         robot={"right_shoulder": [0.5, 0.1 + shift]},
     )
     condition = ExplorationCondition("c", HANDS, True, False, "closest", epsilon=1.0)

@@ -5,11 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from coartic import (
-    Movement,
-    corrective_trial,
-    load_task,
-)
+from coartic import Movement, corrective_trial, load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
 from coartic.motion.solution import movements_of
 from coartic.optimisers import OPTIMISER_INFORMATION

@@ -13,14 +13,7 @@ import pytest
 from scipy import optimize
 
 import coartic
-from coartic import (
-    CoarticError,
-    MotionModel,
-    UndeclaredError,
-    corrective_trial,
-    execute,
-    load_task,
-)
+from coartic import CoarticError, MotionModel, UndeclaredError, corrective_trial, execute, load_task
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session

@@ -13,6 +13,8 @@ from coartic.baselines.random_search import RandomSearch
 from coartic.learner.conditions import load_condition
 from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play.page import FOLDER
+from coartic.robot import HANDS
+from coartic.tasks.task import hands_of
 from tests.support.strategies import (
     PAPER_CELLS,
     make_trials,
@@ -24,10 +26,7 @@ from tests.support.strategies import (
 
 MODEL = FOLDER / "model.js"
 NODE = shutil.which("node")
-pytestmark = [
-    pytest.mark.process,
-    pytest.mark.skipif(NODE is None, reason="Node is not installed"),
-]
+pytestmark = [pytest.mark.process, pytest.mark.skipif(NODE is None, reason="Node is not installed")]
 
 TASKS = [
     *("ascending", "descending", "two-armed-1", "two-armed-2"),
@@ -115,30 +114,20 @@ def test_straight_solutions_are_executed_tick_by_tick():
     solutions = []
     for letters, rows in zip(hands, targets, strict=True):
         movements = []
-        for number, (letter, target) in enumerate(zip(letters, rows, strict=True), 1):
-            hand = {"L": "left", "R": "right"}[letter]
+        for number, (hand, target) in enumerate(zip(hands_of(letters), rows, strict=True), 1):
             kind = str(rng.choice(["learned", "planned", "corrective"]))
             gone = None if kind == "corrective" and rng.random() < 0.5 else target
             movements.append(Movement(number, hand, kind, gone))
         solutions.append(movements)
     plain = [
-        [
-            {
-                "goal": m.goal - 1,
-                "hand": ["left", "right"].index(m.hand),
-                "kind": m.kind,
-                "target": None if m.target is None else m.target.tolist(),
-            }
-            for m in movements
-        ]
+        [{"goal": m.goal - 1, "hand": HANDS.index(m.hand), "kind": m.kind,
+          "target": None if m.target is None else m.target.tolist()} for m in movements]
         for movements in solutions
-    ]
+    ]  # fmt: skip
     theirs, completed = node(EXECUTE, content(task), constants, plain), 0
     for movements, film in zip(solutions, theirs, strict=True):
         outcome = execute(task, movements, model=model)
-        made = [
-            [m.goal, ["left", "right"].index(m.hand), m.kind, m.ticks] for m in outcome.movements
-        ]
+        made = [[m.goal, HANDS.index(m.hand), m.kind, m.ticks] for m in outcome.movements]
         assert film["made"][: len(made)] == made
         assert film["reward"] == outcome.reward
         if not outcome.completed:
@@ -187,8 +176,8 @@ OWN = {
 
 
 def test_the_same_seed_learns_the_same_trial_by_trial():
-    """Runs of 4000 trials, draws included, with and without drift."""
-    trials = 4000
+    """Runs of 1500 trials, draws included, with and without drift."""
+    trials = 1500
     tasks = [OWN.get(name) or load_task(name) for name, *_ in RUNS]
     cases = [
         (content(task), of, drift, str(seed), trials)
@@ -267,10 +256,9 @@ PLAN = """(task, horizons) => {
 def test_plans_end_where_the_packages_do_and_say_their_true_reward(name):
     task = load_task(name)
     plans = node(PLAN, content(task), list(range(len(task.goals))))
-    hands = ["left", "right"]
     for plan in plans:
         movements = [
-            Movement(m["goal"] + 1, hands[m["hand"]], m["kind"], np.array(m["target"]))
+            Movement(m["goal"] + 1, HANDS[m["hand"]], m["kind"], np.array(m["target"]))
             for m in plan["movements"]
         ]
         assert execute(task, movements).reward == plan["reward"]

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 
 from coartic import load_task
-from coartic.baselines.posture_graph import (
-    PostureGraph,
-    cheapest_chains,
-    move_other_arm,
-)
+from coartic.baselines.posture_graph import PostureGraph, cheapest_chains, move_other_arm
 from coartic.method import MethodError, Session
 from tests.support.strategies import changed
 

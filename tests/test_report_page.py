@@ -171,10 +171,7 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
     # Rows of a table are alike: three of each.
     page.eval_on_selector_all("tbody tr:nth-child(n+4)", "all => all.forEach(row => row.remove())")
-    rules = {
-        "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"],
-        "resultTypes": ["violations"],
-    }
+    rules = {"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], "resultTypes": ["violations"]}
     for width, scheme in ((390, "dark"), (1280, "light")):
         page.set_viewport_size({"width": width, "height": 900})
         page.emulate_media(color_scheme=scheme)

@@ -49,11 +49,7 @@ def test_three_worlds_agree(robot, hand):
     """NumPy, CasADi (its own automatic differentiation included) and the kernels."""
     symbol = casadi.SX.sym("q", robot.dof)
     position = robot.symbolic_hand(symbol, hand)
-    symbolic = casadi.Function(
-        "f",
-        [symbol],
-        [position, casadi.jacobian(position, symbol)],
-    )
+    symbolic = casadi.Function("f", [symbol], [position, casadi.jacobian(position, symbol)])
 
     @entry
     def compiled(q, arm, xs, ys, jacobian):

@@ -8,13 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import (
-    CoarticError,
-    Movement,
-    corrective_trial,
-    execute,
-    load_task,
-)
+from coartic import CoarticError, Movement, corrective_trial, execute, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local

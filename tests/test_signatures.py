@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from coartic import Movement, corrective_trial, execute, learn, load_task
+from coartic import Movement, corrective_trial, execute, learn, load_task, movements_of
 from coartic.analysis import random_search
 from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH
 from coartic.analysis.sections import TABLES, coarticulation
@@ -39,13 +39,6 @@ def posture(x=0.0, y=0.0, **joints):
         hand, number = name.split("_")
         q[(2 if hand == "left" else 6) + int(number) - 1] = angle
     return q
-
-
-def planned(*targets, hands):
-    return [
-        Movement(number, {"L": "left", "R": "right"}[letter], "planned", target)
-        for number, (target, letter) in enumerate(zip(targets, hands, strict=True), 1)
-    ]
 
 
 def posed(task, method, q, ticks=(0, 0, 0), hands="RRR"):
@@ -295,8 +288,8 @@ def test_preshaping_by_the_arm_alone():
     content = {"base": [0.0, 0.0], "left": start[2:6].tolist(), "right": start[6:].tolist()}
     task = tiny_task(goals=goals, initial_hands="RL", start=content, locked_base=["x", "y"])
     end = posture(left_1=0.2, right_1=0.4)
-    initial = execute(task, planned(swung, end, hands="RL"))
-    run = execute(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
+    initial = execute(task, movements_of("RL", [swung, end]))
+    run = execute(task, movements_of("RL", [posture(left_1=0.6, right_1=0.4), end]))
     now, before = (
         np.linalg.norm(robot.forward_kinematics(of.configurations[0], "left") - goals[1])
         for of in (run, initial)
@@ -321,7 +314,7 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     still = execute(
         small, [Movement(1, "left", "corrective"), Movement(2, "right", "corrective"), end]
     )
-    run = execute(small, [*planned(*moved, hands="LR"), end])
+    run = execute(small, [*movements_of("LR", moved), end])
     configurations = run.configurations
     held = np.array(configurations[1])
     held[2:6] = configurations[0, 2:6]

@@ -7,23 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import (
-    CoarticError,
-    load_task,
-)
+from coartic import CoarticError, load_task
 from coartic.analysis.sections.rewards import published_and_ours
 from coartic.benchmarks.runner import plan_suite
 from coartic.benchmarks.suites import load_suite, suites
 from coartic.learner.conditions import EVERY_CONDITION
 from coartic.runs.plan import size_of
 from tests.support.bad_inputs import GOOD
-from tests.support.suites import (
-    KNOWN,
-    cells_of,
-    paper_cells,
-    run_and_write,
-    suite_of,
-)
+from tests.support.suites import KNOWN, cells_of, paper_cells, run_and_write, suite_of
 
 
 def test_every_method_runs_in_some_suite():

@@ -29,9 +29,7 @@ from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import PAPER_CELLS, make_trials, sample, uneven_task
 
-TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {
-    "uneven": uneven_task(),
-}
+TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {"uneven": uneven_task()}
 LIMITS = {  # iterations of the corrective process, spread of the targets
     "ascending": (100, 4.0),
     "descending": (100, 4.0),
@@ -247,10 +245,7 @@ def test_trials_differ(name):
     assert len({case.due.corrections for case in cases(name)}) >= 2
 
 
-OTHERS = [
-    MotionModel(max_iterations=100),
-    MotionModel(max_iterations=300, arrival_tolerance=0.09),
-]
+OTHERS = [MotionModel(max_iterations=100), MotionModel(max_iterations=300, arrival_tolerance=0.09)]
 
 
 @functools.cache

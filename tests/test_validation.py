@@ -93,10 +93,7 @@ SUITES = [
     (suite("process/", "proces/"), "did you mean 'dual-process/EC1'"),
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
-    (
-        SUITE + "grid = {noise_sd = [-1.0]}",
-        "noise_sd is -1.0; it should be at least 0",
-    ),
+    (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
     (SUITE + "grid = {noise_sd = []}", "blocks[0].grid.noise_sd is []; it needs at least 1 item"),
     (suite('["dual-process/EC1"]', "[]"), "blocks[0].methods is []; it needs at least 1 item"),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; it should be a whole number"),

@@ -180,10 +180,7 @@ EDITS = {  # what is said: of which run, and what was edited
         '$.title', hex(zeroblob(60000))) WHERE task = 'tiny'""",
     ),
     # Of no run: the tables and views through which others read the runs.
-    "Two tasks are called tiny": (
-        None,
-        "UPDATE cells SET task = 'tiny' WHERE task = 'ascending'",
-    ),
+    "Two tasks are called tiny": (None, "UPDATE cells SET task = 'tiny' WHERE task = 'ascending'"),
     "Row 4 of table cells: its parameters are not": (
         None,
         "UPDATE cells SET setting = '' WHERE id = 4",

@@ -5,53 +5,29 @@ robot's formulas with the package and nothing of its kernels, which are tested a
 policy's initial hands are taken over. Draws from its generator in the same order as the learner.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
+from collections import namedtuple
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coartic.analysis import verify
-from coartic.learner.conditions import ExplorationCondition
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER
 from coartic.motion.movement import Correction, MoveResult
 from coartic.motion.solution import Movement, initial_hands
-from coartic.robot import HANDS, Array, Hand, Robot
-from coartic.tasks.task import Task, hands_of
+from coartic.robot import HANDS
+from coartic.tasks.task import hands_of
 
-State = tuple[int, Hand | None]  # goal, and the hand that hit the one before
-
-
-class ReferenceRun(NamedTuple):
-    """What the slow learner found."""
-
-    rewards: NDArray[np.int64]
-    completed: NDArray[np.bool_]
-    values: dict[tuple[State, Hand], float]
-    targets: dict[tuple[State, Hand], Array]
-    movement_ticks: int
-    corrections: int
-    corrections_by_trial: NDArray[np.int64]
-    corrective_iterations: int
+ReferenceRun = namedtuple(
+    "ReferenceRun",
+    "rewards completed values targets movement_ticks corrections corrections_by_trial "
+    "corrective_iterations",
+)
+"""What the slow learner found; values and targets by state (goal, hand before) and hand."""
 
 
-def move(
-    robot: Robot,
-    q: Array,
-    target: Array,
-    hand: Hand,
-    goal: tuple[float, float],
-    radius: float,
-    *,
-    stop_on_arrival: bool = True,
-    model: MotionModel = PAPER,
-    waypoints: Sequence[Array] = (),
-) -> MoveResult:
+def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PAPER, waypoints=()):
     """:func:`coartic.move`, or a path along waypoints, by the engine of :mod:`analysis.verify`.
 
     It visits every step, and is exact to the last bit.
@@ -71,20 +47,11 @@ def move(
     return MoveResult(end, ticks, hit, ticks + 1)
 
 
-class Outcome(NamedTuple):
-    """An execution; without a reward where it failed."""
-
-    reward: int | None
-    ticks: int
-    corrections: int
-    iterations: int
-    hits: list[Array]
-    movements: list[Movement]
-    rows: Array
-    """Configuration at each tick, shape ``(ticks, dof)``."""
+Outcome = namedtuple("Outcome", "reward ticks corrections iterations hits movements rows")
+"""An execution; without a reward where it failed. ``rows``: the configuration at each tick."""
 
 
-def execute(task: Task, solution: Sequence[Movement], model: MotionModel = PAPER) -> Outcome:
+def execute(task, solution, model=PAPER):
     """:func:`coartic.execute`, movement after movement; joints whose target is NaN stay."""
     q, hits, made = np.array(task.q0), [], []
     rows, corrections, iterations = [np.empty((0, len(q)))], 0, 0
@@ -125,17 +92,7 @@ def execute(task: Task, solution: Sequence[Movement], model: MotionModel = PAPER
     return Outcome(reward, ticks, corrections, iterations, hits, made, np.concatenate(rows))
 
 
-def correct(
-    robot: Robot,
-    q: Array,
-    hand: Hand,
-    goal: tuple[float, float],
-    *,
-    locked_base: tuple[str, ...] = (),
-    model: MotionModel = PAPER,
-    pull: float = 0.0,
-    preferred: Array | None = None,
-) -> Correction:
+def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, preferred=None):
     """:func:`coartic.motion.movement.correct`, with the Jacobian as a matrix; each iteration adds
     β N(x) (p − x) with the pull β and a preferred posture p."""
     free = np.ones(robot.dof)
@@ -160,30 +117,22 @@ def correct(
     return Correction(q, converged, model.max_iterations)
 
 
-def _is_of(robot: Robot, hand: Hand, joint: int) -> bool:
+def _is_of(robot, hand, joint):
     return joint in np.arange(robot.dof)[robot.joints(hand)]
 
 
-def null_space(robot: Robot, q: Array, hand: Hand, joints: Sequence[int]) -> Array:
+def null_space(robot, q, hand, joints):
     """N(q) = I − J⁺J of a hand over some joints, by singular values."""
     jacobian = robot.jacobian(q, hand)[:, joints]
     return np.asarray(np.eye(len(joints)) - np.linalg.pinv(jacobian, rcond=1e-6) @ jacobian)
 
 
-def preferred_posture(
-    task: Task,
-    condition: ExplorationCondition,
-    q: Array,
-    number: int,
-    hand: Hand,
-    values: dict[tuple[State, Hand], float],
-    targets: dict[tuple[State, Hand], Array],
-) -> Array:
+def preferred_posture(task, condition, q, number, hand, values, targets):
     """The preferred posture p at a goal that has become current, with the hand that is chosen."""
     if condition.direction == "start":
         return np.array(task.q0)
     p = np.array(q)
-    following: State = (number + 1, hand)
+    following = (number + 1, hand)
     stored = {each: values[following, each] for each in HANDS if (following, each) in values}
     if condition.direction == "next-goal" and number + 1 < len(task.goals) and stored:
         best = max(stored, key=lambda each: stored[each])
@@ -193,22 +142,14 @@ def preferred_posture(
     return p
 
 
-def learn(
-    task: Task,
-    condition: ExplorationCondition,
-    *,
-    seed: int,
-    trials: int,
-    model: MotionModel = PAPER,
-    start: Sequence[Movement] = (),
-) -> ReferenceRun:
+def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     """:func:`coartic.learner.learning.learn`, after Figure 3 line by line; ``start``: trial 0."""
     rng = np.random.default_rng(seed)
     first_hands = [movement.hand for movement in start] or hands_of(
         initial_hands(task, condition.hands, model=model)
     )
-    values: dict[tuple[State, Hand], float] = {}
-    targets: dict[tuple[State, Hand], Array] = {}
+    values = {}
+    targets = {}
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
     ticks = corrections = iterations = 0
@@ -219,11 +160,11 @@ def learn(
             drift = condition.drifts[int(rng.random() * len(condition.drifts))]
         q = np.array(task.q0)
         total = 0
-        previous: Hand | None = None
-        visited: list[tuple[State, Hand, Array]] = []
-        subtasks: list[float] = []
+        previous = None
+        visited = []
+        subtasks = []
         for number, goal in enumerate(task.goals):
-            state: State = (number, previous)
+            state = (number, previous)
             spent_before = total
             if trial == 0:
                 hand = first_hands[number]
@@ -269,7 +210,7 @@ def learn(
         completed[trial] = len(visited) == len(task.goals)
         if completed[trial]:
             for number, (state, hand, reached) in enumerate(visited):
-                credit: float = total
+                credit = total
                 if condition.credit == "subtask":
                     credit = 0.0
                     for reward in reversed(subtasks[number:]):
@@ -287,16 +228,7 @@ def learn(
     )
 
 
-def _choose(
-    task: Task,
-    condition: ExplorationCondition,
-    q: Array,
-    goal: tuple[float, float],
-    state: State,
-    values: dict[tuple[State, Hand], float],
-    rng: np.random.Generator,
-    model: MotionModel,
-) -> tuple[Hand, int]:
+def _choose(task, condition, q, goal, state, values, rng, model):
     """The hand, and the iterations of the corrective process that the choice takes."""
     hands = [hand for hand in HANDS if hand in condition.hands]
     if condition.hand_exploration != "none" and rng.random() < condition.epsilon:
@@ -314,17 +246,8 @@ def _choose(
     return max(hands, key=lambda hand: values.get((state, hand), -math.inf)), 0
 
 
-def _explore(
-    task: Task,
-    condition: ExplorationCondition,
-    q: Array,
-    hand: Hand,
-    stored: Array,
-    rng: np.random.Generator,
-    drift: float,
-    p: Array,
-) -> Array:
-    other: Hand = "left" if hand == "right" else "right"
+def _explore(task, condition, q, hand, stored, rng, drift, p):
+    other = "left" if hand == "right" else "right"
     target = np.array(stored)
     explored = _explored(task, condition, hand)
     if drift:
@@ -342,19 +265,19 @@ def _explore(
     return target
 
 
-def _explored(task: Task, condition: ExplorationCondition, hand: Hand) -> NDArray[np.bool_]:
-    other: Hand = "left" if hand == "right" else "right"
+def _explored(task, condition, hand):
+    other = "left" if hand == "right" else "right"
     explored = np.full(task.robot.dof, condition.modify_chosen)
     explored[task.robot.joints(other)] = condition.modify_other
     explored[:2] &= ["x" not in task.locked_base, "y" not in task.locked_base]
     return explored
 
 
-def _distance(a: Array, b: Array | tuple[float, float]) -> float:
+def _distance(a, b):
     return math.sqrt(_sum_of_squares(np.asarray(a) - b))
 
 
-def _sum_of_squares(vector: Array) -> float:
+def _sum_of_squares(vector):
     total = 0.0
     for value in vector:
         total += float(value) * float(value)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import minimize
 
 from coartic import PAPER, Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
 from coartic.method import Session
@@ -90,6 +91,29 @@ def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):
 def make_trials(task, hands, targets, model=PAPER):
     """Trials in a session of their own."""
     return Session(task, 0, OPTIMISER_INFORMATION, model=model).trials(hands, targets)
+
+
+def least_cost(task, hands, moving, starts, *, radius, square=False):
+    """The least length, or sum of squares, of steps in joint space by which hands hit all goals: by
+    SLSQP, from steps of the joints that are ``moving``, shape (G, dof); all others are 0."""
+
+    def steps(x):
+        steps = np.zeros(moving.shape)
+        steps[moving] = x
+        return steps
+
+    def cost(x):
+        squares = (steps(x) ** 2).sum(axis=1)
+        return squares.sum() if square else np.sqrt(squares + 1e-14).sum()
+
+    def room(x):
+        postures = zip(task.q0 + np.cumsum(steps(x), axis=0), hands, strict=True)
+        places = [task.robot.forward_kinematics(q, hand) for q, hand in postures]
+        return radius - np.linalg.norm(places - task.goal_array, axis=1)
+
+    options = {"constraints": {"type": "ineq", "fun": room}, "options": {"maxiter": 500}}
+    found = [minimize(cost, start, method="SLSQP", tol=1e-10, **options) for start in starts]
+    return min(each.fun for each in found if room(each.x).min() > -1e-6)
 
 
 def shipped_optima():

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from coartic.analysis.claims import judging
 from tests.support.processes import program
 
 FOLDER = Path(__file__).parents[3] / "studies" / "dial"
@@ -34,6 +35,11 @@ def planted(gains, quarters=None):
                     "first": 0.0,
                 })  # fmt: skip
     return STUDY.measure_runs(pd.DataFrame(rows))
+
+
+@pytest.fixture(autouse=True)
+def _fewer_resamples(monkeypatch):
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
 
 
 def verdicts(*arguments):
