@@ -159,21 +159,23 @@ def test_run_ids_name_what_the_run_depends_on():
     assert len({base, *others}) == 8
 
 
+STUCK = tiny_task(
+    name="stuck", locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]], initial_hands="R"
+)
+"""The corrective process cannot leave where it starts."""
+
+
 def test_failures_are_kept_as_data(tmp_path):
-    stuck = tiny_task(
-        name="stuck", locked_base=["x", "y"], hands=["right"],
-        goals=[[2.5, 0.1]], initial_hands="R",
-    )  # fmt: skip
-    policy = stuck.model_copy(update={"name": "policy", "initial_hands": "best-of-all"})
+    policy = STUCK.model_copy(update={"name": "policy", "initial_hands": "best-of-all"})
     learner = KNOWN["dual-process/EC1"]
-    study = run_and_write(tmp_path, [cell_on(stuck, learner), cell_on(policy, learner)], trials=5)
+    study = run_and_write(tmp_path, [cell_on(STUCK, learner), cell_on(policy, learner)], trials=5)
     assert list(study.runs.status) == ["infeasible"] * 4
     assert study.runs.reason.str.len().min() > 20
     assert study.runs.reward.isna().all()
     assert list(study.runs.failed_trials[:2]) == [5, 5]
     assert [np.isnan(curve).tolist() for _, curve in study.rewards()] == [[True] * 5] * 2
     assert study.solutions.empty
-    assert study.sequences(stuck.name).reward.isna().all()
+    assert study.sequences(STUCK.name).reward.isna().all()
 
 
 def test_learner_columns_are_the_learners(tmp_path):
@@ -250,12 +252,8 @@ def test_the_runs_of_a_batch_share_its_time():
 
 
 def test_a_solution_that_misses_a_goal_is_infeasible():
-    """Whatever the method says: its corrective process cannot leave where it starts."""
-    stuck = tiny_task(
-        name="stuck", locked_base=["x", "y"], hands=["right"],
-        goals=[[2.5, 0.1]], initial_hands="R",
-    )  # fmt: skip
-    job = Job(cell_on(stuck, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
+    """Whatever the method says."""
+    job = Job(cell_on(STUCK, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.outcome.status, run.scores) == ("infeasible", {})
 
