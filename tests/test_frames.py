@@ -303,3 +303,11 @@ def test_which_tasks_separate_methods():
     assert separated.at_floor.to_dict() == {"near": 1, "far": 1, "nothing": -1}
     few = planted_scores().groupby(["method", "task"]).head(3)  # no test of 3 + 3 runs is so sure
     assert frames.separation(few).separated.to_dict() == {"near": 2, "far": 2, "nothing": 1}
+
+
+@pytest.mark.parametrize(("single", "separated"), [(-310, 0), (-312, 0), (-314, 1)])
+def test_a_single_run_is_separated_where_it_is_beyond_nearly_all_others(single, separated):
+    """Of -313 to -308, one for each tick; -312 has one beyond it."""
+    both = planted_scores().query("task == 'near' and method != 'best'")
+    both.loc[both.method == "planner", "reward"] = single
+    assert frames.separation(both).separated.tolist() == [separated]

@@ -348,6 +348,8 @@ def test_learners_over_all_tasks_stand_for_their_conditions():
     assert headline_methods(learned.methods) == together
     titles = ["learner (EC1, EC4)", "informed learner (EC1, EC4)"]
     assert learned.methods.title[together].tolist() == titles
+    both = study({("two-armed-1", label): [-400, -401, -402] for label in learner})
+    assert [*both.methods.index] == learner  # EC1 adds no task
 
 
 def alike(**better):
