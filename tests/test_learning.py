@@ -249,7 +249,9 @@ def test_learned_rewards_of_the_paper(name, condition, low, high, hands):
     assert low < np.mean([run.reward for run in runs]) < high
     assert {run.hands for run in runs} <= hands
     for run in runs:
-        assert run.execute().reward == run.reward  # the best trial, executed anew
+        again = run.execute()  # the best trial, executed anew
+        assert again.reward == run.reward
+        assert [m.ticks for m in run.solution] == [m.ticks for m in again.movements]
         # On two-armed 2 most runs of EC4 find nothing better.
         assert run.reward > run.initial_reward or (name, condition) == ("two-armed-2", "EC4")
         assert run.reward >= run.initial_reward

@@ -88,17 +88,6 @@ def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
             cost.many(wrong)
 
 
-def test_a_point_that_is_far_away_is_a_trial_that_fails():
-    cost, near = (coartic.objective("two-armed-2", "RLRR") for _ in range(2))
-    points = cost.x0 + 0.05 * np.random.default_rng(0).standard_normal((9, cost.dim))
-    points[4, 3] = 2e5
-    assert cost(points[4]) == FAILED
-    costs, others = cost.many(points), near.many(np.delete(points, 4, axis=0))
-    np.testing.assert_array_equal(costs, np.insert(others, 4, FAILED))
-    np.testing.assert_array_equal(cost.best_x, near.best_x)
-    assert (cost.evaluations, near.evaluations) == (10, 8)
-
-
 @pytest.mark.parametrize("method", ["L-BFGS-B", "SLSQP"])
 def test_unbounded_searches_that_step_far_away_go_on(method):
     cost, far = coartic.objective("ascending"), []

@@ -186,10 +186,14 @@ def test_learner_columns_are_the_learners(tmp_path):
     assert study.runs[["replay_reward", "best_trial"]].isna().all(axis=None)
 
 
-@pytest.mark.parametrize("budget", [None, 11])
 @pytest.mark.parametrize(
-    ("goals", "policy", "searched"),
-    [(3, "best-of-all", 8), (3, "best-single-hand", 2), (13, "best-single-hand", 2)],
+    ("goals", "policy", "searched", "budget"),
+    [
+        (3, "best-of-all", 8, None),
+        (3, "best-single-hand", 2, 11),
+        (13, "best-single-hand", 2, None),
+        (13, "best-single-hand", 2, 11),
+    ],
 )
 def test_every_method_makes_the_trials_that_it_is_told(tmp_path, goals, policy, searched, budget):
     """The search for the first hands is counted apart, by the methods that need it. There are more

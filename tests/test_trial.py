@@ -14,7 +14,6 @@ from coartic import (
     corrective_trial,
     execute,
     hand_sequences,
-    learn,
     learn_many,
     load_task,
     trajectory,
@@ -27,7 +26,7 @@ from coartic.motion.trial import compiled_task
 from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, explored_joints
 from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import PAPER_CELLS, make_trials, sample, uneven_task
+from tests.support.strategies import make_trials, sample, uneven_task
 
 TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {"uneven": uneven_task()}
 LIMITS = {  # iterations of the corrective process, spread of the targets
@@ -287,18 +286,6 @@ def rich_cases(name, number):
 @pytest.mark.parametrize("door", [*DOORS][:5])
 def test_a_solution_of_any_kind_is_the_references(door, name, number):
     assert_due(door, TASKS[name], OTHERS[number], rich_cases(name, number))
-
-
-@pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)
-def test_learned_solutions_take_what_they_took(name, condition):
-    task = load_task(name)
-    for seed in range(3):
-        run = learn(task, condition, seed=seed, trials=400)
-        due = reference.execute(task, run.solution)
-        path = trajectory(task, run.solution)
-        assert run.reward == due.reward == -path.ticks
-        np.testing.assert_array_equal(path.configurations, due.rows)
-        assert [movement.ticks for movement in run.solution] == [m.ticks for m in due.movements]
 
 
 @pytest.mark.parametrize("name", ["two-armed-1", "uneven"])
