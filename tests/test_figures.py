@@ -10,8 +10,8 @@ from coartic import drawing, load_task
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.learning import learning_curves
-from tests.support.made_up import row, study_of
-from tests.support.suites import KNOWN, ROOT, cells_of, run_and_write
+from tests.support.made_up import row, runs_of, study_of
+from tests.support.suites import KNOWN, ROOT
 
 
 def test_robots_and_goals_are_drawn_where_they_are():
@@ -63,12 +63,11 @@ def test_learning_curves_against_a_loop(traced):
     assert spread > 100
 
 
-def test_published_differences(tmp_path):
-    cells = cells_of("paper", tasks=["two-armed-1"], methods=["dual-process/EC2"])
-    planted = run_and_write(tmp_path, cells=cells, runs=3, trials=60)
-    planted.runs["trials"] = 10_000  # planted: the table asks for the paper's length
-    planted.runs["hands"] = ["RRRR", "RRRR", "LRLR"]
-    planted.runs["reward"] = [-610, -606, -500]
+def test_published_differences():
+    hands = ["RRRR", "RRRR", "LRLR"]
+    planted = study_of(
+        runs_of("two-armed-1", "dual-process/EC2", [-610, -606, -500], hands=hands, trials=10_000)
+    )
     data = FIGURES["published"](planted).data.set_index("hands")
     assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
     assert data.verdict[""] == "undecided"  # also of a mean over sequences

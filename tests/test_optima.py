@@ -7,7 +7,6 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 import renew_optima
 from renew_best_known import movements_of
@@ -20,6 +19,7 @@ from coartic.runs.record import movements_from
 from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import BEST_KNOWN, best_shipped, essence
 from coartic.tasks.task import hands_of
+from tests.support.made_up import row, study_of
 from tests.support.strategies import shipped_optima
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
@@ -119,40 +119,40 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
 
 def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
     """Also of runs that are no search; not of another base, and not of one method alone."""
-    search = "optimum/branch-and-bound"
-    drawn, own = "one-armed/v1/i901", load_task("ascending").model_copy(update={"radius": 0.2})
-    tasks = [*map(load_task, ("ascending", "descending", "two-armed-2", drawn))]
-    tasks += [own.model_copy(update={"name": name}) for name in ("mine", "yours", "still", "free")]
+    search, drawn = "optimum/branch-and-bound", "one-armed/v1/i901"
+
+    def run(task, method, reward, bound=None, setting="", **parameters):
+        return row(method, reward, task=task, setting=setting, proven_bound=bound,
+                   run_id=f"{task} {reward}", parameters=json.dumps(parameters))  # fmt: skip
+
     rows = [
-        ("ascending", search, "", -290, -280, {}),
-        ("ascending", "other", "", -200, None, {"base": ""}),  # another task
-        ("descending", "other", "", -309, None, {}),
-        (drawn, search, "", -300, -250, {}), (drawn, "other", "", -290, None, {}),
-        ("mine", search, "", -290, -280, {}), ("mine", "other", "b=2", -288, None, {}),
-        ("yours", "other", "", -290, None, {}),  # to be compared with itself
-        ("still", search, "other_arm=still", -290, -285, {"other_arm": "still"}),
-        ("still", search, "", -290, -280, {}),
-        ("free", "one", "", -301, None, {}), ("free", "one", "b=2", -300, None, {}),
-    ]  # fmt: skip
-    columns = ["task", "method", "setting", "reward", "proven_bound", "parameters"]
-    runs = pd.DataFrame(rows, columns=columns).astype({"proven_bound": "Int64"})
-    runs = runs.assign(
-        status="ok", hands="RRR", parameters=runs.parameters.map(json.dumps),
-        run_id=[f"run-{number}" for number in range(len(runs))],
-    )  # fmt: skip
-    best = optima.best_known(runs, tasks)
+        run("ascending", search, -290, -280),
+        run("ascending", "other", -200, base=""),  # another task
+        run("descending", "other", -309),
+        *(run(drawn, search, -300, -250), run(drawn, "other", -290)),
+        *(run("mine", search, -290, -280), run("mine", "other", -288, setting="b=2")),
+        run("yours", "other", -290),  # to be compared with itself
+        run("still", search, -291, -285, "other_arm=still", other_arm="still"),
+        run("still", search, -290, -280),
+        *(run("free", "one", -301), run("free", "one", -300, setting="b=2")),
+    ]
+    radius = {"radius": 0.2}
+    own = [load_task("ascending").model_copy(update={"name": name, **radius})
+           for name in ("mine", "yours", "still", "free")]  # fmt: skip
+    study = study_of(rows, own)
+    tasks = [*study.tasks.values(), load_task("two-armed-2")]
+    best = optima.best_known(study.stored, tasks)
     shipped = {name: best_shipped(load_task(name)) for name in ("descending", "two-armed-2")}
     assert {name: (b.reward, b.bound, b.source, b.run_id) for name, b in best.items()} == {
-        "ascending": (-290, -292, search, "run-0"),
-        "descending": (shipped["descending"].reward, shipped["descending"].bound, "shipped", ""),
-        "two-armed-2": (shipped["two-armed-2"].reward, shipped["two-armed-2"].bound, "shipped", ""),
-        drawn: (-290, -250, "other", "run-4"),
-        "mine": (-288, -280, "other b=2", "run-6"),
-        "still": (-290, -280, f"{search} other_arm=still", "run-8"),
-        "free": (-300, None, "one b=2", "run-11"),
+        "ascending": (-290, -292, search, "ascending -290"),
+        **{name: (of.reward, of.bound, "shipped", "") for name, of in shipped.items()},
+        drawn: (-290, -250, "other", f"{drawn} -290"),
+        "mine": (-288, -280, "other b=2", "mine -288"),
+        "still": (-290, -280, search, "still -290"),
+        "free": (-300, None, "one b=2", "free -300"),
     }
     assert [name for name, each in best.items() if each.only_here] == ["free"]
-    nothing = runs.assign(status="timeout")
-    assert {name: each.reward for name, each in optima.best_known(nothing, tasks).items()} == {
+    nothing = optima.best_known(study.stored.assign(status="timeout"), tasks)
+    assert {name: each.reward for name, each in nothing.items()} == {
         name: best_shipped(load_task(name)).reward for name in ("ascending", *shipped)
     }
