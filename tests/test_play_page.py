@@ -134,12 +134,12 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
     assert "alike" in text(page, "finding")
 
 
-@pytest.mark.parametrize("rule", [None, "best-single-hand", "best-of-all", "RLLR"])
+@pytest.mark.parametrize("rule", ["best-single-hand", "best-of-all", "RLLR"])
 def test_a_task_from_a_file_begins_with_the_hands_of_the_package(visited, tmp_path, rule):
     """Trial 0, the learner, and the corrective process with its best hands, by each rule."""
     file = tmp_path / "shelf.toml"
     goals = [(2.1, 3.6), (4.4, 3.6), (5.2, 0.55), (7.0, 3.6)]
-    Task(name="shelf", goals=goals, **({} if rule is None else {"initial_hands": rule})).save(file)
+    Task(name="shelf", goals=goals, initial_hands=rule).save(file)
     task, page_file = load_task(file), tmp_path / "play.html"
     html = pages.play_page(task).replace("TRIALS = 10000;", f"TRIALS = {TRIALS};")
     page_file.write_text(html, encoding="utf-8")
@@ -267,7 +267,6 @@ def shown_condition(page):
     [
         ("preset=3&drift=0.3", {"drift": 0.3}),
         ("preset=3&explores=EC3&reward=movement&drift=1", {"drift": 1.0, "credit": "subtask"}),
-        ("preset=3", {}),
     ],
 )
 def test_the_learner_is_that_of_the_python_that_the_page_shows(opened, state, fields):
