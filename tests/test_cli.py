@@ -98,6 +98,7 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
     assert [line.rstrip() for line in shown if line] == [line[:79].rstrip() for line in lines]
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_check(coartic, tmp_path):
     """A task file and a method that keep the rules, and ones that do not."""
     assert coartic("check", TASK_FILE)[0] == 0
@@ -311,14 +312,16 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and streams of POSIX")
 @pytest.mark.parametrize("what", ["blocked", "closed"])
 def test_a_command_ends_well_whatever_started_it(tmp_path, what):
-    """With all signals blocked, or without input, output and errors."""
-    mine = tmp_path / "mine.py"
-    mine.write_text(Path(template.__file__).read_text())
+    """With all signals blocked, or without input, output and errors. What a method prints is not
+    shown."""
+    mine, prints = tmp_path / "mine.py", "import sys; print('it prints', file=sys.stderr)"
+    text = Path(template.__file__).read_text()
+    mine.write_text(text.replace("while True:", f"{prints}\n        while True:"))
     command = ("-m", "coartic", *SMALL, "--methods", "EC1,NAME", "--method-file", mine, "--out")
-    status, _ = call_apart(
+    status, words = call_apart(
         tmp_path, [sys.executable, "-c", SURROUNDED, what, *map(str, command), tmp_path / "out"]
     )
-    assert status == 0
+    assert (status, "it prints" in words) == (0, False)
     assert load(tmp_path / "out").runs.status.tolist() == ["ok"] * 4
 
 
@@ -333,7 +336,7 @@ def test_kernels_that_may_not_be_compiled_get_a_sentence(tmp_path):
 
 @pytest.mark.process
 def test_what_a_method_prints_and_where_it_crashes(tmp_path):
-    """With --verbose all of it, and a place in any case."""
+    """With --verbose; the place in any case."""
     text = Path(template.__file__).read_text().replace("def optimise", "def unused")
     body = """
     def optimise(self, *_):
@@ -346,15 +349,13 @@ def helper():
     raise RuntimeError("here")
 """
     (tmp_path / "mine.py").write_text(text + body)
-    command = [sys.executable, "-m", "coartic", "check", "NAME", "--method-file", "mine.py"]
-    for more in ((), ("--verbose",)):
-        done = subprocess.run([*command, *more], capture_output=True, text=True, cwd=tmp_path)
-        shown = done.stdout + done.stderr
-        place = f"mine.py, line {len((text + body).splitlines())}: RuntimeError: here"
-        assert place in done.stdout
-        assert done.returncode == 1
-        for words in ("it prints", "INFO:root:it logs", "Traceback", "return helper()"):
-            assert (words in shown) == bool(more), words
+    own = ["NAME", "--method-file", "mine.py", "--verbose"]
+    command = [sys.executable, "-m", "coartic", "check", *own]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    place = f"mine.py, line {len((text + body).splitlines())}: RuntimeError: here"
+    assert (done.returncode, place in done.stdout) == (1, True)
+    for words in ("it prints", "INFO:root:it logs", "Traceback", "return helper()"):
+        assert words in done.stdout + done.stderr
 
 
 def test_list(coartic, tmp_path):
@@ -444,6 +445,7 @@ def test_the_example_of_a_command_has_options_that_there_are(command, example):
     assert {word for word in example.split() if word.startswith("--")} <= options
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_results_folder_is_no_suite_but_may_have_the_name_of_one(coartic, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert coartic(*SMALL, "--methods", "EC1", "--out", "paper")[0] == 0
