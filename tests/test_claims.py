@@ -28,6 +28,7 @@ from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.estimates import Estimate
+from tests.support.golden import golden
 from tests.support.made_up import row, runs_of, study_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED
 from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
@@ -116,18 +117,10 @@ def test_claims_are_counted_by_verdict():
     ).set_axis(["context", "rail", "overall-reward", "ec4-mixed"])
     numbers = {"supported": 1, "not supported": 1, "undecided": 2, "depends on the goals": 0}
     assert counts(entries.verdict) == numbers
-    half = verdicts_in_words(entries)
-    assert half.startswith("Too few runs to judge the paper: 2 of 4 claims are undecided")
-    assert verdicts_in_words(entries[:-1]).startswith(
-        "1 of 3 claims is supported, among them one of the two central ones.\nSupported: the post"
-    )
     both = entries.assign(verdict=["supported", "not supported", "supported", "undecided"])
-    assert verdicts_in_words(both).startswith(
-        "2 of 4 claims are supported, among them the two central ones.\n"
-    )
-    assert verdicts_in_words(both.iloc[[1, 3]].assign(verdict="not supported")).startswith(
-        "0 of 2 claims are supported.\n"
-    )
+    none = both.iloc[[1, 3]].assign(verdict="not supported")
+    for name, of in (("half", entries), ("a third", entries[:-1]), ("both", both), ("none", none)):
+        assert verdicts_in_words(of) == golden(f"claims are counted, {name}")
 
 
 def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():

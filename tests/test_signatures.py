@@ -24,6 +24,7 @@ from coartic.analysis.signatures.two_contexts import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.robot import HANDS
+from tests.support.golden import golden
 from tests.support.made_up import runs_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
 
@@ -470,14 +471,8 @@ def test_p_of_shared_goals_is_corrected_by_method():
 
 
 def test_a_signature_stands_beside_random_search():
-    study = beside_random_search(2.0)
-    contexts = coarticulation.shared_goal(study)
-    (of_random_search,) = random_search.every_random_search_for(study, contexts)
-    first, _, _ = coarticulation.next_goal(study).partition("\n")
-    assert (
-        f"{contexts.standardised_posture_difference:.1f} SD; random search: "
-        f"{of_random_search.standardised_posture_difference:.1f})" in first
-    )
+    sentences = coarticulation.next_goal(beside_random_search(2.0))
+    assert sentences == golden("the learner coarticulates beside random search")
 
 
 def beside_corrective(method, posture_difference, *, stochastic, runs):
