@@ -21,7 +21,7 @@ from coartic.estimates import Estimate
 )
 @pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
 def test_bootstrap_test_against_all_resamples(a, b, alternative):
-    """One value on the second side is a known number: the one-sample test (Efron, Tibshirani 1993)."""
+    """One value on the second side is a known number: a test of one sample."""
     other = b[0] if len(b) == 1 else b
     one = np.array(a) - np.mean(a)
     two = np.array(b) - np.mean(b)

@@ -15,7 +15,11 @@ class NearestHand(Method):
     title = "Corrective process with the nearest hand"
     citation = "An example of this package."
     information = frozenset(
-        {Information.GOALS, Information.FORWARD_KINEMATICS, Information.CORRECTIVE_PROCESS}
+        {
+            Information.GOALS,
+            Information.FORWARD_KINEMATICS,
+            Information.CORRECTIVE_PROCESS,
+        }
     )
     stochastic = False
     Parameters = NearestHandParameters
