@@ -317,7 +317,8 @@ def test_a_command_ends_well_whatever_started_it(tmp_path, what):
     mine, prints = tmp_path / "mine.py", "import sys; print('it prints', file=sys.stderr)"
     text = Path(template.__file__).read_text()
     mine.write_text(text.replace("while True:", f"{prints}\n        while True:"))
-    command = ("-m", "coartic", *SMALL, "--methods", "EC1,NAME", "--method-file", mine, "--out")
+    own = ("--methods", "EC1,NAME", "--method-file", mine, "--jobs", 1)
+    command = ("-m", "coartic", *SMALL, *own, "--out")
     status, words = call_apart(
         tmp_path, [sys.executable, "-c", SURROUNDED, what, *map(str, command), tmp_path / "out"]
     )
