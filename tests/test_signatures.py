@@ -26,20 +26,11 @@ from coartic.analysis.solutions import Solutions
 from coartic.robot import HANDS
 from tests.support.golden import golden
 from tests.support.made_up import runs_of, study_of_solutions
-from tests.support.strategies import AS_RELEASED, changed, tiny_task
+from tests.support.strategies import AS_RELEASED, changed, posture, tiny_task
 
 
 def rng(seed=1):
     return np.random.default_rng(seed)
-
-
-def posture(x=0.0, y=0.0, **joints):
-    """Arms straight along +x, base at (x, y); ``right_2=0.3`` and the like bend them."""
-    q = np.array([x, y, *[0.0] * 8])
-    for name, angle in joints.items():
-        hand, number = name.split("_")
-        q[(2 if hand == "left" else 6) + int(number) - 1] = angle
-    return q
 
 
 def posed(task, method, q, ticks=(0, 0, 0), hands="RRR"):

@@ -17,7 +17,7 @@ from coartic import (
 )
 from coartic.method import Information, Session
 from coartic.runs.record import MOST_STEPS, execute_all
-from tests.support.strategies import make_trials, tiny_task
+from tests.support.strategies import make_trials, posture, tiny_task
 
 
 def test_no_way_is_followed_without_end():
@@ -35,11 +35,6 @@ def planned(*targets, hand="right"):
         Movement(number, hand, "planned", np.array(target, dtype=float))
         for number, target in enumerate(targets, 1)
     ]
-
-
-def posture(x, y=0.0):
-    """Arms straight along +x, base at (x, y): the right hand is at (x + 4.5, y + 0.1)."""
-    return [x, y, *[0.0] * 8]
 
 
 WAY = np.zeros((1, 10))

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from coartic import CoarticError, Movement, Task, corrective_trial, movements_of, trajectory
-from tests.support.strategies import tiny_task
+from tests.support.strategies import posture, tiny_task
 
 TASK = Task(goals=[(3.0, 2.0), (4.5, 2.0)], q0=[0, 0, 2, -0.5, 0, 0, 1, 0.5, 0, 0])
 
@@ -64,7 +64,7 @@ def test_what_cannot_be_is_said(mine, call, words):
 def test_rows_of_a_trajectory_by_hand():
     """A goal hit at the start, two lines of 3 and 2 steps, q + k m (target - q)/distance."""
     task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
-    ahead = [Movement(n, "right", "planned", q_at(x)) for n, x in ((2, 0.06), (3, 0.08))]
+    ahead = [Movement(n, "right", "planned", posture(x)) for n, x in ((2, 0.06), (3, 0.08))]
     path = trajectory(task, [Movement(1, "right", "corrective"), *ahead])
     np.testing.assert_allclose(path.configurations[:, 0], np.array([0, 1, 2, 3, 3, 4, 5]) / 100)
     np.testing.assert_allclose(path.hand_path("right")[:, 0], path.configurations[:, 0] + 4.5)
@@ -73,8 +73,3 @@ def test_rows_of_a_trajectory_by_hand():
     only = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
     idle = trajectory(only, [Movement(1, "right", "corrective")])
     assert (idle.configurations.shape, idle.hits.tolist()) == ((0, 10), [0])
-
-
-def q_at(x):
-    """Arms straight along +x, the base at (x, 0)."""
-    return np.array([x, *[0.0] * 9])

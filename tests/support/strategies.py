@@ -30,6 +30,16 @@ def configurations(robot, low=-4.0, high=4.0):
     return arrays(np.float64, robot.dof, elements=st.floats(low, high))
 
 
+def posture(x=0.0, y=0.0, **joints):
+    """The paper's arms straight along +x, its base at (x, y): the right hand is at (x + 4.5, y +
+    0.1); ``right_2=0.3`` and the like bend them."""
+    q = np.array([x, y, *[0.0] * 8])
+    for name, angle in joints.items():
+        hand, number = name.split("_")
+        q[(2 if hand == "left" else 6) + int(number) - 1] = angle
+    return q
+
+
 def tiny_task(**changes):
     """A two-goal task for the paper's robot; keyword arguments replace its keys."""
     content = {
