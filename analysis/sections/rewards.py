@@ -12,7 +12,12 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import CONDITION_OF, LEARNERS, title_of
 from coartic.analysis.published import RUNS, published_alone, published_cell
-from coartic.analysis.statistics.hypotheses import MARGIN, difference_to_published, equivalence
+from coartic.analysis.statistics.hypotheses import (
+    MARGIN,
+    difference_to_published,
+    equivalence,
+    spread_test,
+)
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.words import interval, listed, marked
@@ -74,6 +79,9 @@ def published_and_ours(study: Study) -> list[dict[str, Any]]:
                     rewards, summary.mean, summary.sd, summary.runs
                 )
                 row |= difference.columns("difference")
+                if summary.sd is not None and not summary.derived:
+                    for column, of_mean in (("p_sd", False), ("p_se", True)):
+                        row[column] = spread_test(rewards, summary.sd, summary.runs, of_mean=of_mean)
                 if (cell.good.trials == TRIALS).all():
                     row["verdict"] = equivalence(difference, row["margin"])
             rows.append(row)
@@ -82,7 +90,7 @@ def published_and_ours(study: Study) -> list[dict[str, Any]]:
 
 @table(
     "task; condition; published± .1; ours± .1; runs; difference[] .1; margin .1; verdict; "
-    "published_initial: -; ours_initial: -"
+    "p_sd: p of the spread .p; p_se: -; published_initial: -; ours_initial: -"
 )
 def list_published(study: Study) -> Rows:
     """List published and our learned rewards of the paper's cells, and their equivalence."""
@@ -99,7 +107,7 @@ def list_published(study: Study) -> Rows:
 
 @table(
     "task; condition; hands; published_runs; runs: our runs; of_runs: of our runs; "
-    "published± .1; ours± .1; difference[] .1"
+    "published± .1; ours± .1; difference[] .1; p_sd: p of the spread .p; p_se: -"
 )
 def list_hands(study: Study) -> Rows:
     """List learned rewards by hand sequence, published and ours, for cells with several."""

@@ -132,6 +132,22 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
     return Estimate(count / total - share, p=p, n=(total,))
 
 
+def spread_test(values: ArrayLike, published: float, runs: int, *, of_mean: bool = False) -> float:
+    """Test whether ``runs`` runs like ours could have a published spread, two-tailed.
+
+    Samples of so many of our ``values``, shape ``(n,)``, are drawn with replacement, and p is twice
+    the share whose standard deviation, or standard error of the mean with ``of_mean``, is at least
+    as far on the side of the published spread. NaN with fewer than ten values.
+    """
+    sample = vector(values)
+    if len(sample) < 10:
+        return math.nan
+    drawn = np.random.default_rng(SEED).choice(sample, (RESAMPLES, runs))
+    spreads = drawn.std(axis=1, ddof=1) / (math.sqrt(runs) if of_mean else 1.0)
+    beyond = min((spreads <= published).sum(), (spreads >= published).sum())
+    return float(min(1.0, 2 * (1 + beyond) / (1 + RESAMPLES)))
+
+
 def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
