@@ -33,7 +33,7 @@ KEPT = {
     "comparison": (
         "beside-random-search claims contexts hands learning methods runtimes published ranking "
         "scores separation signatures tasks",
-        "postures published ranking runtimes learning-curves",
+        "postures published ranking runtimes learning-curves solutions",
     ),
     "ablations": ("methods signatures claims", ""),
     "families": ("family-gaps claims", "gaps-by-family"),
@@ -116,6 +116,14 @@ def p_above(values: pd.Series, bound: float) -> float:
     return mean_beyond("{}", values, bound).p
 
 
+def published_spreads() -> pd.DataFrame:
+    """Return the published spreads (±) with the tests of both readings; a spread that is published
+    of a hand sequence is compared with runs that have it."""
+    spreads = pd.concat([table("comparison", "hands"), table("comparison", "published")])
+    spreads = spreads.drop_duplicates(["task", "condition", "published_sd"]).dropna(subset="p_sd")
+    return spreads.sort_index()
+
+
 def known_optima() -> pd.DataFrame:
     """Count, by family, instances with best known rewards, and how near their bounds are.
 
@@ -146,6 +154,7 @@ def filled_pages() -> dict[str, str]:
     values = {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "seen": seen,
         "title_of": title_of, "known_optima": known_optima,
+        "published_spreads": published_spreads,
         "p_of_shares": p_of_shares, "p_above": p_above,
         "published": tomllib.loads(published.read_text("utf-8"))["general"],
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),

@@ -3,8 +3,8 @@
     coartic run studies/horizon/suite.toml
     python studies/horizon/study.py results/horizon
 
-writes results.csv, signatures.csv, gains.csv, claims.csv, repeats.csv, figure.svg and the page,
-README.md; without a folder figure and page, of the stored tables.
+writes results.csv, signatures.csv, gains.csv, movements.csv, claims.csv, repeats.csv, figure.svg and
+the page, README.md; without a folder figure and page, of the stored tables.
 
 Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims are
 judged by the mean over the repeats of a task, and again without the task that speaks most for them;
@@ -79,6 +79,20 @@ def tabulate(study, plans):
     table = table.rename(columns={"step": "h", "rows": "tasks", "cpu_s": "seconds"})
     table.index = (table.group + " " + table.value + " h=" + table.h).rename("row")
     return table.drop(columns=["cpu_s_low", "cpu_s_high"])
+
+
+def tabulate_movements(gains):
+    """What the last goal in view gains, in per cent of a movement that has it ahead, as in study
+    fourteen: all tasks that have it, and by number of goals."""
+    h = gains.h[(gains.h > 0) & (gains.h <= 4)]
+    gains = gains.loc[h.index].assign(gain=100 * gains.gain * gains.goals / (gains.goals - h))
+    count = gains.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")
+    parts = [gains.assign(goals="all"), gains.assign(goals=count)]
+    every = pd.concat(part.sort_values(["goals", "h"]) for part in parts)
+    table = means(every, ["goals", "h"], ["gain"]).rename(columns={"rows": "tasks"})
+    table["median"] = every.groupby(["goals", "h"], sort=False).gain.median().to_numpy()
+    table.index = ("goals " + table.goals + " h=" + table.h.astype(str)).rename("row")
+    return table
 
 
 def tabulate_signatures(plans):
@@ -165,7 +179,8 @@ def measure(study):
     return {
         "results": tabulate(study, plans),
         "signatures": tabulate_signatures(plans),
-        "gains": steps.set_index("task")[["family", "goals", "h", "gap", "gain"]],
+        "gains": (gains := steps.set_index("task")[["family", "goals", "h", "gap", "gain"]]),
+        "movements": tabulate_movements(gains.reset_index()),
         "claims": judge_claims(study, plans),
         "repeats": pd.concat(repeats, names=["nodes"]).reset_index("nodes"),
     }

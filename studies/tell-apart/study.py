@@ -43,11 +43,26 @@ def share_by_task(changes):
 
 
 def tabulate(changes, starts, steps):
-    """Means over tasks with intervals, a row for each measure of a model."""
+    """Means over tasks with intervals, a row for each measure of a model.
+
+    Shares vary between tasks, so that ``share_1`` has its median and its ``pooled`` value, sums
+    over tasks, as well, and the trials to half their quartiles. ``unlike``: tasks on which two
+    learners who learn the changed task anew differ by more than the learner shifts.
+    """
     shares = share_by_task(changes)
     columns = [*(f"share_{n}" for n in AFTER), "shift", "half", "drift", "from_anew", "first",
                "gap"]  # fmt: skip
-    tables = [means(shares, ["distance", "model"], columns)]
+    by = shares.assign(unlike=shares.among > shares.square).groupby(
+        ["distance", "model"], sort=False
+    )
+    more = pd.DataFrame({
+        "share_1_median": by.share_1.median(),
+        "share_1_pooled": by.dot_1.sum() / by.square.sum(),
+        **{f"half_{100 * part:.0f}": by.half.quantile(part) for part in (0.25, 0.5, 0.75)},
+        "unlike": by.unlike.sum(),
+    })  # fmt: skip
+    tables = [means(shares, ["distance", "model"], columns)
+              .merge(more, left_on=["distance", "model"], right_index=True)]  # fmt: skip
     starts = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
     tables.append(means(starts, ["model", "trials"], ["ratio"]))
     tables.append(means(steps.groupby(["model", "task"], sort=False).mean(numeric_only=True)
@@ -164,7 +179,7 @@ def find_power(changes, starts, steps):
     """People needed for each contrast, by what they are.
 
     Noise: in the first contrast ``NOISE`` in each joint of one trial, as a share of the planner's
-    shift, with means of 20 trials before and after; in the second the spread of runs, as a share of
+    shift on a task at its lower quartile, with means of 20 trials before and after; in the second the spread of runs, as a share of
     the distance of the groups, whose middle is 0; in the third the spread of persons.
     """
     shares, rng = share_by_task(changes), np.random.default_rng(0)
@@ -174,7 +189,7 @@ def find_power(changes, starts, steps):
     cases = {}
     for distance in (0.25, 0.5, 1.0):
         planned = shares[(shares.distance == distance) & (shares.model == "planner, all goals")]
-        noise = NOISE * np.sqrt(1.05) / planned["shift"].median()
+        noise = NOISE * np.sqrt(1.05) / planned["shift"].quantile(0.25)
         cases |= {f"change {distance:g}, {k} goals": (0, 1, noise, k) for k in (1, 4)}
     cases["start"] = 1, 0, np.sqrt(2) / apart, 1
     records = round(steps.records[steps.model == "learner"].mean())
