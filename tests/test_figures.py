@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from coartic import drawing, load_task
+from coartic import corrective_trial, drawing, initial_hands, load_task
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.learning import learning_curves
@@ -37,6 +37,23 @@ def test_every_figure_that_runs_allow(traced):
         assert plot.alt
         assert plot.caption
         assert len(plot.data)
+
+
+def test_solutions_are_of_the_run_with_the_median_reward(traced):
+    data = FIGURES["solutions"](traced).data
+    ticks = -data.groupby(["task", "condition"], sort=False).reward.sum()
+    for (name, condition), of_run in ticks.items():
+        if condition == "initial":
+            assert of_run == corrective_trial(name, initial_hands(name)).ticks
+        else:
+            rewards = traced.cells[name, f"dual-process/{condition}"].rewards
+            assert -of_run in rewards
+            assert (rewards < -of_run).sum() <= len(rewards) / 2 >= (rewards > -of_run).sum()
+    for hit in data.to_dict("records"):
+        task = load_task(hit["task"])
+        q = [hit[joint] for joint in task.robot.joint_names]
+        hand = task.robot.forward_kinematics(q, {"L": "left", "R": "right"}[hit["hand"]])
+        assert np.hypot(*(hand - task.goals[hit["goal"] - 1])) <= task.radius
 
 
 def test_the_gallery_shows_every_figure():

@@ -165,6 +165,19 @@ def test_rounding_is_no_spread():
     assert statistics.standard_deviation(np.full(3, 0.1)) == 0
 
 
+def test_spreads_against_normal_samples():
+    """Of normal values the SD of n runs has a chi-square distribution."""
+    values = np.random.default_rng(1).normal(0, 3, 4000)
+    for runs, published in ((20, 3.0), (20, 2.0), (9, 4.2), (20, 4.6)):
+        below = stats.chi2.cdf((runs - 1) * (published / values.std(ddof=1)) ** 2, runs - 1)
+        due = 2 * min(below, 1 - below)
+        assert hypotheses.spread_test(values, published, runs) == pytest.approx(due, abs=0.03)
+        of_mean = hypotheses.spread_test(values, published / np.sqrt(runs), runs, of_mean=True)
+        assert of_mean == pytest.approx(due, abs=0.03)
+    assert hypotheses.spread_test(values, 0.5, 20) < 0.001
+    assert np.isnan(hypotheses.spread_test(values[:9], 3.0, 20))
+
+
 def test_share_test():
     """20 of 20 where three quarters are expected: 0.75 to the 20th."""
     test = hypotheses.share_test(20, 20, 0.75, "greater")

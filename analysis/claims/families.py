@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from statistics import median
 
 from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, all_positive, no_trial_fails
@@ -23,7 +24,7 @@ from coartic.analysis.methods import (
 )
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.standings import best_of_instances
-from coartic.analysis.words import estimate
+from coartic.analysis.words import estimate, number
 from coartic.estimates import FEWEST, mean
 
 OF_ONE_ARM = ("one-armed/v1",)
@@ -54,9 +55,11 @@ def in_every_family(
             if len(values) < FEWEST:
                 raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
             findings.append(mean_beyond("", values, margin))
-            seen = estimate(mean(values), 2 if first.quantity else 1) + " %" * (not first.quantity)
+            digits, unit_of = (2, "") if first.quantity else (1, " %")
+            seen = estimate(mean(values), digits) + unit_of
             quantity = first.quantity or "gain as a share of the best known reward"
-            parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances"))
+            many = f"{number(median(values), digits)}{unit_of} on the median one"
+            parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances, {many}"))
     finding = all_of(*findings)
     return replace(finding, evidence=all_positive(finding.tests, parts).evidence)
 

@@ -33,7 +33,9 @@ def draw_solutions(study: Study) -> Parts | None:
         cells = {
             CONDITION_OF[label]: cell
             for (on, label), cell in study.cells.items()
-            if on == name and label in CONDITION_OF and len(cell.good)
+            if on == name
+            and label in CONDITION_OF
+            and len(cell.good)
             and published_cell(name, CONDITION_OF[label]) is not None
         }
         if cells:
@@ -58,7 +60,9 @@ def draw_solutions(study: Study) -> Parts | None:
         words = f"{task.label}\n{condition}, {run.hands}\n−{run.ticks}"
         panels[0].text(-0.05, 0.5, words, transform=panels[0].transAxes, ha="right", va="center")
         before = task.q0
-        for goal, (q, ticks) in enumerate(zip(run.configurations, run.ticks_by_goal(), strict=True)):
+        for goal, (q, ticks) in enumerate(
+            zip(run.configurations, run.ticks_by_goal(), strict=True)
+        ):
             draw_hit(panels[goal], task, before, q, HANDS["LR".index(run.hands[goal])], f"−{ticks}")
             named = {"task": task.name, "condition": condition, "goal": goal + 1}
             angles = dict(zip(task.robot.joint_names, q.tolist(), strict=True))

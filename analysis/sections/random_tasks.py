@@ -61,6 +61,8 @@ def list_family_gaps(study: Study) -> Rows:
     two_armed = {*every.family[hands > 1]}
     for method, of_method in every.groupby("method", sort=False):
         row: Row = {"method": method, "instances": len(of_method), "gap": math.nan}
+        if (of_two_arms := of_method.family.isin(two_armed)).any():
+            row["instances"] = int(of_two_arms.sum())  # the gap is a mean over these
         for column in ("gap", "to_bound"):
             scores = by_family(of_method, column)
             if two_armed and two_armed <= scores.keys():

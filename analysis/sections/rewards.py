@@ -81,7 +81,9 @@ def published_and_ours(study: Study) -> list[dict[str, Any]]:
                 row |= difference.columns("difference")
                 if summary.sd is not None and not summary.derived:
                     for column, of_mean in (("p_sd", False), ("p_se", True)):
-                        row[column] = spread_test(rewards, summary.sd, summary.runs, of_mean=of_mean)
+                        row[column] = spread_test(
+                            rewards, summary.sd, summary.runs, of_mean=of_mean
+                        )
                 if (cell.good.trials == TRIALS).all():
                     row["verdict"] = equivalence(difference, row["margin"])
             rows.append(row)

@@ -3,8 +3,8 @@
     coartic run studies/horizon/suite.toml
     python studies/horizon/study.py results/horizon
 
-writes results.csv, signatures.csv, gains.csv, movements.csv, claims.csv, repeats.csv, figure.svg and
-the page, README.md; without a folder figure and page, of the stored tables.
+writes results.csv, signatures.csv, gains.csv, movements.csv, claims.csv, repeats.csv, figure.svg
+and the page, README.md; without a folder figure and page, of the stored tables.
 
 Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims are
 judged by the mean over the repeats of a task, and again without the task that speaks most for them;

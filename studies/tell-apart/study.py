@@ -179,8 +179,9 @@ def find_power(changes, starts, steps):
     """People needed for each contrast, by what they are.
 
     Noise: in the first contrast ``NOISE`` in each joint of one trial, as a share of the planner's
-    shift on a task at its lower quartile, with means of 20 trials before and after; in the second the spread of runs, as a share of
-    the distance of the groups, whose middle is 0; in the third the spread of persons.
+    shift on a task at its lower quartile, with means of 20 trials before and after; in the second
+    the spread of runs, as a share of the distance of the groups, whose middle is 0; in the third
+    the spread of persons.
     """
     shares, rng = share_by_task(changes), np.random.default_rng(0)
     ratio = starts[(starts.model == "learner") & (starts.trials == 1)]
