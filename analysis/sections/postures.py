@@ -38,8 +38,8 @@ def draw_solutions(study: Study) -> Parts | None:
             and len(cell.good)
             and published_cell(name, CONDITION_OF[label]) is not None
         }
-        if cells:
-            rows.append((task, "initial", initial_solution(task)))
+        if cells and (initial := initial_solution(task)) is not None:
+            rows.append((task, "initial", initial))
         for condition, cell in sorted(cells.items()):
             runs = sorted(study.executed(name, cell.label).runs, key=lambda run: -run.ticks)
             rows.append((task, condition, runs[(len(runs) - 1) // 2]))
