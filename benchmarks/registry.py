@@ -49,25 +49,29 @@ Registry = Mapping[str, MethodInfo]
 _INFOS = TypeAdapter(list[MethodInfo])
 
 
-def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
-    """Return every known method by id.
+def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> dict[str, MethodInfo]:
+    """Return every known method by id; ``with_code`` as in :func:`built_in`.
 
     Raises CoarticError for a file that cannot be loaded or holds no method, and for an id that is
     reserved or taken.
     """
-    infos = dict(built_in())
+    infos = dict(built_in(with_code=with_code))
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
         add_methods(infos, methods_of_file(path))
     return infos
 
 
 @cache
-def built_in() -> Mapping[str, MethodInfo]:
-    """Return the built-in methods by id."""
+def built_in(*, with_code: bool = True) -> Mapping[str, MethodInfo]:
+    """Return the built-in methods by id.
+
+    ``with_code``: with the hash of their code, which takes half a second. Runs need it, lists of
+    methods do not.
+    """
     infos: dict[str, MethodInfo] = {}
     for name in MODULES:
         module = importlib.import_module(name)
-        code = code_of(Path(inspect.getfile(module)))
+        code = code_of(Path(inspect.getfile(module))) if with_code else ""
         infos |= {
             method.name: method_info(method, BUILT_IN, name, code) for method in module.METHODS
         }

@@ -123,7 +123,7 @@ def trace(
     if not len(behind):
         say("No runs stand behind this row.")
         return
-    known = {*registry(), "dual-process"}
+    known = {*registry(with_code=False), "dual-process"}
     file = "" if known >= {*behind.method} else " --method-file FILE"
     say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
     table_of_runs = traced.runs_behind(study, ids).astype(str).map(one_line)
@@ -190,7 +190,7 @@ def cite(
     from coartic.runs.store import open_store
 
     if folder is None:
-        text = bibliography(built_in(), analysis=analysis)
+        text = bibliography(built_in(with_code=False), analysis=analysis)
     else:
         with open_store(folder) as store:
             plan, made_with = store.plan(), store.made_with()

@@ -148,7 +148,7 @@ def list_(
     """List tasks, suites and methods, or describe one of them."""
     from coartic.benchmarks.registry import registry
 
-    registered = registry(method_file or [])
+    registered = registry(method_file or [], with_code=False)
     say_pairs(overview(registered) if name is None else describe(name, registered))
 
 
@@ -355,7 +355,7 @@ def new(
         raise CoarticError(f"--out {path}: the name must end in .py.")
     mine = type("Mine", (template.Mine,), {"name": name})
     check_declaration(mine, "coartic new")
-    add_methods(registry(), [method_info(mine, "coartic new", "", "")])
+    add_methods(registry(with_code=False), [method_info(mine, "coartic new", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     say_pairs(
