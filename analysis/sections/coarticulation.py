@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
@@ -134,15 +135,40 @@ def mean_of_goals(values: Array) -> float:
 
 @figure(
     "One goal, two postures",
-    "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
-    "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
+    "Postures of one method's runs when they hit a goal that two tasks share, and of random search "
+    "with as many trials, at its strongest width. Thick: mean posture; thin: every run. Dashed "
+    "arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw postures at a goal before two different next goals: runs thin, their means thick."""
+    """Draw postures at a goal before two different next goals, and random search beside them."""
     shared = shared_goal(study)
     if shared is None:
         return None
-    drawing, (axes,) = style.panels((1, 1), (style.ONE, 2.0))
+    chance = random_search_for(study, shared) if selects(study, shared.method) else None
+    contexts = [shared, chance] if chance else [shared]
+    size = (style.ONE, style.TWO)[len(contexts) - 1], 2.0
+    drawing, panels = style.panels((1, len(contexts)), size, sharex=True, sharey=True)
+    parts, differences = [], []
+    for axes, each in zip(panels, contexts, strict=True):
+        title = study.methods.title[each.method]
+        if len(contexts) > 1:
+            axes.set_title(f"{title}: difference {number(each.posture_difference, 2)}")
+        parts += draw_contexts(axes, each)
+        differences.append(f"{title} {each.posture_difference:.2f}")
+    hands = [shared.tasks[0].robot.forward_kinematics(runs.mean(axis=0), shared.hand)
+             for runs in shared.configurations]  # fmt: skip
+    first, second = (task.label for task in shared.tasks)
+    alt = (
+        f"Two postures of one arm at goal {shared.goal}, which {first} and {second} share. "
+        f"Posture difference: {'; '.join(differences)}. The distance of the hands is "
+        f"{np.linalg.norm(hands[0] - hands[1]):.2f}."
+    )
+    return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
+
+
+def draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
+    """Draw the postures of runs at a shared goal, runs thin and their means thick; return their
+    numbers for each task."""
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius
@@ -186,15 +212,7 @@ def draw_postures(study: Study) -> Parts | None:
     axes.annotate("1 length unit", (x, y), (0, -2), va="top", **words)
     here = f"goal {shared.goal},\nthe same"
     axes.annotate(here, at, (7, 0), va="center", weight="bold", **words)
-    first, second = (task.label for task in shared.tasks)
-    hands = [robot.forward_kinematics(q, shared.hand) for q in means]
-    alt = (
-        f"Two postures of one arm at goal {shared.goal}, which {first} and {second} share "
-        f"({study.methods.title[shared.method]}): the posture difference is "
-        f"{shared.posture_difference:.2f}, while the distance of the hands is "
-        f"{np.linalg.norm(hands[0] - hands[1]):.2f}."
-    )
-    return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
+    return parts
 
 
 def next_goal(study: Study) -> str:
