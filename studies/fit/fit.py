@@ -1,0 +1,232 @@
+"""Fit the learner, and five other models, to the trials of people.
+
+    python studies/fit/fit.py two-armed-1 studies/fit/example.csv [--condition EC4] [--noise 0.01]
+
+prints for each subject which model explains the trials, and the parameters of the learner with 95 %
+profile intervals.
+"""
+
+import argparse
+
+import numpy as np
+import pandas as pd
+from evidence import NODES, condition_for, evidence_in, plan_for, tables_before, trials_of
+from hits import read_hits
+from scipy import optimize, stats
+
+from coartic import CONDITIONS, CoarticError, load_task
+
+MODELS = {
+    "best": "keep the best",
+    "informed": "keep the best, informed",
+    "drawn": "keep the best, drawn drift",
+    "walk": "a walk (keep the last)",
+    "memoryless": "no memory (keep the first)",
+    "planner": "a noisy planner, replayed",
+}
+LEARNERS = ("best", "informed", "drawn")
+CLEAR = 6.0
+"""Difference in BIC from which a model is preferred ("strong" in Kass & Raftery 1995)."""
+
+SIMULATED = 8
+"""Number of simulations from which the bias of an estimate is found."""
+
+
+def interval(log_likelihood, best, step, low, high):
+    """Return the 95 % profile interval around a maximum within bounds."""
+    drop = stats.chi2.ppf(0.95, 1) / 2
+    least = log_likelihood(best) - drop
+    ends = []
+    for bound, sign in ((low, -1), (high, 1)):
+        end = best
+        while log_likelihood(end) > least and end != bound:
+            end = (max if sign < 0 else min)(end + sign * step, bound)
+        if log_likelihood(end) < least:
+            inner = end - sign * step if sign * (end - best) > step else best
+            end = optimize.brentq(lambda x: log_likelihood(x) - least, inner, end, xtol=1e-4)
+        ends.append(end)
+    return ends
+
+
+def maximum(function, low, high):
+    """Return the place and the value of the maximum of a function between bounds."""
+    done = optimize.minimize_scalar(lambda x: -function(x), bounds=(low, high), method="bounded",
+                                    options={"xatol": 1e-3})  # fmt: skip
+    return done.x, -done.fun
+
+
+def most_likely(evidence, noise):
+    """Return log σ and κ of highest likelihood, shape ``(2,)``, and the log likelihood."""
+    nodes = [[np.log(evidence.rough_sigma(kappa)), kappa] for kappa in NODES]
+    start = max(nodes, key=lambda x: evidence.log_likelihood(np.exp(x[0]), x[1], 0.0))
+    simplex = np.add(start, [[0, 0], [0.1, 0], [0, 0.1]])
+    done = optimize.minimize(
+        lambda x: -evidence.log_likelihood(np.exp(x[0]), x[1], noise), start, method="Nelder-Mead",
+        options={"xatol": 1e-3, "fatol": 1e-3, "initial_simplex": simplex},
+    )  # fmt: skip
+    return done.x, -done.fun
+
+
+def bias(task, condition, trials, log_sigma, kappa):
+    """Return the bias of log σ and κ, shape ``(2,)``: landings are not linear in the target.
+
+    It is the mean error of estimates from hits simulated with the tables of the subject.
+    """
+    estimates = []
+    for number in range(SIMULATED):
+        simulated = np.exp(log_sigma), kappa, np.random.default_rng(number)
+        evidence = evidence_in(task, condition, trials, "informed", None, simulated)
+        estimates.append(most_likely(evidence, 0.0)[0])
+    return np.mean(estimates, axis=0) - [log_sigma, kappa]
+
+
+def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True):
+    """Fit all models to the trials of a subject; a dictionary of numbers.
+
+    ``sigma``, ``epsilon`` and ``kappa`` are of *keep the best, informed*, with ``_low`` and
+    ``_high``; ``bic_`` and the name of a model.
+    """
+    row, plan = {}, plan or plan_for(task)
+    for model in MODELS:
+        evidence = evidence_in(task, condition, trials, model, plan)
+        count = int(evidence.sizes.sum()) + len(evidence.follows)
+        free, total = 1, 0.0
+
+        def hands(rate, of=evidence):
+            chance = rate * of.explored + (1 - rate) * of.follows
+            return np.log(np.maximum(chance, 1e-9)).sum()
+
+        def postures(log_sigma, kappa=0.0, of=evidence):
+            return of.log_likelihood(np.exp(log_sigma), kappa, noise)
+
+        if len(condition.hands) > 1:
+            epsilon, total = maximum(hands, 0.0, 1.0)
+            free += 1
+        around = np.log(evidence.rough_sigma(0.0)) + [-3.0, 1.5]
+        if model == "drawn":
+            total += maximum(lambda x, of=evidence: of.drawn(np.exp(x), noise), *around)[1]
+        elif model != "informed":
+            total += maximum(postures, *around)[1]
+        else:
+            (log_sigma, kappa), best = most_likely(evidence, noise)
+            total, free = total + best, free + 1
+            row |= {"sigma": np.exp(log_sigma), "kappa": kappa}
+            if len(condition.hands) > 1:
+                row["epsilon"] = epsilon
+            if intervals:
+                ends = interval(
+                    lambda x: maximum(lambda y: postures(x, y), kappa - 1, kappa + 1)[1],
+                    log_sigma, 0.2, -12.0, 3.0,
+                )  # fmt: skip
+                row["sigma_low"], row["sigma_high"] = np.exp(ends)
+                row["kappa_low"], row["kappa_high"] = interval(
+                    lambda x: maximum(lambda y: postures(y, x), log_sigma - 1, log_sigma + 1)[1],
+                    kappa, 0.1, -2.0, 4.0,
+                )  # fmt: skip
+                off = bias(task, condition, trials, log_sigma, kappa)
+                for end in ("", "_low", "_high"):
+                    row[f"sigma{end}"] /= np.exp(off[0])
+                    row[f"kappa{end}"] -= off[1]
+                if len(condition.hands) > 1:
+                    ends = interval(hands, epsilon, 0.1, 0.0, 1.0)
+                    row["epsilon_low"], row["epsilon_high"] = ends
+        row[f"bic_{model}"] = free * np.log(count) - 2 * total
+    return row
+
+
+def judge(row):
+    """Return the model of least BIC, and the models that are not clearly worse, best first."""
+    bic = {model: row[f"bic_{model}"] for model in MODELS}
+    ordered = sorted(bic, key=bic.get)
+    return ordered[0], [model for model in ordered[1:] if bic[model] - bic[ordered[0]] < CLEAR]
+
+
+def fit(frame, task, *, condition=None, noise=0.0):
+    """Fit all models to the trials of all subjects.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Rows of :func:`hits.read_hits`.
+    task : Task
+        The task that was practised.
+    condition : ExplorationCondition, optional
+        Hands and explored joints; by default EC1 with one hand, EC4 with two.
+    noise : float
+        SD of the motor noise in recorded postures, length unit and rad.
+
+    Returns
+    -------
+    DataFrame
+        A row for each subject: numbers of :func:`fit_subject`; ``trials``, ``lost`` trials and
+        ``missing`` hits of the others; ``improved``, the number of trials after the first that were
+        better than all before; ``model`` and ``others`` (:func:`judge`).
+    """
+    condition, plan, rows = condition or condition_for(task), plan_for(task), []
+    for subject, of_subject in frame.groupby("subject", sort=False):
+        trials = trials_of(of_subject, task)
+        hits = (trials.hands >= 0).sum(axis=1)
+        rewards = trials.rewards[np.isfinite(trials.rewards)]
+        row = {
+            "subject": subject, "trials": len(hits), "lost": int((hits == 0).sum()),
+            "missing": int((len(task.goals) - hits[hits > 0]).sum()),
+            "improved": int((np.diff(np.maximum.accumulate(rewards)) > 0).sum()),
+        }  # fmt: skip
+        if not (tables_before(task, condition, trials, "best").stored >= 0).any():
+            raise CoarticError(f"subject {subject}: no hit follows a complete trial, so nothing can "
+                               "be fitted; needed are two trials in which all goals are hit")  # fmt: skip
+        row |= fit_subject(task, condition, trials, noise=noise, plan=plan)
+        model, others = judge(row)
+        rows.append({**row, "model": model, "others": " ".join(others)})
+    return pd.DataFrame(rows)
+
+
+def sentence(row):
+    """Return what a row of :func:`fit` says, in words."""
+    others = [MODELS[name] for name in row.others.split()]
+    lost = f"{row.lost} lost, {row.missing} hits missing"
+    text = f"{row.subject} ({row.trials} trials, {lost}): "
+    if others and not {row.model, *row.others.split()} <= {*LEARNERS}:
+        return (
+            f"{text}these trials cannot distinguish {MODELS[row.model]} from {', '.join(others)} "
+            f"(difference in BIC below {CLEAR:g}; {row.improved} trials were better than all "
+            "before), so no parameters are given."
+        )
+    text += f"{' or '.join([MODELS[row.model], *others])}."
+    if row.model not in LEARNERS:
+        return f"{text} Parameters of the learner do not apply."
+    numbers = [
+        f"{symbol} = {row[name]:.3f} [{row[f'{name}_low']:.3f}, {row[f'{name}_high']:.3f}]"
+        for symbol, name in (("σ", "sigma"), ("ε", "epsilon"), ("κ", "kappa"))
+        if name in row.index
+    ]
+    return f"{text} {', '.join(numbers)}."
+
+
+def main():
+    """Read a file, fit, and print a sentence for each subject."""
+    parser = argparse.ArgumentParser(description="Fit the learner to the trials of people.")
+    parser.add_argument("task", help="name or file of the task")
+    parser.add_argument("csv", help="file with a row for each hit")
+    parser.add_argument("--condition", choices=CONDITIONS, help="hands and explored joints")
+    parser.add_argument("--noise", type=float, default=0.0, help="SD of motor noise in postures")
+    parser.add_argument(
+        "--ticks-per-unit", type=float, default=1.0, help="ticks in a duration of 1"
+    )
+    parser.add_argument("--out", help="CSV file for all numbers")
+    given = parser.parse_args()
+    try:
+        task = load_task(given.task)
+        frame = read_hits(given.csv, task, ticks_per_unit=given.ticks_per_unit)
+        condition = CONDITIONS[given.condition] if given.condition else None
+        table = fit(frame, task, condition=condition, noise=given.noise)
+    except CoarticError as error:
+        raise SystemExit(f"error: {error}") from None
+    for _, row in table.iterrows():
+        print(sentence(row))
+    if given.out:
+        table.to_csv(given.out, index=False)
+
+
+if __name__ == "__main__":
+    main()
