@@ -29,8 +29,8 @@ NODES = (*DRIFTS[:3], 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0)
 SHORT = 0.1
 """Way, length unit and rad, below which a movement does not show what it aimed at."""
 ELSEWHERE = 0.02
-"""Probability of a hit that the landing of the mean target does not predict, because noise made the
-movement end in another goal crossing; its residual has an SD of 1."""
+"""Probability of a hit that the landing of the mean target does not predict, as
+noise can make a movement cross the goal at once or not; the residual then has an SD of 1."""
 
 
 def condition_for(task):
@@ -120,8 +120,8 @@ def landings(task, condition, trials, rows, kappas, plan, simulated):
     """Return residuals at drifts ``(K, m, dof)``, their dimensions ``(m,)`` and the shares of the
     movements that were made ``(K, m)``, for hits whose tables are in ``rows``.
 
-    ``simulated``: noise, drift and a generator, to simulate these hits in place of the recorded
-    ones; None for the recorded ones.
+    ``simulated``: noise, drift and a number N, to simulate these hits N times in place of the
+    recorded ones, for residuals of shape ``(N, K, m, dof)``; None for the recorded ones.
     """
     robot, explored = task.robot, explored_by(task, condition)
     trial, goal, hand = (rows[name].to_numpy() for name in ("trial", "goal", "hand"))
@@ -148,8 +148,11 @@ def landings(task, condition, trials, rows, kappas, plan, simulated):
 
     nearest = t if condition.modify_other else np.where(explored[hand], t, q)
     if simulated:
-        sigma, kappa, rng = simulated
-        y = land(nearest + kappa * d + sigma * explored[hand] * rng.standard_normal(t.shape)).q
+        sigma, kappa, count = simulated
+        noise = np.random.default_rng(0).standard_normal((count, *t.shape))
+        y = np.array(
+            [land(nearest + kappa * d + sigma * explored[hand] * each).q for each in noise]
+        )
     each = []
     for kappa in kappas:
         mean = nearest + kappa * d
@@ -159,6 +162,8 @@ def landings(task, condition, trials, rows, kappas, plan, simulated):
         free = null_space(landed.q)
         each.append(((free @ (y - landed.q)[..., None])[..., 0], share))
     residuals, shares = map(np.array, zip(*each, strict=True))
+    if simulated:
+        residuals = np.moveaxis(residuals, 1, 0)
     return residuals, np.trace(free, axis1=1, axis2=2).round(), shares
 
 
@@ -237,6 +242,11 @@ class Evidence(NamedTuple):
             scale = np.sqrt(covariance)
             z = residual / scale[:, None]
         return prior - (z**2).sum() / 2 - self.sizes @ np.log(np.sqrt(2 * np.pi) * scale)
+
+    def hands(self, epsilon):
+        """Return the logarithm of the likelihood of the choices of hands."""
+        chance = epsilon * self.explored + (1 - epsilon) * self.follows
+        return np.log(np.maximum(chance, 1e-9)).sum()
 
     def drawn(self, sigma, noise):
         """Return the logarithm of the likelihood if each trial draws its drift; with motor noise a

@@ -72,12 +72,29 @@ def bias(task, condition, trials, log_sigma, kappa):
 
     It is the mean error of estimates from hits simulated with the tables of the subject.
     """
-    estimates = []
-    for number in range(SIMULATED):
-        simulated = np.exp(log_sigma), kappa, np.random.default_rng(number)
-        evidence = evidence_in(task, condition, trials, "informed", None, simulated)
-        estimates.append(most_likely(evidence, 0.0)[0])
-    return np.mean(estimates, axis=0) - [log_sigma, kappa]
+    simulated = np.exp(log_sigma), kappa, SIMULATED
+    evidence = evidence_in(task, condition, trials, "informed", None, simulated)
+    each = [most_likely(evidence._replace(nodes=nodes), 0.0)[0] for nodes in evidence.nodes]
+    return np.mean(each, axis=0) - [log_sigma, kappa]
+
+
+def with_intervals(evidence, noise, log_sigma, kappa):
+    """Return σ and κ with the ends of their 95 % profile intervals, a dictionary."""
+
+    def value(log_sigma, kappa):
+        return evidence.log_likelihood(np.exp(log_sigma), kappa, noise)
+
+    def of_sigma(x):
+        return maximum(lambda y: value(x, y), kappa - 1, kappa + 1)[1]
+
+    def of_kappa(x):
+        return maximum(lambda y: value(y, x), log_sigma - 1, log_sigma + 1)[1]
+
+    sigmas = np.exp([log_sigma, *interval(of_sigma, log_sigma, 0.2, -12.0, 3.0)])
+    kappas = kappa, *interval(of_kappa, kappa, 0.1, -2.0, 4.0)
+    ends = ("", "_low", "_high")
+    numbers = {f"sigma{end}": each for end, each in zip(ends, sigmas, strict=True)}
+    return numbers | {f"kappa{end}": each for end, each in zip(ends, kappas, strict=True)}
 
 
 def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True):
@@ -91,46 +108,33 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
         evidence = evidence_in(task, condition, trials, model, plan)
         count = int(evidence.sizes.sum()) + len(evidence.follows)
         free, total = 1, 0.0
-
-        def hands(rate, of=evidence):
-            chance = rate * of.explored + (1 - rate) * of.follows
-            return np.log(np.maximum(chance, 1e-9)).sum()
-
-        def postures(log_sigma, kappa=0.0, of=evidence):
-            return of.log_likelihood(np.exp(log_sigma), kappa, noise)
-
         if len(condition.hands) > 1:
-            epsilon, total = maximum(hands, 0.0, 1.0)
+            epsilon, total = maximum(evidence.hands, 0.0, 1.0)
             free += 1
-        around = np.log(evidence.rough_sigma(0.0)) + [-3.0, 1.5]
-        if model == "drawn":
-            total += maximum(lambda x, of=evidence: of.drawn(np.exp(x), noise), *around)[1]
-        elif model != "informed":
-            total += maximum(postures, *around)[1]
-        else:
+        if model == "informed":
             (log_sigma, kappa), best = most_likely(evidence, noise)
-            total, free = total + best, free + 1
+            free += 1
             row |= {"sigma": np.exp(log_sigma), "kappa": kappa}
-            if len(condition.hands) > 1:
-                row["epsilon"] = epsilon
             if intervals:
-                ends = interval(
-                    lambda x: maximum(lambda y: postures(x, y), kappa - 1, kappa + 1)[1],
-                    log_sigma, 0.2, -12.0, 3.0,
-                )  # fmt: skip
-                row["sigma_low"], row["sigma_high"] = np.exp(ends)
-                row["kappa_low"], row["kappa_high"] = interval(
-                    lambda x: maximum(lambda y: postures(y, x), log_sigma - 1, log_sigma + 1)[1],
-                    kappa, 0.1, -2.0, 4.0,
-                )  # fmt: skip
+                row |= with_intervals(evidence, noise, log_sigma, kappa)
                 off = bias(task, condition, trials, log_sigma, kappa)
                 for end in ("", "_low", "_high"):
                     row[f"sigma{end}"] /= np.exp(off[0])
                     row[f"kappa{end}"] -= off[1]
-                if len(condition.hands) > 1:
-                    ends = interval(hands, epsilon, 0.1, 0.0, 1.0)
-                    row["epsilon_low"], row["epsilon_high"] = ends
-        row[f"bic_{model}"] = free * np.log(count) - 2 * total
+            if len(condition.hands) > 1:
+                row["epsilon"] = epsilon
+                ends = interval(evidence.hands, epsilon, 0.1, 0.0, 1.0)
+                row["epsilon_low"], row["epsilon_high"] = ends
+        else:
+            middle = np.log(evidence.rough_sigma(0.0))
+
+            def postures(log_sigma, of=evidence, model=model):
+                if model == "drawn":
+                    return of.drawn(np.exp(log_sigma), noise)
+                return of.log_likelihood(np.exp(log_sigma), 0.0, noise)
+
+            _, best = maximum(postures, middle - 3.0, middle + 1.5)
+        row[f"bic_{model}"] = free * np.log(count) - 2 * (total + best)
     return row
 
 
@@ -173,8 +177,10 @@ def fit(frame, task, *, condition=None, noise=0.0):
             "improved": int((np.diff(np.maximum.accumulate(rewards)) > 0).sum()),
         }  # fmt: skip
         if not (tables_before(task, condition, trials, "best").stored >= 0).any():
-            raise CoarticError(f"subject {subject}: no hit follows a complete trial, so nothing can "
-                               "be fitted; needed are two trials in which all goals are hit")  # fmt: skip
+            raise CoarticError(
+                f"subject {subject}: no hit follows a complete trial, so nothing can be fitted; "
+                "needed are two trials, the first with all goals"
+            )
         row |= fit_subject(task, condition, trials, noise=noise, plan=plan)
         model, others = judge(row)
         rows.append({**row, "model": model, "others": " ".join(others)})

@@ -7,8 +7,11 @@ import pandas as pd
 
 from coartic import CoarticError
 
-HALF_TURNS = 20.0
+LARGEST_ANGLE = 20.0
 """Angle, rad, beyond which a recorded angle is taken for degrees."""
+
+MOST_TRIALS = 100_000
+"""Largest number of a trial."""
 
 
 def read_hits(path, task, *, ticks_per_unit=1.0):
@@ -40,7 +43,7 @@ def read_hits(path, task, *, ticks_per_unit=1.0):
     except (OSError, ValueError) as error:
         raise CoarticError(f"{path} cannot be read as a CSV file: {error}") from None
     if "ticks" not in frame and "duration" in frame:
-        frame["ticks"] = frame.duration * ticks_per_unit
+        frame["ticks"] = (pd.to_numeric(frame.duration, errors="coerce") * ticks_per_unit).round(6)
     joints = [*task.robot.joint_names]
     needed = ["subject", "trial", "goal", "hand", "ticks", *joints]
     if missing := [name for name in needed if name not in frame]:
@@ -50,36 +53,36 @@ def read_hits(path, task, *, ticks_per_unit=1.0):
     def refuse(wrong, column, wanted):
         if wrong.any():
             row = int(np.flatnonzero(wrong)[0])
-            raise CoarticError(f"{path}, line {row + 2}: {column} is {frame[column].iloc[row]!r}; "
-                               f"{wanted}")  # fmt: skip
+            value = frame[column].tolist()[row]
+            raise CoarticError(f"{path}, line {row + 2}: {column} is {value!r}; {wanted}")
 
-    for name in needed[1:]:
-        if name != "hand":
-            frame[name], given = pd.to_numeric(frame[name], errors="coerce"), frame[name]
-            wrong = ~np.isfinite(frame[name])
-            frame[name] = frame[name].where(~wrong, given) if wrong.any() else frame[name]
-            refuse(wrong, name, "needed is a number; leave out the row of a hit that is missing")
+    for name in ["trial", "goal", "ticks", *joints]:
+        numbers = pd.to_numeric(frame[name], errors="coerce")
+        wanted = "needed is a number; leave out the row of a hit that is missing"
+        refuse(~np.isfinite(numbers), name, wanted)
+        frame[name] = numbers
     refuse(frame.subject.isna(), "subject", "needed is a name")
     refuse(~frame.hand.isin(task.hands), "hand", f"needed is {' or '.join(task.hands)}")
-    whole = (frame.trial % 1 == 0) & (frame.trial >= 1)
-    refuse(~whole, "trial", "needed is a whole number from 1")
+    is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, MOST_TRIALS)
+    refuse(~is_whole, "trial", f"needed is a whole number from 1 to {MOST_TRIALS}")
     last = len(task.goals)
     refuse(~frame.goal.isin(range(1, last + 1)), "goal", f"needed is a number from 1 to {last}")
     refuse(frame.ticks < 0, "ticks", "needed is 0 or more")
     twice = frame.duplicated(["subject", "trial", "goal"])
     refuse(twice, "goal", "this subject, trial and goal have a line above already")
     for name in joints[2:]:
-        wanted = f"angles are in rad (did you mean {np.radians(frame[name].abs().max()):.3g}?)"
-        refuse(
-            frame[name].abs() > HALF_TURNS, name, f"{wanted}: convert degrees with numpy.radians"
-        )
+        wanted = "angles are in rad: convert degrees with numpy.radians"
+        refuse(frame[name].abs() > LARGEST_ANGLE, name, wanted)
     off = np.zeros(len(frame))
     for hand in task.hands:
         rows = (frame.hand == hand).to_numpy()
         place = task.robot.forward_kinematics(frame.loc[rows, joints].to_numpy(), hand)
         off[rows] = np.linalg.norm(place - task.goal_array[frame.goal[rows] - 1], axis=1)
     if np.median(off) > 2 * task.radius:
-        warnings.warn(f"{path}: the hands are {np.median(off):.2g} length units from their goals in "
-                      "the median hit. Are the angles in rad, each measured from the link before, "
-                      f"and is the task {task.name!r}?", stacklevel=2)  # fmt: skip
+        warnings.warn(
+            f"{path}: in the median hit the hand is {np.median(off):.2g} length units from its "
+            "goal. Are the angles in rad, each measured from the link before, and is the task "
+            f"{task.name!r}?",
+            stacklevel=2,
+        )
     return frame[needed].sort_values(["subject", "trial", "goal"], ignore_index=True)

@@ -14,13 +14,15 @@ import os
 import sys
 import zlib
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from itertools import product
 from pathlib import Path
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a process for each core
 
-import numpy as np  # noqa: E402
-import pandas as pd  # noqa: E402
-from evidence import (  # noqa: E402
+import numpy as np
+import pandas as pd
+from evidence import (
     DRIFTS,
     condition_for,
     explored_by,
@@ -28,11 +30,11 @@ from evidence import (  # noqa: E402
     projection,
     trials_of,
 )
-from fit import MODELS, fit_subject  # noqa: E402
+from fit import MODELS, fit_subject
 
-from coartic import initial_hands, load_task  # noqa: E402
-from coartic.motion.trial import reach_goals  # noqa: E402
-from coartic.robot import HANDS  # noqa: E402
+from coartic import initial_hands, load_task
+from coartic.motion.trial import reach_goals
+from coartic.robot import HANDS
 
 
 def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, plan=None):
@@ -150,9 +152,9 @@ TRIALS = (100, 30, 300)
 DATA = {"complete": (0.0, 0.0), "noisy": (0.02, 0.0), "lossy": (0.0, 0.1)}
 """SD of motor noise in recorded postures (length unit and rad), and share of trials that are lost.
 The fit is given the SD."""
-REPEATS = 12
-"""Repeats on each of the paper's tasks with complete data; half of them with other data, one with
-noisy data of 300 trials. A random task has one, but no noisy data of 300 trials."""
+REPEATS = {"complete": 16, "lossy": 8, "noisy": 6}
+"""Repeats on each of the paper's tasks; one of noisy data of 300 trials. A random task has one of
+complete and of lossy data, and one of noisy data of 100 trials."""
 PEOPLE = (*MODELS, "informed")
 """Models of the people of a repeat."""
 
@@ -160,22 +162,26 @@ PEOPLE = (*MODELS, "informed")
 def cells():
     """Yield cells, a task with trials, data and the number of a repeat, those first that matter
     most."""
-    for repeat in range(REPEATS):
-        for trials in TRIALS:
-            for data in DATA:
-                is_slow = (data, trials) == ("noisy", 300)
-                if repeat < (1 if is_slow else 12 if data == "complete" else 6):
-                    yield from ((task, trials, data, repeat) for task in TASKS)
+    for repeat in range(max(REPEATS.values())):
+        for data, trials in product(REPEATS, TRIALS):
+            if repeat < (1 if (data, trials) == ("noisy", 300) else REPEATS[data]):
+                yield from ((task, trials, data, repeat) for task in TASKS)
         if repeat == 1:
-            yield from ((task, trials, data, 0) for trials in TRIALS for data in DATA
-                        for task in INSTANCES if (data, trials) != ("noisy", 300))  # fmt: skip
+            for data, trials in (*product(("complete", "lossy"), TRIALS), ("noisy", 100)):
+                yield from ((task, trials, data, 0) for task in INSTANCES)
+
+
+@cache
+def plan_of(name):
+    """Return :func:`evidence.plan_for` of a task by its name."""
+    return plan_for(load_task(name))
 
 
 def recover(cell):
     """Simulate people of every model, and fit them; a row for each."""
-    name, trials, data, repeat = cell
+    name, trials, data, _ = cell
     task, rows, (noise, lost) = load_task(name), [], DATA[data]
-    plan, seed = plan_for(task), zlib.crc32(repr(cell).encode())
+    plan, seed = plan_of(name), zlib.crc32(repr(cell).encode())
     for person, model in enumerate(PEOPLE):
         rng = np.random.default_rng([seed, person])
         sigma, epsilon = np.exp(rng.uniform(np.log(0.01), np.log(0.1))), rng.uniform(0.05, 0.5)

@@ -22,9 +22,10 @@ from coartic.tasks.task import hands_of
 ReferenceRun = namedtuple(
     "ReferenceRun",
     "rewards completed values targets movement_ticks corrections corrections_by_trial "
-    "corrective_iterations",
+    "corrective_iterations visits ticks_by_goal",
 )
-"""What the slow learner found; values and targets by state (goal, hand before) and hand."""
+"""What the slow learner found; values and targets by state (goal, hand before) and hand. By trial:
+``visits`` has state, hand and posture at each hit, ``ticks_by_goal`` the ticks for each goal."""
 
 
 def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PAPER, waypoints=()):
@@ -154,6 +155,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     completed = np.zeros(trials, dtype=np.bool_)
     ticks = corrections = iterations = 0
     by_trial = np.zeros(trials, dtype=np.int64)
+    visits, ticks_by_goal = [], []
     for trial in range(trials):
         drift = condition.drifts[0]
         if trial and len(condition.drifts) > 1:
@@ -206,6 +208,8 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
             visited.append((state, hand, q))
             subtasks.append(total - spent_before)
             previous = hand
+        visits.append(visited)
+        ticks_by_goal.append([-reward for reward in subtasks])
         rewards[trial] = total
         completed[trial] = len(visited) == len(task.goals)
         if completed[trial]:
@@ -224,8 +228,9 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
-        rewards, completed, values, targets, ticks, corrections, by_trial, iterations
-    )
+        rewards, completed, values, targets, ticks, corrections, by_trial, iterations, visits,
+        ticks_by_goal,
+    )  # fmt: skip
 
 
 def _choose(task, condition, q, goal, state, values, rng, model):
