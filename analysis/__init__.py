@@ -25,6 +25,7 @@ _MODULES = {
     "ranking": "analysis.frames",
     "separation": "analysis.frames",
     "shares": "analysis.frames",
+    "solutions_of": "analysis.frames",
     "runtimes": "analysis.sections.costs",
     "write_study": "analysis.pages",
 }

@@ -19,7 +19,9 @@ from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 from scipy.stats import mannwhitneyu
 
+from coartic import Execution, Movement, Task
 from coartic.analysis.optima import gap_share
+from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
@@ -419,3 +421,40 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
         steps = zip(*running_times.share_by_budget(times), strict=True)
         rows += [(method, *step) for step in steps]
     return pd.DataFrame(rows, columns=["method", "trials", "share"])
+
+
+def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
+    """Return recorded trials, of people for instance, as solutions for signatures.
+
+    Nothing is executed again: postures at hits and ticks are as recorded.
+
+    Parameters
+    ----------
+    task : Task
+        The task of the trials.
+    hits : DataFrame
+        A row for each hit: ``subject``, ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the
+        posture, a column for each of ``task.robot.joint_names``, length unit and rad.
+
+    Returns
+    -------
+    Solutions
+        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial.
+
+    Raises
+    ------
+    CoarticError
+        The frame has no rows, lacks a column, or has text or infinite numbers.
+    """
+    joints, runs = [*task.robot.joint_names], {}
+    numbers = ("trial", "goal", "ticks", *joints)
+    columns = checked(hits, numbers=numbers, names=("subject", "hand"))
+    for (subject, trial), rows in columns.groupby(["subject", "trial"], sort=False):
+        ordered = rows.sort_values("goal")
+        if ordered.goal.tolist() == [*range(1, len(task.goals) + 1)]:
+            postures, ticks = ordered[joints].to_numpy(), ordered.ticks.astype(int).tolist()
+            each = zip(ordered.hand, postures, ticks, strict=True)
+            movements = tuple(Movement(g, hand, "learned", q, n)
+                              for g, (hand, q, n) in enumerate(each, 1))  # fmt: skip
+            runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
+    return Solutions(task, "recorded", tuple(runs.values()), tuple(runs))

@@ -5,10 +5,12 @@ import struct
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from coartic import CONDITIONS, Movement, Task, corrective_trial, execute, learn, load_task
+from coartic.analysis import solutions_of
 from coartic.analysis.signatures.context_tests import standardised_posture_difference
 from coartic.baselines.random_search import RandomSearch
 from coartic.motion.solution import hand_sequences, initial_hands
@@ -222,6 +224,14 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     done = execute("two-armed-1", movements)
     assert done.hands == "LLLR"
     assert ticks(page, "You") == done.ticks
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save your trials").click()
+    trials = pd.read_csv(download.value.path())
+    assert trials.trial.max() == 3  # a drag, a hand, a key; the other key moves nothing
+    task = load_task("two-armed-1")
+    last = solutions_of(task, trials).runs[-1]
+    assert last.ticks_by_goal() == done.ticks_by_goal()
+    assert np.allclose(last.configurations, done.configurations)
     comes_back(page)
 
 

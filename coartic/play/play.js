@@ -834,6 +834,7 @@ class Play {
     ["trials", "tick"].forEach((name) => on(name, "change", () => this.keep()));
     on("png", "click", () => this.save());
     on("link", "click", () => this.copyLink());
+    on("trials-csv", "click", () => this.download(new Blob([this.csv], { type: "text/csv" }), "trials.csv"));
   }
 
   /* A place for one more goal of a list: the one that is wished for, or a stride from the last in some direction; in
@@ -868,6 +869,7 @@ class Play {
     [state.tick, state.trials] = [state.tick, state.trials].map(Math.round);
     this.find("more").open = Boolean(state.open);
     this.results.clear();
+    this.made = [];
     this.box = null;
     this.view = null;
     this.playing = false;
@@ -922,6 +924,23 @@ class Play {
 
   keep() {
     this.data.keep(this.link);
+    if (!this.state.own) this.made = [];
+    else if (this.editing) this.note();
+  }
+
+  /* A posture has been placed, or a hand chosen: one more trial of yours. */
+  note() {
+    const [{ trial }] = this.main;
+    const ticks = trial.hands.map((_, goal) => trial.movements.reduce((sum, movement) => sum + (movement.goal === goal ? movement.ticks : 0), 0));
+    const hits = trial.hands.map((hand, goal) => [goal + 1, HANDS[hand], ticks[goal], ...trial.reached[goal]]);
+    if (!same(this.made.at(-1) || null, hits)) this.made.push(hits);
+  }
+
+  /* Your trials, a row a hit: the format of studies/fit. */
+  get csv() {
+    const joints = this.problems[0].arms.flatMap(({ links }, hand) => links.map((_, k) => `${HANDS[hand]}_${k + 1}`));
+    const rows = this.made.flatMap((hits, trial) => hits.map((hit) => ["you", trial + 1, ...hit]));
+    return [["subject", "trial", "goal", "hand", "ticks", "base_x", "base_y", ...joints], ...rows].map((row) => `${row}\n`).join("");
   }
 
   /* Show a stored run from its beginning, as a cell of a table asks for it. */
@@ -968,10 +987,12 @@ class Play {
     lines.forEach((line, k) => picture.text(line, [24, 2 * height + 32 + 40 * k], colours.ink, "left", 28));
     stage.density = 0;
     this.draw();
-    canvas.toBlob((blob) => {
-      const address = URL.createObjectURL(blob);
-      Object.assign(document.createElement("a"), { href: address, download: "coartic.png" }).click();
-      setTimeout(() => URL.revokeObjectURL(address), 60000);
-    });
+    canvas.toBlob((blob) => this.download(blob, "coartic.png"));
+  }
+
+  download(blob, file) {
+    const address = URL.createObjectURL(blob);
+    Object.assign(document.createElement("a"), { href: address, download: file }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 60000);
   }
 }

@@ -15,7 +15,6 @@ import sys
 import zlib
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from itertools import product
 from pathlib import Path
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a process for each core
@@ -148,27 +147,28 @@ def explored_hand(task, condition, q, goal, known, rng):
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 INSTANCES = [f"{family}/v1/i{number:03d}" for number in range(4) for family in FAMILIES]
-TRIALS = (100, 30, 300)
 DATA = {"complete": (0.0, 0.0), "noisy": (0.02, 0.0), "lossy": (0.0, 0.1)}
 """SD of motor noise in recorded postures (length unit and rad), and share of trials that are lost.
 The fit is given the SD."""
-REPEATS = {"complete": 16, "lossy": 8, "noisy": 6}
-"""Repeats on each of the paper's tasks; one of noisy data of 300 trials. A random task has one of
-complete and of lossy data, and one of noisy data of 100 trials."""
+PLAN = (
+    (TASKS, "complete", 100, 6), (INSTANCES, "complete", 100, 1), (TASKS, "noisy", 100, 3),
+    (TASKS, "lossy", 100, 4), (TASKS, "complete", 30, 6), (TASKS, "complete", 300, 4),
+    (TASKS, "complete", 100, 12), (INSTANCES, "complete", 30, 1), (TASKS, "lossy", 30, 4),
+    (TASKS, "noisy", 30, 4), (INSTANCES, "lossy", 100, 1), (TASKS, "lossy", 300, 4),
+    (INSTANCES, "noisy", 100, 1), (INSTANCES, "complete", 300, 1), (TASKS, "noisy", 300, 1),
+    (TASKS, "complete", 30, 12), (TASKS, "noisy", 100, 6), (TASKS, "complete", 300, 8),
+    (TASKS, "lossy", 100, 8),
+)  # fmt: skip
+"""Tasks, data, trials and repeats, those first that matter most."""
 PEOPLE = (*MODELS, "informed")
 """Models of the people of a repeat."""
 
 
 def cells():
-    """Yield cells, a task with trials, data and the number of a repeat, those first that matter
-    most."""
-    for repeat in range(max(REPEATS.values())):
-        for data, trials in product(REPEATS, TRIALS):
-            if repeat < (1 if (data, trials) == ("noisy", 300) else REPEATS[data]):
-                yield from ((task, trials, data, repeat) for task in TASKS)
-        if repeat == 1:
-            for data, trials in (*product(("complete", "lossy"), TRIALS), ("noisy", 100)):
-                yield from ((task, trials, data, 0) for task in INSTANCES)
+    """Return cells: a task, a number of trials, data and the number of a repeat."""
+    every = ((task, trials, data, repeat) for tasks, data, trials, repeats in PLAN
+             for repeat in range(repeats) for task in tasks)  # fmt: skip
+    return [*dict.fromkeys(every)]
 
 
 @cache

@@ -1,7 +1,5 @@
 """Study fit: the reader, the simulator, and fits of people whom other code simulates."""
 
-import importlib.util
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,34 +8,28 @@ import pandas as pd
 import pytest
 
 from coartic import CONDITIONS, CoarticError, learn, load_task
+from coartic.analysis import SIGNATURES, solutions_of
+from coartic.analysis.solutions import Solutions
 from tests.support import reference
+from tests.support.processes import program
 
 FOLDER = Path(__file__).parents[3] / "studies" / "fit"
 TASK = load_task("two-armed-1")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _folder_of_the_study():
-    sys.path.insert(0, str(FOLDER))
-    yield
-    sys.path.remove(str(FOLDER))
-
-
-def program(name):
-    spec = importlib.util.spec_from_file_location(f"fit_{name}", FOLDER / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@pytest.fixture(scope="module")
+def simulate():
+    return program(FOLDER / "protocols.py").simulate
 
 
 @pytest.fixture(scope="module")
-def simulate(_folder_of_the_study):
-    return program("protocols").simulate
+def fit():
+    return program(FOLDER / "fit.py")
 
 
 @pytest.fixture(scope="module")
-def fit(_folder_of_the_study):
-    return program("fit")
+def read():
+    return program(FOLDER / "hits.py").read_hits
 
 
 @pytest.fixture(scope="module")
@@ -54,9 +46,8 @@ def by_reference(task, condition, trials, seed):
         for trial, (visited, spent) in enumerate(zip(run.visits, run.ticks_by_goal, strict=True), 1)
         for goal, ((_, hand, q), ticks) in enumerate(zip(visited, spent, strict=True), 1)
     ]
-    return pd.DataFrame(
-        rows, columns=["subject", "trial", "goal", "hand", "ticks", *task.robot.joint_names]
-    )
+    names = ["subject", "trial", "goal", "hand", "ticks", *task.robot.joint_names]
+    return pd.DataFrame(rows, columns=names)
 
 
 @pytest.mark.parametrize(("name", "condition"), [("ascending", "EC1"), ("two-armed-1", "EC2")])
@@ -110,6 +101,19 @@ def test_where_two_models_explain_the_trials_no_parameters_are_given(fit, simula
     assert "κ" not in fit.sentence(found)
 
 
+def test_signatures_of_recorded_trials_are_of_what_was_recorded(simulate):
+    task = load_task("two-armed-2")
+    people = simulate(task, "best", 0.05, 0.2, seeds=[4], trials=20)
+    run = learn(task, "EC4", seed=4, trials=20)
+    recorded = solutions_of(task, people)
+    best = Solutions(task, "learner", (run.execute(),))
+    for signature in SIGNATURES.values():
+        assert signature.each(recorded)[run.best_trial] == pytest.approx(
+            signature.each(best)[0], nan_ok=True
+        )
+    assert len(solutions_of(task, people.drop(index=[0, 5])).runs) == 18
+
+
 def test_lost_trials_and_hits_are_counted(fit, people):
     first = people[people.subject == 0]
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
@@ -132,14 +136,14 @@ WRONG = {
 
 
 @pytest.mark.parametrize("sentence", WRONG)
-def test_reader_says_what_is_wrong_and_where(people, tmp_path, sentence):
+def test_reader_says_what_is_wrong_and_where(read, people, tmp_path, sentence):
     WRONG[sentence](people).to_csv(tmp_path / "people.csv", index=False)
     with pytest.raises(CoarticError, match=sentence):
-        program("hits").read_hits(tmp_path / "people.csv", TASK)
+        read(tmp_path / "people.csv", TASK)
 
 
-def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
-    path, read = tmp_path / "people.csv", program("hits").read_hits
+def test_reader_takes_durations_and_warns_of_small_degrees(read, people, tmp_path):
+    path = tmp_path / "people.csv"
     timed = people.rename(columns={"ticks": "duration"})
     timed.assign(duration=timed.duration / 100).to_csv(path, index=False)
     assert read(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
