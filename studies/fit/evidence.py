@@ -58,8 +58,8 @@ def plan_for(task):
 def projection(jacobian, explored):
     """Return the projection N = I − J⁺J over the explored joints, shape ``(..., dof, dof)``."""
     among = np.where(explored[..., None, :], jacobian, 0.0)
-    identity = np.eye(explored.shape[-1]) * explored[..., None, :]
-    return identity - np.linalg.pinv(among, rcond=1e-6) @ among
+    gram = np.linalg.pinv(among @ among.mT, rcond=1e-12, hermitian=True)
+    return np.eye(explored.shape[-1]) * explored[..., None, :] - among.mT @ gram @ among
 
 
 # ---- What the tables say before each hit ----
@@ -272,10 +272,9 @@ class Evidence(NamedTuple):
                 - self.sizes.sum() * np.log(2 * np.pi) / 2)  # fmt: skip
 
 
-def evidence_in(task, condition, trials, model, plan, simulated=None):
-    """Return the evidence on a model in the trials of a subject."""
-    rule = {"walk": "walk", "memoryless": "memoryless", "planner": "memoryless"}.get(model, "best")
-    plan = plan if model == "planner" else None
+def evidence_in(task, condition, trials, rule, plan=None, simulated=None):
+    """Return the evidence on models with a rule of :func:`tables_before` in the trials of a
+    subject; ``plan`` replaces tables where it has the hand."""
     rows = tables_before(task, condition, trials, rule)
     q = starts(task, trials, rows)
     follows = (rows.hand == (plan[0][rows.goal] if plan else rows.greedy)).to_numpy()
@@ -286,7 +285,7 @@ def evidence_in(task, condition, trials, model, plan, simulated=None):
         explored = (far.argmin(axis=0) == rows.hand).to_numpy(float)
     way = np.linalg.norm(trials.postures[rows.trial, rows.goal] - q, axis=1)
     rows = rows[(rows.stored >= 0) & (way > SHORT)]
-    kappas = NODES if model in ("informed", "drawn") else NODES[:1]
+    kappas = NODES if rule == "best" else NODES[:1]
     nodes, sizes, shares = landings(task, condition, trials, rows, kappas, plan, simulated)
     trial, goal, following = (rows[name].to_numpy() for name in ("trial", "goal", "following"))
     stored, count = rows.stored.to_numpy(), len(task.goals)

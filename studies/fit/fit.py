@@ -27,7 +27,6 @@ MODELS = {
 LEARNERS = ("best", "informed", "drawn")
 CLEAR = 6.0
 """Difference in BIC from which a model is preferred ("strong" in Kass & Raftery 1995)."""
-
 SIMULATED = 8
 """Number of simulations from which the bias of an estimate is found."""
 
@@ -73,7 +72,7 @@ def bias(task, condition, trials, log_sigma, kappa):
     It is the mean error of estimates from hits simulated with the tables of the subject.
     """
     simulated = np.exp(log_sigma), kappa, SIMULATED
-    evidence = evidence_in(task, condition, trials, "informed", None, simulated)
+    evidence = evidence_in(task, condition, trials, "best", None, simulated)
     each = [most_likely(evidence._replace(nodes=nodes), 0.0)[0] for nodes in evidence.nodes]
     return np.mean(each, axis=0) - [log_sigma, kappa]
 
@@ -105,7 +104,10 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
     """
     row, plan = {}, plan or plan_for(task)
     for model in MODELS:
-        evidence = evidence_in(task, condition, trials, model, plan)
+        if model not in LEARNERS[1:]:  # which have the same tables
+            rule = "memoryless" if model == "planner" else model
+            planned = plan if model == "planner" else None
+            evidence = evidence_in(task, condition, trials, rule, planned)
         count = int(evidence.sizes.sum()) + len(evidence.follows)
         free, total = 1, 0.0
         if len(condition.hands) > 1:
@@ -189,24 +191,30 @@ def fit(frame, task, *, condition=None, noise=0.0):
 
 def sentence(row):
     """Return what a row of :func:`fit` says, in words."""
-    others = [MODELS[name] for name in row.others.split()]
-    lost = f"{row.lost} lost, {row.missing} hits missing"
-    text = f"{row.subject} ({row.trials} trials, {lost}): "
-    if others and not {row.model, *row.others.split()} <= {*LEARNERS}:
-        return (
-            f"{text}these trials cannot distinguish {MODELS[row.model]} from {', '.join(others)} "
-            f"(difference in BIC below {CLEAR:g}; {row.improved} trials were better than all "
-            "before), so no parameters are given."
+    alike, names = [row.model, *row.others.split()], [*MODELS]
+    text = (
+        f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
+        f"{row.missing}): "
+    )
+    if {*alike} <= {*LEARNERS} or len(alike) == 1:
+        behind = min(row[f"bic_{name}"] for name in names if name not in alike)
+        text += (
+            f"{' or '.join(MODELS[name] for name in alike)} (other models: BIC higher by "
+            f"{behind - row[f'bic_{row.model}']:.0f} or more)"
         )
-    text += f"{' or '.join([MODELS[row.model], *others])}."
-    if row.model not in LEARNERS:
-        return f"{text} Parameters of the learner do not apply."
-    numbers = [
-        f"{symbol} = {row[name]:.3f} [{row[f'{name}_low']:.3f}, {row[f'{name}_high']:.3f}]"
-        for symbol, name in (("σ", "sigma"), ("ε", "epsilon"), ("κ", "kappa"))
-        if name in row.index
-    ]
-    return f"{text} {', '.join(numbers)}."
+        if row.model not in LEARNERS:
+            return f"{text}. Parameters of the learner do not apply."
+        numbers = [
+            f"{symbol} = {row[name]:.3f} [{row[f'{name}_low']:.3f}, {row[f'{name}_high']:.3f}]"
+            for symbol, name in (("σ", "sigma"), ("ε", "epsilon"), ("κ", "kappa"))
+            if name in row.index
+        ]
+        return f"{text}. {', '.join(numbers)}."
+    return (
+        f"{text}these trials cannot distinguish {'; '.join(MODELS[name] for name in alike)} "
+        f"(differences in BIC below {CLEAR:g}), so no parameters are given. Trials better than all "
+        f"before: {row.improved}."
+    )
 
 
 def main():

@@ -66,7 +66,11 @@ def read_hits(path, task, *, ticks_per_unit=1.0):
     is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, MOST_TRIALS)
     refuse(~is_whole, "trial", f"needed is a whole number from 1 to {MOST_TRIALS}")
     last = len(task.goals)
-    refuse(~frame.goal.isin(range(1, last + 1)), "goal", f"needed is a number from 1 to {last}")
+    refuse(
+        ~frame.goal.isin(range(1, last + 1)),
+        "goal",
+        f"needed is a number from 1 to {last}",
+    )
     refuse(frame.ticks < 0, "ticks", "needed is 0 or more")
     twice = frame.duplicated(["subject", "trial", "goal"])
     refuse(twice, "goal", "this subject, trial and goal have a line above already")

@@ -21,14 +21,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a process for each core
 
 import numpy as np
 import pandas as pd
-from evidence import (
-    DRIFTS,
-    condition_for,
-    explored_by,
-    plan_for,
-    projection,
-    trials_of,
-)
+from evidence import DRIFTS, condition_for, explored_by, plan_for, projection, trials_of
 from fit import MODELS, fit_subject
 
 from coartic import initial_hands, load_task
@@ -147,17 +140,20 @@ def explored_hand(task, condition, q, goal, known, rng):
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 INSTANCES = [f"{family}/v1/i{number:03d}" for number in range(4) for family in FAMILIES]
-DATA = {"complete": (0.0, 0.0), "noisy": (0.02, 0.0), "lossy": (0.0, 0.1)}
-"""SD of motor noise in recorded postures (length unit and rad), and share of trials that are lost.
-The fit is given the SD."""
+DATA = {
+    "complete": (0.0, 0.0, 0.0), "lossy": (0.0, 0.1, 0.0), "noisy": (0.02, 0.0, 0.02),
+    "ignored": (0.02, 0.0, 0.0),
+}  # fmt: skip
+"""SD of motor noise in recorded postures (length unit and rad), share of trials that are lost, and
+the SD that the fit is given."""
 PLAN = (
     (TASKS, "complete", 100, 6), (INSTANCES, "complete", 100, 1), (TASKS, "noisy", 100, 3),
-    (TASKS, "lossy", 100, 4), (TASKS, "complete", 30, 6), (TASKS, "complete", 300, 4),
-    (TASKS, "complete", 100, 12), (INSTANCES, "complete", 30, 1), (TASKS, "lossy", 30, 4),
-    (TASKS, "noisy", 30, 4), (INSTANCES, "lossy", 100, 1), (TASKS, "lossy", 300, 4),
-    (INSTANCES, "noisy", 100, 1), (INSTANCES, "complete", 300, 1), (TASKS, "noisy", 300, 1),
-    (TASKS, "complete", 30, 12), (TASKS, "noisy", 100, 6), (TASKS, "complete", 300, 8),
-    (TASKS, "lossy", 100, 8),
+    (TASKS, "lossy", 100, 4), (TASKS, "ignored", 100, 4), (TASKS, "complete", 30, 6),
+    (TASKS, "complete", 300, 4), (TASKS, "complete", 100, 12), (INSTANCES, "complete", 30, 1),
+    (TASKS, "lossy", 30, 4), (TASKS, "noisy", 30, 4), (INSTANCES, "lossy", 100, 1),
+    (TASKS, "lossy", 300, 4), (INSTANCES, "noisy", 100, 1), (INSTANCES, "complete", 300, 1),
+    (TASKS, "noisy", 300, 1), (TASKS, "complete", 30, 12), (TASKS, "noisy", 100, 6),
+    (TASKS, "complete", 300, 8), (TASKS, "lossy", 100, 8),
 )  # fmt: skip
 """Tasks, data, trials and repeats, those first that matter most."""
 PEOPLE = (*MODELS, "informed")
@@ -180,11 +176,14 @@ def plan_of(name):
 def recover(cell):
     """Simulate people of every model, and fit them; a row for each."""
     name, trials, data, _ = cell
-    task, rows, (noise, lost) = load_task(name), [], DATA[data]
+    task, rows, (noise, lost, given) = load_task(name), [], DATA[data]
     plan, seed = plan_of(name), zlib.crc32(repr(cell).encode())
     for person, model in enumerate(PEOPLE):
         rng = np.random.default_rng([seed, person])
-        sigma, epsilon = np.exp(rng.uniform(np.log(0.01), np.log(0.1))), rng.uniform(0.05, 0.5)
+        sigma, epsilon = (
+            np.exp(rng.uniform(np.log(0.01), np.log(0.1))),
+            rng.uniform(0.05, 0.5),
+        )
         kappa = rng.uniform(0.0, 1.0) if model == "informed" else 0.0
         frame = simulate(task, model, sigma, epsilon, kappa, seeds=[[seed, person, 1]],
                          trials=trials, plan=plan)  # fmt: skip
@@ -196,7 +195,7 @@ def recover(cell):
         row = dict(zip(("task", "trials", "data", "repeat", "person", "true"),
                        (*cell, person, model), strict=True))  # fmt: skip
         try:
-            found = fit_subject(task, condition_for(task), there, noise=noise, plan=plan,
+            found = fit_subject(task, condition_for(task), there, noise=given, plan=plan,
                                 intervals=model in ("best", "informed"))  # fmt: skip
         except np.linalg.LinAlgError:
             found = {}
