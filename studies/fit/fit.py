@@ -209,7 +209,8 @@ def sentence(row):
             for symbol, name in (("σ", "sigma"), ("ε", "epsilon"), ("κ", "kappa"))
             if name in row.index
         ]
-        return f"{text}. {', '.join(numbers)}."
+        hidden = " A lost trial may have been the best: the intervals can be too narrow."
+        return f"{text}. {', '.join(numbers)}.{hidden if row.lost + row.missing else ''}"
     return (
         f"{text}these trials cannot distinguish {'; '.join(MODELS[name] for name in alike)} "
         f"(differences in BIC below {CLEAR:g}), so no parameters are given. Trials better than all "

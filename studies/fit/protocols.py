@@ -147,13 +147,14 @@ DATA = {
 """SD of motor noise in recorded postures (length unit and rad), share of trials that are lost, and
 the SD that the fit is given."""
 PLAN = (
-    (TASKS, "complete", 100, 6), (INSTANCES, "complete", 100, 1), (TASKS, "noisy", 100, 3),
-    (TASKS, "lossy", 100, 4), (TASKS, "ignored", 100, 4), (TASKS, "complete", 30, 6),
-    (TASKS, "complete", 300, 4), (TASKS, "complete", 100, 12), (INSTANCES, "complete", 30, 1),
-    (TASKS, "lossy", 30, 4), (TASKS, "noisy", 30, 4), (INSTANCES, "lossy", 100, 1),
-    (TASKS, "lossy", 300, 4), (INSTANCES, "noisy", 100, 1), (INSTANCES, "complete", 300, 1),
-    (TASKS, "noisy", 300, 1), (TASKS, "complete", 30, 12), (TASKS, "noisy", 100, 6),
-    (TASKS, "complete", 300, 8), (TASKS, "lossy", 100, 8),
+    (TASKS, "complete", 100, 6), (TASKS, "complete", 30, 3), (TASKS, "lossy", 100, 2),
+    (TASKS, "ignored", 100, 1), (TASKS, "noisy", 100, 1), (TASKS, "complete", 300, 1),
+    (INSTANCES, "complete", 100, 1), (TASKS, "lossy", 100, 4), (TASKS, "complete", 30, 6),
+    (TASKS, "complete", 300, 3), (TASKS, "ignored", 100, 3), (TASKS, "noisy", 100, 3),
+    (INSTANCES, "complete", 30, 1), (TASKS, "complete", 100, 12), (INSTANCES, "lossy", 100, 1),
+    (TASKS, "lossy", 30, 4), (TASKS, "noisy", 30, 4), (TASKS, "lossy", 300, 3),
+    (INSTANCES, "complete", 300, 1), (TASKS, "complete", 300, 6), (TASKS, "complete", 30, 12),
+    (TASKS, "noisy", 300, 1), (INSTANCES, "noisy", 100, 1),
 )  # fmt: skip
 """Tasks, data, trials and repeats, those first that matter most."""
 PEOPLE = (*MODELS, "informed")

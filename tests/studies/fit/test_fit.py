@@ -14,28 +14,14 @@ from tests.support import reference
 from tests.support.processes import program
 
 FOLDER = Path(__file__).parents[3] / "studies" / "fit"
+PROTOCOLS, FIT, STUDY = (program(FOLDER / f"{name}.py") for name in ("protocols", "fit", "study"))
 TASK = load_task("two-armed-1")
 
 
 @pytest.fixture(scope="module")
-def simulate():
-    return program(FOLDER / "protocols.py").simulate
-
-
-@pytest.fixture(scope="module")
-def fit():
-    return program(FOLDER / "fit.py")
-
-
-@pytest.fixture(scope="module")
-def read():
-    return program(FOLDER / "hits.py").read_hits
-
-
-@pytest.fixture(scope="module")
-def people(simulate):
+def people():
     """Two people, of whom the second is uninformed."""
-    return simulate(TASK, "informed", 0.04, 0.3, [0.4, 0.0], seeds=[1, 2], trials=60)
+    return PROTOCOLS.simulate(TASK, "informed", 0.04, 0.3, [0.4, 0.0], seeds=[1, 2], trials=60)
 
 
 def by_reference(task, condition, trials, seed):
@@ -51,8 +37,8 @@ def by_reference(task, condition, trials, seed):
 
 
 @pytest.mark.parametrize(("name", "condition"), [("ascending", "EC1"), ("two-armed-1", "EC2")])
-def test_the_simulated_learner_is_the_packages(simulate, name, condition):
-    people = simulate(load_task(name), "best", 0.05, 0.2, seeds=[7, 8], trials=30,
+def test_the_simulated_learner_is_the_packages(name, condition):
+    people = PROTOCOLS.simulate(load_task(name), "best", 0.05, 0.2, seeds=[7, 8], trials=30,
                       condition=CONDITIONS[condition])  # fmt: skip
     for number, seed in enumerate((7, 8)):
         of_person = people[people.subject == number]
@@ -60,50 +46,50 @@ def test_the_simulated_learner_is_the_packages(simulate, name, condition):
         assert (of_person.groupby("trial").ticks.sum() == -run.rewards).all()
 
 
-def test_parameters_of_the_plain_learner_are_found(fit):
+def test_parameters_of_the_plain_learner_are_found():
     """Its movements, tables and null spaces share no code with the package's kernels."""
     truth = {"sigma": 0.03, "epsilon": 0.25, "kappa": 0.5}
     fields = {"noise_sd": 0.03, "epsilon": 0.25, "drift": 0.5}
     people = by_reference(TASK, replace(CONDITIONS["EC4"], **fields), 60, seed=5)
-    ((_, found),) = fit.fit(people, TASK).iterrows()
+    ((_, found),) = FIT.fit(people, TASK).iterrows()
     assert (found.model, found.others) == ("informed", "")
     for name, value in truth.items():
         assert found[f"{name}_low"] < value < found[f"{name}_high"]
     assert found.kappa_high - found.kappa_low < 0.1
-    assert "κ = 0." in fit.sentence(found)
+    assert "κ = 0." in FIT.sentence(found)
 
 
 @pytest.mark.parametrize("model", ["best", "drawn", "walk", "memoryless", "planner"])
-def test_model_of_simulated_people_is_preferred(fit, simulate, model):
-    people = simulate(TASK, model, 0.04, 0.3, seeds=[3], trials=60)
-    ((_, found),) = fit.fit(people, TASK).iterrows()
+def test_model_of_simulated_people_is_preferred(model):
+    people = PROTOCOLS.simulate(TASK, model, 0.04, 0.3, seeds=[3], trials=60)
+    ((_, found),) = FIT.fit(people, TASK).iterrows()
     assert found.model == model
-    assert ("do not apply" in fit.sentence(found)) == (model not in fit.LEARNERS)
+    assert ("do not apply" in FIT.sentence(found)) == (model not in FIT.LEARNERS)
 
 
-def test_motor_noise_is_a_parameter(fit, people):
+def test_motor_noise_is_a_parameter(people):
     noisy, joints = people[people.subject == 0].copy(), [*TASK.robot.joint_names]
     noisy[joints] += 0.03 * np.random.default_rng(0).standard_normal((len(noisy), len(joints)))
-    trials = fit.trials_of(noisy, TASK)
-    given, ignored = (fit.fit_subject(TASK, CONDITIONS["EC4"], trials, noise=noise, intervals=False)
+    trials = FIT.trials_of(noisy, TASK)
+    given, ignored = (FIT.fit_subject(TASK, CONDITIONS["EC4"], trials, noise=noise)
                       for noise in (0.03, 0.0))  # fmt: skip
     assert ignored["sigma"] > 0.046
     assert given["sigma"] == pytest.approx(0.04, rel=0.1)
     assert given["kappa"] == pytest.approx(0.4, abs=0.05)
 
 
-def test_where_two_models_explain_the_trials_no_parameters_are_given(fit, simulate):
+def test_where_two_models_explain_the_trials_no_parameters_are_given():
     """A learner that has found nothing better is one without memory."""
-    people = simulate(load_task("ascending"), "best", 0.05, 0.2, seeds=[2], trials=12)
-    ((_, found),) = fit.fit(people, load_task("ascending")).iterrows()
+    people = PROTOCOLS.simulate(load_task("ascending"), "best", 0.05, 0.2, seeds=[2], trials=12)
+    ((_, found),) = FIT.fit(people, load_task("ascending")).iterrows()
     assert {"best", "memoryless"} <= {found.model, *found.others.split()}
-    assert "cannot distinguish" in fit.sentence(found)
-    assert "κ" not in fit.sentence(found)
+    assert "cannot distinguish" in FIT.sentence(found)
+    assert "κ" not in FIT.sentence(found)
 
 
-def test_signatures_of_recorded_trials_are_of_what_was_recorded(simulate):
+def test_signatures_of_recorded_trials_are_of_what_was_recorded():
     task = load_task("two-armed-2")
-    people = simulate(task, "best", 0.05, 0.2, seeds=[4], trials=20)
+    people = PROTOCOLS.simulate(task, "best", 0.05, 0.2, seeds=[4], trials=20)
     run = learn(task, "EC4", seed=4, trials=20)
     recorded = solutions_of(task, people)
     best = Solutions(task, "learner", (run.execute(),))
@@ -114,13 +100,13 @@ def test_signatures_of_recorded_trials_are_of_what_was_recorded(simulate):
     assert len(solutions_of(task, people.drop(index=[0, 5])).runs) == 18
 
 
-def test_lost_trials_and_hits_are_counted(fit, people):
+def test_lost_trials_and_hits_are_counted(people):
     first = people[people.subject == 0]
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
-    ((_, found),) = fit.fit(kept, TASK).iterrows()
+    ((_, found),) = FIT.fit(kept, TASK).iterrows()
     assert (found.trials, found.lost, found.missing) == (60, 2, 2)
     with pytest.raises(CoarticError, match="two trials"):
-        fit.fit(first[first.trial == 1], TASK)
+        FIT.fit(first[first.trial == 1], TASK)
 
 
 WRONG = {
@@ -136,18 +122,40 @@ WRONG = {
 
 
 @pytest.mark.parametrize("sentence", WRONG)
-def test_reader_says_what_is_wrong_and_where(read, people, tmp_path, sentence):
+def test_reader_says_what_is_wrong_and_where(people, tmp_path, sentence):
     WRONG[sentence](people).to_csv(tmp_path / "people.csv", index=False)
     with pytest.raises(CoarticError, match=sentence):
-        read(tmp_path / "people.csv", TASK)
+        FIT.read_hits(tmp_path / "people.csv", TASK)
 
 
-def test_reader_takes_durations_and_warns_of_small_degrees(read, people, tmp_path):
+def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
     path = tmp_path / "people.csv"
     timed = people.rename(columns={"ticks": "duration"})
     timed.assign(duration=timed.duration / 100).to_csv(path, index=False)
-    assert read(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
+    assert FIT.read_hits(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
     angles = [name for name in people if name[-1].isdigit()]
     people.assign(**np.degrees(people[angles] / 10)).to_csv(path, index=False)
     with pytest.warns(UserWarning, match="Are the angles in rad"):
-        read(path, TASK)
+        FIT.read_hits(path, TASK)
+
+
+def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
+    example = FOLDER / "example.csv"
+    monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", str(example)])
+    FIT.main()
+    page = (FOLDER.parents[1] / "docs" / "howto" / "people.md").read_text("utf-8")
+    assert all(line in page for line in capsys.readouterr().out.splitlines())
+    assert example.stat().st_size < 30_000
+
+
+def test_tables_count_whom_the_fit_recovers():
+    cells = [("two-armed-1", 30, "complete", repeat) for repeat in (0, 1)]
+    people = STUDY.measure_people(pd.concat(map(PROTOCOLS.recover, cells)))
+    row = STUDY.tabulate(people).loc["two-armed-1 30 complete"]
+    assert (row.people, row.informed, row.best) == (14, 4, 2)
+    assert row.right == (people.model == people.true).mean() >= 12 / 14
+    informed = people[people.true == "informed"]
+    assert row.kappa_bias == pytest.approx((informed.kappa - informed.true_kappa).mean())
+    walks = people[people.true == "walk"].model.tolist()
+    confusion = STUDY.confuse(people).loc["two-armed-1 30 complete walk"]
+    assert confusion.to_dict() == {model: walks.count(model) for model in FIT.MODELS}

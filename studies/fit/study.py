@@ -1,0 +1,133 @@
+"""Measure how well parameters and models of simulated people are recovered.
+
+    python studies/fit/protocols.py results/fit
+    python studies/fit/study.py results/fit
+
+writes results.csv, confusion.csv, people.csv, figure.svg and the page, README.md; without a folder
+figure and page, of the stored tables.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from fit import MODELS, judge
+
+from coartic.analysis import figures, write_study
+
+HERE = Path(__file__).parent
+TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
+PARAMETERS = ("sigma", "epsilon", "kappa")
+
+
+def measure_people(raw):
+    """Add what the fit says of each simulated person: ``model``, the model of least BIC, and
+    ``others``, the models that are not clearly worse; ``group``, the task or the family."""
+    judged = [judge(row) for _, row in raw.iterrows()]
+    return raw.assign(
+        model=[model for model, _ in judged],
+        others=[" ".join(others) for _, others in judged],
+        group=raw.task.str.partition("/")[0],
+    )
+
+
+def tabulate(people):
+    """Tabulate recovery by group (task, family, paper, random), trials and data.
+
+    ``people`` of all models: shares of them whose model has the least BIC (``right``), whose model
+    the fit excludes (``wrong``) and for whom no other model is left (``decided``). ``informed`` of
+    them: correlation, bias (of σ as a share), and coverage of intervals of each parameter;
+    ``kappa_0_cover`` and ``kappa_0_bias`` of people who keep the best and have κ = 0.
+    """
+    pooled = people.assign(group=np.where(people.task.isin(TASKS), "paper", "random"))
+    by, rows = ["group", "trials", "data"], {}
+    for key, of_cell in pd.concat([people, pooled]).groupby(by, sort=False):
+        left = of_cell.model + " " + of_cell.others
+        kept = [true in names.split() for true, names in zip(of_cell.true, left, strict=True)]
+        row = dict(zip(by, key, strict=True)) | {
+            "tasks": of_cell.task.nunique(), "people": len(of_cell),
+            "right": (of_cell.model == of_cell.true).mean(), "wrong": 1 - np.mean(kept),
+            "decided": (of_cell.others == "").mean(),
+        }  # fmt: skip
+        informed, best = (of_cell[of_cell.true == model] for model in ("informed", "best"))
+        row["informed"] = len(informed)
+        for name in PARAMETERS:
+            found = informed.dropna(subset=name)
+            truth, value = found[f"true_{name}"], found[name]
+            if name == "sigma":
+                truth, value = np.log(truth), np.log(value)
+            if len(found) > 2:
+                row[f"{name}_r"] = np.corrcoef(truth, value)[0, 1]
+                row[f"{name}_bias"] = (value - truth).mean()
+                row[f"{name}_rmse"] = np.sqrt(((value - truth) ** 2).mean())
+                row[f"{name}_cover"] = covers(found, name).mean()
+        row |= {"best": len(best), "kappa_0_bias": best.kappa.mean(),
+                "kappa_0_cover": covers(best, "kappa").mean()}  # fmt: skip
+        rows[" ".join(map(str, key))] = row
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
+
+
+def covers(people, name):
+    """Return where intervals have the true value of a parameter."""
+    truth = people[f"true_{name}"]
+    return (people[f"{name}_low"] <= truth) & (truth <= people[f"{name}_high"])
+
+
+def confuse(people):
+    """Count the people of each model by the model of least BIC."""
+    cell = people.group.where(people.task.isin(TASKS), "random")
+    row = cell + " " + people.trials.astype(str) + " " + people.data + " " + people.true
+    return pd.crosstab(row.rename("row"), people.model).reindex(columns=[*MODELS], fill_value=0)
+
+
+def scatter(people):
+    """Return the parameters of people with 100 complete trials on the paper's tasks."""
+    chosen = people.true.isin(["informed", "best"]) & (people.trials == 100)
+    chosen &= people.task.isin(TASKS) & (people.data == "complete")
+    names = [f"{start}{name}" for name in PARAMETERS for start in ("true_", "")]
+    return people[chosen].sort_values(["task", "repeat", "person"])[["task", "true", *names]]
+
+
+@figures.styled
+def draw(table):
+    """Draw estimates against true values, and the share of right models by trials."""
+    people = pd.read_csv(HERE / "people.csv")
+    figure, panels = figures.panels((1, 4), (figures.TWO, 2.1))
+    labels = {"sigma": "σ", "epsilon": "ε", "kappa": "κ"}
+    for axes, name in zip(panels, PARAMETERS, strict=False):
+        informed = people[people.true == "informed"]
+        ends = [informed[f"true_{name}"].min(), informed[f"true_{name}"].max()]
+        axes.plot(ends, ends, color=figures.GREY, linewidth=0.6)
+        for number, task in enumerate(TASKS):
+            some = informed[informed.task == task]
+            axes.plot(some[f"true_{name}"], some[name], linestyle="", marker="o", markersize=2.5,
+                      color=figures.PALETTE[number])  # fmt: skip
+        axes.set_xlabel(f"true {labels[name]}")
+        axes.set_ylabel(f"estimated {labels[name]}")
+    rows = table[(table.data == "complete") & table.group.isin(TASKS)].sort_values("trials")
+    for number, task in enumerate(TASKS):
+        some = rows[rows.group == task]
+        panels[3].plot(some.trials, 100 * some.right, marker="o", markersize=3, label=task,
+                       color=figures.PALETTE[number])  # fmt: skip
+    panels[3].set_xscale("log")
+    panels[3].set_xticks([30, 100, 300], ["30", "100", "300"])
+    panels[3].minorticks_off()
+    panels[3].set_xlabel("trials")
+    panels[3].set_ylabel("right models (%)")
+    figures.letters(panels)
+    figures.legend(figure, panels[3].get_legend_handles_labels()[0], 4)
+    return figure
+
+
+def measure(folder):
+    """Return the tables by name; each becomes a CSV file."""
+    people = measure_people(pd.read_csv(Path(folder) / "recovery.csv"))
+    return {
+        "results": tabulate(people), "confusion": confuse(people),
+        "people": scatter(people).reset_index(drop=True),
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    write_study(HERE, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)
