@@ -1,4 +1,4 @@
-"""What the trials of a subject say about the six models: residuals, hands, and their likelihood.
+"""Evidence on six models in the trials of a subject: residuals, hands, and their likelihood.
 
 Rewards and postures determine the learner's tables Q and q*, hence the hand of highest value: a
 hand has probability ε P(hand is explored) + (1 − ε) [hand has the highest value]. The mean target
@@ -23,7 +23,7 @@ from coartic.motion.trial import reach_goals
 from coartic.robot import HANDS
 
 DRIFTS = (0.0, 0.03, 0.1, 0.3, 1.0)
-"""Values of κ of which drawn drift draws one in each trial."""
+"""Values of κ for drawn drift: each trial draws one."""
 NODES = (*DRIFTS[:3], 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0)
 """Values of κ at which landings are simulated; between them residuals are interpolated."""
 SHORT = 0.1
@@ -73,7 +73,7 @@ class Trials(NamedTuple):
     postures: np.ndarray
     """Shape ``(T, G, dof)``; NaN for a hit that is missing."""
     rewards: np.ndarray
-    """Minus the ticks, shape ``(T,)``; NaN for a trial of which a hit is missing."""
+    """Minus the ticks, shape ``(T,)``; NaN where a hit of the trial is missing."""
 
 
 def trials_of(frame, task):
@@ -131,7 +131,7 @@ def landings(task, condition, trials, rows, kappas, plan, simulated):
         t = np.where((plan[0][goal] == hand)[:, None], plan[1][goal], t)
 
     def null_space(at):
-        """Projections onto the null space of the hand over the explored joints."""
+        """Return projections onto the null space of the hand, over the explored joints."""
         each = np.stack([robot.jacobian(at, name) for name in HANDS], axis=1)
         return projection(each[np.arange(len(at)), hand], explored[hand])
 
@@ -219,8 +219,8 @@ class Evidence(NamedTuple):
         return sparse.csr_array((each[there], (row[there], self.records[there])), shape)
 
     def covariance(self, sigma, kappa, noise, residual):
-        """Return the covariance of residuals, its diagonal where they are independent, and the
-        logarithm of the probability of which of them landed elsewhere."""
+        """Return the covariance of residuals, or its diagonal if they are independent, and the
+        logarithm of the probability that some hits landed elsewhere and the others did not."""
         variance = (sigma * self.at(kappa)[1]) ** 2
         b = self.weights(kappa) if noise else None
         total = variance + (noise**2 * b.power(2).sum(axis=1) if noise else 0.0)

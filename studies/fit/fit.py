@@ -168,7 +168,10 @@ def fit(frame, task, *, condition=None, noise=0.0):
         ``missing`` hits of the others; ``improved``, the number of trials after the first that were
         better than all before; ``model`` and ``others`` (:func:`judge`).
     """
-    condition, plan, rows = condition or condition_for(task), plan_for(task), []
+    condition, rows = condition or condition_for(task), []
+    if other := {*frame.hand} - {*condition.hands}:
+        raise CoarticError(f"{condition.id} does not use the {other.pop()} hand, the data do")
+    plan = plan_for(task)
     for subject, of_subject in frame.groupby("subject", sort=False):
         trials = trials_of(of_subject, task)
         hits = (trials.hands >= 0).sum(axis=1)

@@ -6,8 +6,9 @@ writes ``recovery.csv``, a row for each simulated person. A cell is done at a ti
 not done again. It takes about an hour of one core.
 
 Aims, set before the runs: with 100 complete trials on one of the tasks, r ≥ 0.95 of σ, ε and κ, and
-the right model of six in 95 % of the people. Expected to fail: 30 trials; no memory beside keep the
-best on ascending and descending, where a learner often finds nothing better than its first trial.
+the right model of six in 95 % of the people. Expected to fail: 30 trials; and ascending and
+descending, where a learner often finds nothing better than its first trial and looks as if it had
+no memory.
 """
 
 import os
@@ -45,14 +46,14 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
     trials : int
         Number of trials of a person.
     condition : ExplorationCondition, optional
-        The condition, of which hands and explored joints are taken.
+        The condition: its hands and its explored joints.
     plan : tuple of ndarray, optional
         Hands and postures of the planner; by default those of :func:`evidence.plan_for`.
 
     Returns
     -------
     DataFrame
-        A row for each hit; ``attrs["corrections"]`` is the share of goals that were corrected.
+        A row for each hit.
     """
     condition = condition or condition_for(task)
     people, goals, dof, robot = len(seeds), len(task.goals), task.robot.dof, task.robot
@@ -64,7 +65,7 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
     value = np.full((people, goals, 3, 2), -np.inf)
     stored = np.full((people, goals, 3, 2, dof), np.nan)
     plan = (plan or plan_for(task)) if model == "planner" else None
-    rows, corrected = [], 0
+    rows = []
     for trial in range(trials):
         q, before = np.tile(task.q0, (people, 1)), np.full(people, 2)
         going, total = np.ones(people, bool), np.zeros(people, int)
@@ -107,7 +108,6 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
                                   targets, locked_base=task.locked_base)  # fmt: skip
             going &= reached.hit
             total += reached.ticks
-            corrected += int(reached.corrections.sum())
             made.append((before, hands, reached.q))
             for n in np.flatnonzero(going):
                 rows.append([n, trial + 1, goal + 1, HANDS[hands[n]], reached.ticks[n],
@@ -123,7 +123,6 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
                     value[entry], stored[entry] = -total[n], postures[n]
     columns = ["subject", "trial", "goal", "hand", "ticks", *robot.joint_names]
     frame = pd.DataFrame(rows, columns=columns)
-    frame.attrs["corrections"] = corrected / (people * trials * goals)
     return frame.sort_values(["subject", "trial", "goal"], ignore_index=True)
 
 

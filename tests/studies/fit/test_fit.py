@@ -27,11 +27,10 @@ def people():
 def by_reference(task, condition, trials, seed):
     """Hits of the plain learner of the tests, in the format of the study."""
     run = reference.learn(task, condition, seed=seed, trials=trials)
-    rows = [
-        [seed, trial, goal, hand, ticks, *q]
-        for trial, (visited, spent) in enumerate(zip(run.visits, run.ticks_by_goal, strict=True), 1)
-        for goal, ((_, hand, q), ticks) in enumerate(zip(visited, spent, strict=True), 1)
-    ]
+    made = enumerate(zip(run.visits, run.ticks_by_goal, strict=True), 1)
+    rows = [[seed, trial, goal, hand, ticks, *q] for trial, (visited, spent) in made
+            for goal, ((_, hand, q), ticks) in enumerate(zip(visited, spent, strict=True), 1)
+            ]  # fmt: skip
     names = ["subject", "trial", "goal", "hand", "ticks", *task.robot.joint_names]
     return pd.DataFrame(rows, columns=names)
 
@@ -40,10 +39,9 @@ def by_reference(task, condition, trials, seed):
 def test_the_simulated_learner_is_the_packages(name, condition):
     people = PROTOCOLS.simulate(load_task(name), "best", 0.05, 0.2, seeds=[7, 8], trials=30,
                       condition=CONDITIONS[condition])  # fmt: skip
-    for number, seed in enumerate((7, 8)):
-        of_person = people[people.subject == number]
-        run = learn(name, condition, seed=seed, trials=30)
-        assert (of_person.groupby("trial").ticks.sum() == -run.rewards).all()
+    for number, person in people.groupby("subject"):
+        run = learn(name, condition, seed=7 + number, trials=30)
+        assert (person.groupby("trial").ticks.sum() == -run.rewards).all()
 
 
 def test_parameters_of_the_plain_learner_are_found():
@@ -51,7 +49,7 @@ def test_parameters_of_the_plain_learner_are_found():
     truth = {"sigma": 0.03, "epsilon": 0.25, "kappa": 0.5}
     fields = {"noise_sd": 0.03, "epsilon": 0.25, "drift": 0.5}
     people = by_reference(TASK, replace(CONDITIONS["EC4"], **fields), 60, seed=5)
-    ((_, found),) = FIT.fit(people, TASK).iterrows()
+    found = FIT.fit(people, TASK).iloc[0]
     assert (found.model, found.others) == ("informed", "")
     for name, value in truth.items():
         assert found[f"{name}_low"] < value < found[f"{name}_high"]
@@ -62,7 +60,7 @@ def test_parameters_of_the_plain_learner_are_found():
 @pytest.mark.parametrize("model", ["best", "drawn", "walk", "memoryless", "planner"])
 def test_model_of_simulated_people_is_preferred(model):
     people = PROTOCOLS.simulate(TASK, model, 0.04, 0.3, seeds=[3], trials=60)
-    ((_, found),) = FIT.fit(people, TASK).iterrows()
+    found = FIT.fit(people, TASK).iloc[0]
     assert found.model == model
     assert ("do not apply" in FIT.sentence(found)) == (model not in FIT.LEARNERS)
 
@@ -81,7 +79,7 @@ def test_motor_noise_is_a_parameter(people):
 def test_where_two_models_explain_the_trials_no_parameters_are_given():
     """A learner that has found nothing better is one without memory."""
     people = PROTOCOLS.simulate(load_task("ascending"), "best", 0.05, 0.2, seeds=[2], trials=12)
-    ((_, found),) = FIT.fit(people, load_task("ascending")).iterrows()
+    found = FIT.fit(people, load_task("ascending")).iloc[0]
     assert {"best", "memoryless"} <= {found.model, *found.others.split()}
     assert "cannot distinguish" in FIT.sentence(found)
     assert "κ" not in FIT.sentence(found)
@@ -91,22 +89,21 @@ def test_signatures_of_recorded_trials_are_of_what_was_recorded():
     task = load_task("two-armed-2")
     people = PROTOCOLS.simulate(task, "best", 0.05, 0.2, seeds=[4], trials=20)
     run = learn(task, "EC4", seed=4, trials=20)
-    recorded = solutions_of(task, people)
-    best = Solutions(task, "learner", (run.execute(),))
-    for signature in SIGNATURES.values():
-        assert signature.each(recorded)[run.best_trial] == pytest.approx(
-            signature.each(best)[0], nan_ok=True
-        )
+    recorded, best = solutions_of(task, people), Solutions(task, "learner", (run.execute(),))
+    for each in (signature.each for signature in SIGNATURES.values()):
+        assert each(recorded)[run.best_trial] == pytest.approx(each(best)[0], nan_ok=True)
     assert len(solutions_of(task, people.drop(index=[0, 5])).runs) == 18
 
 
 def test_lost_trials_and_hits_are_counted(people):
     first = people[people.subject == 0]
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
-    ((_, found),) = FIT.fit(kept, TASK).iterrows()
+    found = FIT.fit(kept, TASK).iloc[0]
     assert (found.trials, found.lost, found.missing) == (60, 2, 2)
     with pytest.raises(CoarticError, match="two trials"):
         FIT.fit(first[first.trial == 1], TASK)
+    with pytest.raises(CoarticError, match="EC1 does not use the left hand"):
+        FIT.fit(first, TASK, condition=CONDITIONS["EC1"])
 
 
 WRONG = {
@@ -117,7 +114,6 @@ WRONG = {
     "line 2: ticks is nan": lambda t: t.assign(ticks=t.ticks.where(t.index != 0)),
     "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
     "a line above": lambda t: pd.concat([t, t]),
-    "subject is nan": lambda t: t.assign(subject=t.subject.where(t.index != 0)),
 }
 
 
@@ -140,10 +136,10 @@ def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
 
 
 def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
-    example = FOLDER / "example.csv"
+    example, pages = FOLDER / "example.csv", FOLDER.parents[1] / "docs" / "howto"
     monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", str(example)])
     FIT.main()
-    page = (FOLDER.parents[1] / "docs" / "howto" / "people.md").read_text("utf-8")
+    page = (pages / "people.md").read_text("utf-8")
     assert all(line in page for line in capsys.readouterr().out.splitlines())
     assert example.stat().st_size < 30_000
 
