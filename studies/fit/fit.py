@@ -177,15 +177,13 @@ def fit(frame, task, *, condition=None, noise=0.0):
         hits = (trials.hands >= 0).sum(axis=1)
         rewards = trials.rewards[np.isfinite(trials.rewards)]
         row = {
-            "subject": subject, "trials": len(hits), "lost": int((hits == 0).sum()),
+            "subject": subject, "noise": noise, "trials": len(hits), "lost": int((hits == 0).sum()),
             "missing": int((len(task.goals) - hits[hits > 0]).sum()),
             "improved": int((np.diff(np.maximum.accumulate(rewards)) > 0).sum()),
         }  # fmt: skip
         if not (tables_before(task, condition, trials, "best").stored >= 0).any():
-            raise CoarticError(
-                f"subject {subject}: no hit follows a complete trial, so nothing can be fitted; "
-                "needed are two trials, the first with all goals"
-            )
+            why = "no hit follows a complete trial; needed are two trials, the first with all goals"
+            raise CoarticError(f"subject {subject}: {why}")
         row |= fit_subject(task, condition, trials, noise=noise, plan=plan)
         model, others = judge(row)
         rows.append({**row, "model": model, "others": " ".join(others)})
@@ -194,13 +192,13 @@ def fit(frame, task, *, condition=None, noise=0.0):
 
 def sentence(row):
     """Return what a row of :func:`fit` says, in words."""
-    alike, names = [row.model, *row.others.split()], [*MODELS]
+    alike = [row.model, *row.others.split()]
     text = (
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
         f"{row.missing}): "
     )
     if {*alike} <= {*LEARNERS} or len(alike) == 1:
-        behind = min(row[f"bic_{name}"] for name in names if name not in alike)
+        behind = min(row[f"bic_{name}"] for name in MODELS if name not in alike)
         text += (
             f"{' or '.join(MODELS[name] for name in alike)} (other models: BIC higher by "
             f"{behind - row[f'bic_{row.model}']:.0f} or more)"
@@ -212,8 +210,10 @@ def sentence(row):
             for symbol, name in (("σ", "sigma"), ("ε", "epsilon"), ("κ", "kappa"))
             if name in row.index
         ]
-        hidden = " A lost trial may have been the best: the intervals can be too narrow."
-        return f"{text}. {', '.join(numbers)}.{hidden if row.lost + row.missing else ''}"
+        doubts = ["A lost trial may have been the best"] * bool(row.lost + row.missing)
+        doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
+        doubt = f" {'. '.join(doubts)}: the intervals can be too narrow." if doubts else ""
+        return f"{text}. {', '.join(numbers)}.{doubt}"
     return (
         f"{text}these trials cannot distinguish {'; '.join(MODELS[name] for name in alike)} "
         f"(differences in BIC below {CLEAR:g}), so no parameters are given. Trials better than all "

@@ -68,12 +68,11 @@ def test_model_of_simulated_people_is_preferred(model):
 def test_motor_noise_is_a_parameter(people):
     noisy, joints = people[people.subject == 0].copy(), [*TASK.robot.joint_names]
     noisy[joints] += 0.03 * np.random.default_rng(0).standard_normal((len(noisy), len(joints)))
-    trials = FIT.trials_of(noisy, TASK)
-    given, ignored = (FIT.fit_subject(TASK, CONDITIONS["EC4"], trials, noise=noise)
-                      for noise in (0.03, 0.0))  # fmt: skip
-    assert ignored["sigma"] > 0.046
-    assert given["sigma"] == pytest.approx(0.04, rel=0.1)
-    assert given["kappa"] == pytest.approx(0.4, abs=0.05)
+    given, ignored = (FIT.fit(noisy, TASK, noise=noise).iloc[0] for noise in (0.03, 0.0))
+    assert ignored.sigma > 0.046
+    assert given.sigma == pytest.approx(0.04, rel=0.1)
+    assert given.kappa == pytest.approx(0.4, abs=0.05)
+    assert "Motor noise is more" in FIT.sentence(given)
 
 
 def test_where_two_models_explain_the_trials_no_parameters_are_given():
