@@ -197,14 +197,14 @@ def judge_claims(study, plans, repeats):
         "fourth-of-fourteen-gains-little-on-two-arms": fourth_gains("two arms", "less", two),
         "fourth-of-fourteen-gains-more-on-two-arms": fourth_gains("two arms", "more", two),
         "horizon-is-a-number-of-goals": (
-            "A horizon is a number of goals: two goals ahead gain of fourteen more nearly what two "
-            "gain of seven than what one gains of seven.",
+            "A horizon is a number of goals: with fourteen goals, two goals ahead gain as much as "
+            "two of seven, rather than one of seven.",
             pairs_test.format("more"),
             mean_beyond(sentence, nearer),
         ),
         "horizon-is-a-share-of-goals": (
-            "A horizon is a share of the goals that are left: two goals ahead gain of fourteen "
-            "more nearly what one gains of seven than what two gain of seven.",
+            "A horizon is a share of the goals that are left: with fourteen goals, two goals ahead "
+            "gain as much as one of seven, rather than two of seven.",
             pairs_test.format("less"),
             mean_beyond(sentence, nearer, 0.0, "less"),
         ),

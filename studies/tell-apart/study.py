@@ -116,7 +116,7 @@ def judge_claims(changes, starts, steps):
             mean_beyond("The logarithm is {}", shares["from_anew"]["learner"], 0.1, "less"),
         ),
         "learner-ends-as-well": (
-            "It ends as well in ticks.",
+            "Its final number of ticks is as good.",
             rule + "less than 2 % more ticks than learning anew",
             mean_beyond("It needs {} % more", shares["gap"]["learner"], 2, "less"),
         ),
@@ -131,8 +131,7 @@ def judge_claims(changes, starts, steps):
             ),
         ),
         "signs-tell-no-planner": (
-            "Signs of successive steps do not tell the learner from a planner with noise, but from "
-            "a walk.",
+            "Step directions separate the learner from a random walk, not from a noisy planner.",
             "one-tailed bootstrap tests over test tasks: the learner's share of equal signs "
             "is above the planner's by less than 0.02, and below the walk's by more than 0.1",
             all_of(
