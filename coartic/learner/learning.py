@@ -135,19 +135,15 @@ def learn_many(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     condition : str or ExplorationCondition
-        The condition, or the name of one in ``CONDITIONS`` or ``ABLATIONS``, such as ``"EC4"``.
     seeds : iterable of int
         A seed for each run.
     trials : int
-        Number of trials of each run, the initial one included.
     model : MotionModel
-        The constants of movement and of the corrective process.
+    start : sequence of Movement
+        All but the seeds as of :func:`learn`; every run begins with the first solution.
     jobs : int
         Number of threads; -1 for one a core.
-    start : sequence of Movement
-        A first solution, as of :func:`learn`, with which every run begins.
 
     Returns
     -------
@@ -156,21 +152,10 @@ def learn_many(
 
     Raises
     ------
-    TaskError
-        The task cannot be used.
-    NotApplicableError
-        The condition does not fit the task or the first solution, or no first trial is found for
-        it.
-    CoarticError
-        The condition is unknown.
-    TypeError
-        The task is neither a Task nor a text nor a path, or the condition or the model is none.
-    SolutionError
-        The first solution breaks the task's rules.
-    ValueError
-        A seed is no whole number from 0, there is no trial, ``jobs`` is neither -1 nor at least 1,
-        no movement can be made with the model, or the task was changed so that it contradicts
-        itself.
+    TaskError, NotApplicableError, CoarticError, SolutionError
+        As :func:`learn` raises them.
+    TypeError, ValueError
+        Likewise; also for seeds that are no list, and ``jobs`` that is neither -1 nor at least 1.
     """
     task = as_task(task)
     condition = load_condition(condition)
