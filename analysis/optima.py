@@ -37,7 +37,8 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 
     All runs count, including searches and runs copied from other folders, but not runs with another
     base, which solve another task. A task has no best known reward if its best reward is 0, which
-    leaves no gap, or if only runs of one method have it, which would be compared with themselves.
+    leaves no gap, or if runs of one method are all that is known of the task, as they would be
+    compared with themselves; such a task is not in the result.
 
     Parameters
     ----------

@@ -7,8 +7,8 @@ hand to the centre, both in control steps::
 
     J x = v u,  that is  A = (J; -J),  b = (v u; -v u),      v = min(1 / |J⁺ u|, d)
 
-The pace v is the hand's if the joints do nothing else, and never more than its distance d from the
-centre. Whatever level 2 adds makes the joint
+The pace v is the speed of the hand in the minimum-norm solution, and never more than its distance d
+from the centre. Whatever level 2 adds makes the joint
 step longer than a control step may be; then all of it is shortened, and the hand goes straight and
 slower. Level 2 takes the x nearest to
 

@@ -320,7 +320,9 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     """Cost of the best segment between given end states, which is a polynomial of the joints.
 
     ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals
-    are written out in the end states, so that nothing is discretised.
+    are written out in the end states, so that nothing is discretised. ``step``: change of the
+    joints, ``(dof,)``; ``time`` above 0, which squared displacement ignores; ``rates``: velocities
+    of both ends, and accelerations for the jerk, ``(dof,)`` each.
     """
     if cost == "squared-displacement":
         return casadi.sumsqr(step)

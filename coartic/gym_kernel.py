@@ -123,7 +123,11 @@ def squared_distance(run: Any) -> float:
 def aim(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
     """Phase 2, *aim*: choose the hand that the corrective process brings to the goal by the shorter
     path, or, if the action says so, the other one, and the solution of the process, or the present
-    posture where there is none, plus the action."""
+    posture where there is none, plus the action.
+
+    ``run`` is changed in place; ``other`` is the run of the other hand, with two hands.
+    ``action[0] > 0.5`` takes the other hand; the rest, clipped to ±1, is scaled by
+    ``state.reach``."""
     if len(state.sides) > 1:
         is_nearer = squared_distance(other) < squared_distance(run)
         if is_nearer != (action[0] > 0.5):

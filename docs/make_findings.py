@@ -85,7 +85,7 @@ def claim(name: str, suite: str = "") -> Row:
 
 def verdicts(suite: str = "", *, others: bool = False, published: bool = False) -> dict[str, int]:
     """How many claims have each verdict; ``others``: without the three that carry the paper's
-    point; ``printed``: that rest on published goals alone."""
+    point; ``published``: that rest on published goals alone."""
     judged = claims(suite)
     if published:
         judged = judged[~judged.statement.str.contains("†")]

@@ -263,7 +263,8 @@ def no_reversal(read: Reader) -> Finding:
 
 
 def ec4_mixed(read: Reader) -> Finding:
-    """Count the runs without the commonest hand sequence; the claim is that there are some."""
+    """Count the runs on two-armed task 2 without the commonest hand sequence; the claim, that
+    there are some, is not tested. Raises MissingError without runs."""
     learned = read.hands(TASK_2, EC4)
     others = [hands != mode(learned) for hands in learned]
     return Finding(any(others), runs_that(read, TASK_2, EC4, "not commonest", others))

@@ -176,7 +176,8 @@ def other_arm(runs: Solutions) -> Array:
 def preshaping_of_the_other_arm(runs: Solutions) -> Array:
     """Return :func:`preshaping` of each run at goals g < G, shape ``(n, G − 1)``.
 
-    NaN on a task for one hand, and without an initial solution.
+    NaN on a task for one hand, without an initial solution, and at goals after which the idle hand
+    hits none; negative where the idle hand moves away.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:

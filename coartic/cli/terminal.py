@@ -24,7 +24,7 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """Print an ``Error`` or a ``Warning``, line by line."""
+    """Print an ``Error`` or a ``Warning`` on stderr, with the word before each line."""
     say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
 
 

@@ -178,7 +178,8 @@ def count_goal(goal: Any, counts: Any) -> None:
 
 @shared
 def move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
-    """Move the acting runs to their targets."""
+    """Move those of the first ``count`` runs that are acting to their targets, in place; with
+    ``stops`` a movement ends on arrival, too."""
     at, slot = batch.slots.at[0], 0
     for i in range(count):
         if batch.runs[i].acting:
@@ -261,7 +262,8 @@ def row_of(rows: Any, n: int) -> Any:
 
 @inlined
 def are_within(targets: Any) -> bool:
-    """Return whether no target ``(G, M, dof)`` of a trial is beyond :data:`LARGEST_ENTRY`."""
+    """Return whether no target ``(G, M, dof)`` of a trial has an absolute value beyond
+    :data:`LARGEST_ENTRY`; NaN, a joint that stays, has not."""
     far = 0
     for g in range(targets.shape[0]):
         for m in range(targets.shape[1]):

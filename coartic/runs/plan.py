@@ -142,5 +142,5 @@ def size_of(plan: Sequence[Job]) -> int:
 
 
 def label_of(method: str, setting: str) -> str:
-    """Return the label of a method under a setting, such as ``CMA-ES sigma=0.1``."""
+    """Return the label of a method under a setting, such as ``cma-es/bandit sigma=0.1``."""
     return f"{method} {setting}".strip()
