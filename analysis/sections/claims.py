@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
 from typing import get_args
 
 import pandas as pd
@@ -17,12 +16,6 @@ from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.words import capital, listed, number, spelled
 from coartic.tasks.families import shipped_families
 from coartic.tasks.task import shipped_tasks
-
-
-def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:
-    """Return the number of claims with each verdict, including 0."""
-    numbers = Counter(verdicts)
-    return {verdict: numbers[verdict] for verdict in get_args(Verdict)}
 
 
 def papers_claims(study: Study) -> pd.DataFrame:
@@ -63,7 +56,7 @@ def central_verdicts(judged: pd.DataFrame) -> pd.Series:
 
 def verdicts_in_words(judged: pd.DataFrame) -> str:
     """Say how many claims, and how many central claims, are supported or have other verdicts."""
-    n, central = counts(judged.verdict), central_verdicts(judged)
+    n, central = Counter(judged.verdict), central_verdicts(judged)
     if too_few(judged):
         return (
             f"Too few runs to judge the paper: {n['undecided']} of {len(judged)} claims are "
@@ -75,7 +68,7 @@ def verdicts_in_words(judged: pd.DataFrame) -> str:
         held, of = int((central == "supported").sum()), spelled(len(central))
         some = of if held == len(central) else f"{spelled(held)} of the {of}"
         card += f", among them {'the ' * (some == of)}{some} central ones"
-    each = ", ".join(f"{verdict} {count}" for verdict, count in n.items() if count)
+    each = ", ".join(f"{verdict} {n[verdict]}" for verdict in get_args(Verdict) if n[verdict])
     words = [
         f"{capital(verdict)}: {listed(names.index)}."
         for verdict, names in central.groupby(central, sort=False)
