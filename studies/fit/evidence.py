@@ -212,7 +212,8 @@ class Evidence(NamedTuple):
     def weights(self, kappa):
         """Return the weights B of postures in residuals, sparse, shape ``(m, postures)``."""
         share, there = self.at(kappa)[1], self.records >= 0
-        each = np.stack([np.ones_like(share), share * (kappa - 1), share * (1 - kappa / 2) - 1,
+        start = np.where(there[3], kappa / 2, kappa)  # without a next posture, p is the start
+        each = np.stack([np.ones_like(share), share * (kappa - 1), share * (1 - start) - 1,
                          -share * kappa / 2])  # fmt: skip
         row = np.broadcast_to(np.arange(len(share)), there.shape)
         shape = len(share), int(self.records.max()) + 1

@@ -212,8 +212,8 @@ def sentence(row):
         ]
         doubts = ["A lost trial may have been the best"] * bool(row.lost + row.missing)
         doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
-        doubt = f" {'. '.join(doubts)}: the intervals can be too narrow." if doubts else ""
-        return f"{text}. {', '.join(numbers)}.{doubt}"
+        doubt = f" {'. '.join(doubts)}: intervals can be too narrow, and the model wrong."
+        return f"{text}. {', '.join(numbers)}.{doubt if doubts else ''}"
     return (
         f"{text}these trials cannot distinguish {'; '.join(MODELS[name] for name in alike)} "
         f"(differences in BIC below {CLEAR:g}), so no parameters are given. Trials better than all "

@@ -19,6 +19,8 @@ from coartic.analysis import figures, write_study
 HERE = Path(__file__).parent
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 PARAMETERS = ("sigma", "epsilon", "kappa")
+NOISE = 0.02
+"""SD of motor noise in noisy data."""
 
 
 def measure_people(raw):
@@ -33,7 +35,10 @@ def measure_people(raw):
 
 
 def tabulate(people):
-    """Tabulate recovery by group (task, family, paper, random), trials and data.
+    """Tabulate recovery by group, trials and data.
+
+    Groups are tasks, families, the tasks of the paper, random tasks, and people whose estimate of σ
+    is less than twice the motor noise (``loud``) or not (``quiet``).
 
     ``people`` of all models: shares of them whose model has the least BIC (``right``), whose model
     the fit excludes (``wrong``) and for whom no other model is left (``decided``). ``informed`` of
@@ -41,8 +46,10 @@ def tabulate(people):
     ``kappa_0_cover`` and ``kappa_0_bias`` of people who keep the best and have κ = 0.
     """
     pooled = people.assign(group=np.where(people.task.isin(TASKS), "paper", "random"))
+    noisy = pooled[pooled.data == "noisy"]
+    noisy = noisy.assign(group=np.where(noisy.sigma < 2 * NOISE, "loud", "quiet"))
     by, rows = ["group", "trials", "data"], {}
-    for key, of_cell in pd.concat([people, pooled]).groupby(by, sort=False):
+    for key, of_cell in pd.concat([people, pooled, noisy]).groupby(by, sort=False):
         left = of_cell.model + " " + of_cell.others
         kept = [true in names.split() for true, names in zip(of_cell.true, left, strict=True)]
         row = dict(zip(by, key, strict=True)) | {
