@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.study import Study, check_study
-from coartic.analysis.words import RECONSTRUCTED, id_of
+from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
@@ -53,7 +53,8 @@ def figure(
     """Return a decorator that turns a drawing function of a study into a figure of the report.
 
     The figure is in the style of all figures; its id is the name of the function. The caption
-    explains the dagger if a task is reconstructed. The function returns None if the folder has no
+    explains the dagger if a task is reconstructed; ``{n}`` in it is the range of the column
+    ``runs`` of the drawn numbers. The function returns None if the folder has no
     runs for the figure.
     """
 
@@ -66,7 +67,9 @@ def figure(
                 return None
             drawing, data, alt, tasks = parts
             dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
-            return Plot(id_of(draw), title, caption + dagger, alt, drawing, data)
+            ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
+            n = " to ".join(dict.fromkeys(map(number, ends)))
+            return Plot(id_of(draw), title, caption.format(n=n) + dagger, alt, drawing, data)
 
         return plot
 

@@ -56,8 +56,9 @@ _DASHES: dict[str, Any] = {
     "dashed": (0, (4, 1.5)),
     "dotted": (0, (1, 1.2)),
     "dash-dotted": (0, (5, 1.2, 1, 1.2)),
+    "long-dashed": (0, (9, 1.5)),
 }
-SOLID, DASHED, DOTTED, DASH_DOTTED = _DASHES.values()
+SOLID, DASHED, DOTTED, DASH_DOTTED, _ = _DASHES.values()
 OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": DOTTED}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": DASH_DOTTED}
 """Lines at the rewards of the optimum and of the initial solution."""

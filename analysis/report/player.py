@@ -6,11 +6,10 @@ solves the changed task.
 
 from __future__ import annotations
 
+import math
+from shlex import quote
 from typing import Any
 
-import numpy as np
-
-from coartic.analysis.methods import RANDOM_SEARCH
 from coartic.analysis.random_search import every_random_search_for
 from coartic.analysis.sections.coarticulation import shared_goal
 from coartic.analysis.sections.own import own_methods
@@ -24,19 +23,17 @@ def player(study: Study) -> str:
     """Return the figure as HTML; empty if no run has a solution.
 
     The figure has a preset for each task, with the run nearest the median reward of each method
-    that moves straight. The first preset is the goal that two tasks share, if two tasks do.
+    that moves straight. The first preset is the goal that two tasks share, if two tasks do, with
+    the largest standardised posture difference of random search there.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
-        strongest = max(
-            every_random_search_for(study, shared),
-            key=lambda each: np.nan_to_num(each.standardised_posture_difference, nan=-1.0),
-            default=None,
-        )
         (up, down), first = shared.tasks, shared.method
-        both = {**preset_of(up), "label": f"{up.label} or {down.label}", "others": down.goals[1:]}
-        random_search = RANDOM_SEARCH if strongest is None else strongest.method
-        presets.append(both | {"runs": methods_played(study, [up.name, down.name], random_search)})
+        both = {**preset_of(up), "label": f"{up.label} or {down.label}", "others": down.goals[1:], "optimum": None}
+        both["runs"] = methods_played(study, [up.name, down.name])
+        every = every_random_search_for(study, shared)
+        by_chance = [float(each.standardised_posture_difference) for each in every]
+        presets.append(both | {"by_chance": max(filter(math.isfinite, by_chance), default=None)})
     alone = {
         name: preset_of(task) | {"runs": methods_played(study, [name])}
         for name, task in one_by_one(study).items()
@@ -49,8 +46,8 @@ def player(study: Study) -> str:
     where = {name: presets.index(preset) for name, preset in alone.items()}
     return player_figure(
         presets,
-        still="<p>The movements are played by a script, and scripts are switched off here.</p>",
         page=None,
+        folder=quote(str(study.folder)),
         first=begin,
         cells=[
             (method, f"on {task}", {"preset": where[task], "who": cell.label})
@@ -72,25 +69,21 @@ def first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> 
     return {"who": preferred if preferred in ids[0] else ids[0][0]}
 
 
-def methods_played(
-    study: Study, tasks: list[str], random_search: str = RANDOM_SEARCH
-) -> list[dict[str, Any]]:
+def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     """Return the methods with solved runs on all of these tasks, with a film for each task.
 
     A film has the movements of the run nearest the median reward; films of several tasks also have
     the postures of all runs at goal 1, which the tasks share. Methods that follow paths are left
-    out, as the script moves straight. The label ``random_search`` names the setting of random
-    search with which the script compares the other methods.
+    out, because the script moves straight.
     """
     runs = []
     for label in study.methods.index:
-        played = random_search if label == RANDOM_SEARCH else label
-        films = [film_of(study, (name, played)) for name in tasks]
+        films = [film_of(study, (name, label)) for name in tasks]
         if all(films):
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
-                    film["reached"] = study.configurations(name, played)[:, 0].round(3).tolist()
-            runs.append({"id": label, "name": study.methods.title[played], "films": films})
+                    film["reached"] = study.configurations(name, label)[:, 0].round(3).tolist()
+            runs.append({"id": label, "name": study.methods.title[label], "films": films})
     return runs
 
 

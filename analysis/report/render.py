@@ -43,7 +43,7 @@ IN_LATEX = {
     "claims": "statement, verdict, p_holm",
     "ranking": "method, gap, on *",
     "settings": "method, setting, gap, tasks, comparison, p_holm",
-    "runtimes": "method, reached, trials_to_quarter, trials_to_half, forward_kinematics_to_half",
+    "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "hands": "task, condition, hands, published, ours, runs, difference",
     "learning": "task, method, runs, after_*, trials_to_half_gain",
     "signatures": "task, method, runs, first, total, as_in_isolation, preshaping",
@@ -52,6 +52,8 @@ IN_LATEX = {
     "methods": "task, method, runs, reward, gap, hands, trials",
 }
 """Tables in LaTeX, by id, and their columns, which fit the width of a text."""
+LONGEST = 20
+"""Letters of the longest text in a column of LaTeX that does not break."""
 FORMULA = ("=", "+", "-", "@")
 """Beginnings of text that spreadsheets take for formulas."""
 MOST_ROWS = 50
@@ -183,8 +185,9 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
     """Return the columns of :data:`IN_LATEX` in LaTeX, with booktabs.
 
-    A text that is the same in all rows moves to the caption. ``notes`` are below the table, with
-    the meaning of a dagger in the table.
+    The table is as wide as the text, in letters of 8 pt: the first column and other long text
+    break. A text that is the same in all rows moves to the caption. ``notes`` are below the table,
+    with the meaning of a dagger in the table.
     """
     frame = frame[["setting" not in names for names in classes_of(table, frame)]]
     columns = columns_of(table, frame)
@@ -198,7 +201,8 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
         side, longest = "r" if numbers else "l", max(map(len, texts))
         head = textwrap.wrap(columns[column], max(longest, 9), break_long_words=False)
         heads.append(f"\\shortstack[{side}]{{" + "\\\\{}".join(map(latex, head)) + "}")
-        sides += "p{0.8\\linewidth}" if longest > 60 else side
+        breaks = not cells or not numbers and longest > LONGEST
+        sides += ">{\\raggedright\\arraybackslash}X" if breaks else side
         cells.append(list(map(latex, texts)))
     # Two columns may have one header.
     shown = pd.DataFrame(dict(enumerate(cells))).set_axis(heads, axis="columns")
@@ -215,8 +219,7 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
     begin, end, below = "\\begin{tabular}", "\\end{tabular}", " ".join(map(latex, notes))
     if below:
         below = f"\n\n\\smallskip\\parbox{{\\linewidth}}{{\\footnotesize {below}}}"
-    fit = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
-    body = body.replace(begin, f"\\footnotesize\n{fit}{begin}", 1)
-    body = body.replace(end, f"{end}}}{below}", 1)
-    needs = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
+    body = body.replace(begin, "\\footnotesize\\tabcolsep3pt\n\\begin{tabularx}{\\linewidth}", 1)
+    body = body.replace(end, f"\\end{{tabularx}}{below}", 1)
+    needs = "% needs \\usepackage{booktabs,tabularx} and \\usepackage[T1]{fontenc}"
     return f"{needs}\n{body}"

@@ -207,9 +207,10 @@ def list_runtimes(study: Study) -> Rows:
 @figure(
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget (mean over all "
-    "tasks where there are several). Targets are evenly spaced from the initial solution to the "
-    "optimum; a run counts for each target that it has reached. a: trials; planners make none and "
-    "are lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
+    "tasks where there are several). Targets are evenly spaced from the corrective process alone "
+    "to the optimum; a run counts for each target that it has reached. a: trials, for methods that "
+    "make trials. b: forward-kinematics evaluations, spread evenly over a run's trials. Bands: "
+    f"{style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of reached targets against trials and forward-kinematics evaluations."""
@@ -222,45 +223,60 @@ def draw_runtimes(study: Study) -> Parts | None:
     best = tabled.reached[plans].idxmax() if len(plans) else None
     curves = rows.index[(rows.information == BY_TRIAL) | ~rows.built_in | (rows.index == best)]
     data = runtimes(study) if len(tabled) else pd.DataFrame(columns=["method", "spend", "budget"])
-    shown = data.method.isin(curves) & (data.budget < math.inf)
+    shown = data.method.isin(curves) & (data.budget > 0) & (data.budget < math.inf)
     data = data[shown & data.spend.isin(PANELS)]
-    spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
-    if not spends:
+    if data.empty:
         return None
-    steps = [  # no more than are seen
-        rows.iloc[np.unique(np.linspace(0, len(rows) - 1, 150).round()).astype(int)]
-        for _, rows in data.groupby(["method", "spend"], sort=False)
-    ]
+    steps = []
+    for (method, spend), curve in data.groupby(["method", "spend"], sort=False):
+        # No more than are seen.
+        curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 150).round()).astype(int)]
+        cells = cells_with_targets(study)[method]
+        times = [times_of(study, cell, spend) for cell in cells]
+        low, high = running_times.interval_by_budget(times, curve.budget.to_numpy())
+        runs = sum(len(cell.runs) for cell in cells)
+        steps.append(curve.assign(share_low=low, share_high=high, runs=runs))
     data = pd.concat(steps, ignore_index=True)
     looks = looks_in(study, data.method.unique())
-    size = style.TWO, 2.4 + 0.16 * -(-len(looks) // 3)
-    drawing, panels = style.panels((1, len(spends)), size)
+    spends = [spend for spend in PANELS if (data.spend == spend).any()]
+    drawing, panels = style.panels((1, len(spends)), (style.TWO, 2.6), sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
         style.log_axis(axes)
         of_spend = data[data.spend == spend]
-        positive = of_spend.budget[of_spend.budget > 0]
-        edge, most = positive.min() / 1.5, positive.max()
+        edge, most = of_spend.budget.min() / 1.5, of_spend.budget.max()
+        most = max(most, 10 ** round(math.log10(most)))  # with the number at the end
         axes.axhline(50, color=style.GREY, linewidth=0.5)
         for label, rows in of_spend.groupby("method", sort=False):
-            x = np.append(rows.budget.clip(lower=edge), most)
-            y = 100 * np.append(rows.share, rows.share.iloc[-1])
-            line: Any = {**looks[str(label)], "linewidth": 1.3}
-            (drawn,) = axes.step(x, y, where="post", **line)
+            x = np.append(rows.budget, most)
+            y, low, high = (
+                100 * np.append(rows[name], rows[name].iloc[-1])
+                for name in ("share", "share_low", "share_high")
+            )
+            look = looks[str(label)]
+            axes.fill_between(
+                x, low, high, step="post", color=look["color"], alpha=0.22, linewidth=0
+            )
+            (drawn,) = axes.step(x, y, where="post", linewidth=1.3, **look)
             name = standings.shown_name(study, str(label))
             style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
         axes.set_xlim(edge, most)
         axes.set_ylim(-2, 102)
         axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
-        axes.set_ylabel("targets reached (%)")
+    panels[0].set_ylabel("targets reached (%)")
+    panels[0].annotate("half of the targets", (0, 50), (3, 2), color=style.GREY,
+                       xycoords=panels[0].get_yaxis_transform(), textcoords="offset points")  # fmt: skip
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
-    ends = ends.assign(share=100 * ends.share)
-    entries = [
-        style.legend_line(standings.shown_name(study, label), **look)
-        for label, look in looks.items()
-    ]
-    style.legend(drawing, entries, 3)
+    ends = ends.assign(share=100 * ends.share).sort_values("share")
+    height = -math.inf
+    for end in ends.to_dict("records"):
+        height = max(end["share"], height + 6.5)
+        panels[-1].annotate(
+            standings.shown_name(study, end["method"]), (1, height), (4, 0), va="center",
+            color=looks[end["method"]]["color"], xycoords=panels[-1].get_yaxis_transform(),
+            textcoords="offset points", annotation_clip=False,
+        )  # fmt: skip
     shares = spoken(ends.join(study.methods.title, on="method"), "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()

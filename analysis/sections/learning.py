@@ -20,8 +20,6 @@ from coartic.analysis.words import marked, number
 
 BUDGETS = (100, 1_000, 10_000)
 """Numbers of trials after which the table has rewards."""
-WINDOW = 100
-"""Number of trials over which a learning curve averages."""
 CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 """Built-in methods with learning curves; methods from files all have learning curves."""
 
@@ -61,13 +59,13 @@ def list_learning(study: Study) -> Rows:
 
 @figure(
     "Learning curves",
-    "Thick: best reward so far (mean over runs; band: their quartiles). Thin: reward of "
-    f"the trials themselves (mean over runs and the last {WINDOW} trials; failed trials "
-    "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
-    "far below the initial solution are cut off.",
+    "Best reward so far (mean over runs; band: their quartiles). Grey lines: corrective process "
+    "alone (dash-dotted); optimum, or best known reward (dotted). n = {n} runs of a method on a "
+    "task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Draw rewards of the learner, hill climbing, CMA-ES and methods from files, by task."""
+    """Draw the best reward so far of the learner, hill climbing, CMA-ES and methods from files, by
+    task."""
     data = learning_curves(study)
     if not len(data):
         return None
@@ -84,7 +82,6 @@ def draw_learning_curves(study: Study) -> Parts | None:
             band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
             axes.fill_between(curve.trial, curve.best_low, curve.best_high, **band)
             axes.plot(curve.trial, curve.best, linewidth=1.3, **look)
-            axes.plot(curve.trial, curve.trials, linewidth=0.6, **look)
         floor, top = of_task.best.min(), of_task.best_high.max()
         initial, optimum = initial_reward(task), study.optima.get(task.name)
         if not math.isnan(initial):
@@ -94,8 +91,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
             axes.axhline(optimum.reward, **style.OPTIMUM)
             top = max(top, optimum.reward)
         reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
-        lowest = np.fmin(np.maximum(of_task.trials.min(), floor - 0.9 * reach), floor)  # or NaN
-        axes.set_ylim(lowest - 0.04 * reach, top + 0.06 * reach)
+        axes.set_ylim(floor - 0.04 * reach, top + 0.06 * reach)
         style.log_axis(axes)
         axes.set_xlim(1, max(2, of_task.trial.max()))
         axes.set_title(marked(task))
@@ -106,7 +102,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
         style.legend_line(study.methods.title[label], linewidth=1.3, **look)
         for label, look in looks.items()
     ]
-    handles += [style.legend_line("initial solution", **style.INITIAL)]
+    handles += [style.legend_line("corrective process alone", **style.INITIAL)]
     if known := [task.name for task in tasks if task.name in study.optima]:
         handles.append(style.legend_line(standings.reference(study, known), **style.OPTIMUM))
     style.legend(drawing, handles, min(len(handles), 4))
@@ -117,11 +113,11 @@ def draw_learning_curves(study: Study) -> Parts | None:
 
 
 def learning_curves(study: Study) -> pd.DataFrame:
-    """Return the best reward so far, and the reward of trials, by task, method and trial.
+    """Return the best reward so far by task, method and trial.
 
     For runs with a solution; EC1 only on tasks without two-armed conditions. Columns ``task``,
-    ``method``, ``runs``, ``trial``, ``best`` (mean over runs), quartiles ``best_low`` and
-    ``best_high`` of the runs, and ``trials`` (mean over runs and the last :data:`WINDOW` trials).
+    ``method``, ``runs``, ``trial``, ``best`` (mean over runs), and quartiles ``best_low``
+    and ``best_high`` of the runs.
     """
     shown, methods = list[tuple[str, str]](), study.methods
     drawn = methods.index[methods.headline & (methods.base.isin(CURVES) | ~methods.built_in)]
@@ -144,16 +140,9 @@ def learning_curves(study: Study) -> pd.DataFrame:
         # Until every run has a solution (NaN before) there is no mean of them.
         best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
         low, high = np.quantile(best, [0.25, 0.75], axis=0)
-        sums, counts = (
-            pd.Series(values).rolling(WINDOW, min_periods=1).sum()
-            for values in (np.nansum(rewards, axis=0), (~np.isnan(rewards)).sum(axis=0))
-        )
-        trials = (sums / counts).to_numpy()[at - 1]
-        if sum(int(np.isnan(run).sum()) for run in runs) > good.failed_trials.sum():
-            trials = np.full(len(at), math.nan)  # more trials were left out than failed
         curve = {"trial": at, "best": best.mean(axis=0), "best_low": low, "best_high": high}
         named = {"task": task, "method": label, "runs": len(runs)}
-        curves.append(pd.DataFrame(named | curve | {"trials": trials}))
+        curves.append(pd.DataFrame(named | curve))
     return pd.concat(curves[1:] or curves, ignore_index=True)
 
 

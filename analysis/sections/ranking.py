@@ -30,7 +30,7 @@ from coartic.analysis.words import (
 from coartic.estimates import FEWER_RESAMPLES, LEVEL, NEGLIGIBLE, Estimate, bootstrap_estimate
 from coartic.robot import Array
 
-LONGEST = 36
+LONGEST = 44
 """Letters of a name in the figure."""
 
 
@@ -173,8 +173,9 @@ def differences(study: Study) -> dict[str, dict[str, str]]:
     "Gap from the mean reward to the optimum, as a share of it, with its "
     f"{style.COVERAGE} bootstrap interval over runs; to the best known reward where no optimum is "
     "proven, to the best of this folder where none is known. Means over all tasks where there are "
-    "several. The axis is logarithmic from 0.1 % on. Methods that are run once have no interval. "
-    "Diamonds: the paper's learner. Bold names: the learner and methods from files.",
+    "several. The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
+    "have none. n: runs. Diamonds: the paper's learner. Bold names: the learner and methods from "
+    "files.",
 )
 def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of every method, a mean over tasks, with its name."""
@@ -183,9 +184,11 @@ def draw_ranking(study: Study) -> Parts | None:
     if not len(rows):
         return None
     shown = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
-    looks, line, of_groups = looks_in(study, rows.method), 0.0, shown.groupby("information")
-    size = style.ONE, 0.45 + 0.155 * (len(rows) + 1.4 * of_groups.ngroups)
-    drawing, (axes,) = style.panels((1, 1), size)
+    looks, by_group = looks_in(study, rows.method), shown.groupby("information")
+    lines: list[Any] = []  # headings of groups, and rows
+    for group in [group for group in GROUPS if group in by_group.groups]:
+        lines += [capital(group), *by_group.get_group(group).to_dict("records")]
+    drawing, (axes,) = style.panels((1, 1), (style.TWO, 0.6 + 0.165 * len(lines)))
     gaps = shown[["gap", "gap_low", "gap_high"]]
     nearest, farthest = gaps.min().min(), max(gaps.max().max(), 0.5)
     left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
@@ -196,34 +199,30 @@ def draw_ranking(study: Study) -> Parts | None:
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_xticks([], minor=True)
     axes.set_xlim(left, 1.1 * farthest)
+    axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
     axes.axvline(0, **style.OPTIMUM)
-    across = axes.transData - axes.transAxes  # how far to the right: 0 to 1
-    for group in [group for group in GROUPS if group in of_groups.groups]:
-        at = axes.get_yaxis_transform()
-        axes.text(0.01, line, capital(group), color=style.GREY, va="center", transform=at)
-        for row in of_groups.get_group(group).to_dict("records"):
-            line += 1
-            learner, low, high = row["kind"] == "learner", row["gap"], row["gap"]
-            look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
-            if row["gap_low"] < row["gap_high"]:
-                low, high = row["gap_low"], row["gap_high"]
-                axes.plot([low, high], [line, line], "|-", markersize=6, linewidth=1, **look)
-            mark = "D" if learner else "o"
-            (dot,) = axes.plot(row["gap"], line, mark, markersize=2.6, markeredgewidth=0, **look)
-            name, gap = standings.shown_name(study, row["method"]), number(row["gap"], 1)
-            style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
-            ends = across.transform([(low, 0), (high, 0)])[:, 0]
-            right = ends[1] < 1 - ends[0]  # there is more room
-            style_of_name: Any = {"textcoords": "offset points", "va": "center_baseline"}
-            style_of_name |= {"ha": "left"} if right else {"ha": "right"}
-            style_of_name |= {"weight": "bold"} if learner or not row["built_in"] else {}
-            if len(name) > LONGEST:  # its end may say on how many tasks
-                name = f"{name[: LONGEST - 20]}…{name[-19:]}"
-            text, place = (f"{gap}  {name}", (high, 6)) if right else (f"{name}  {gap}", (low, -6))
-            axes.annotate(text, (place[0], line), (place[1], 0), **style_of_name)
-        line += 1.4
-    axes.set_ylim(line - 0.8, -0.6)
-    axes.set_yticks([])
+    style.name_rows(axes, [name_in_figure(study, line) for line in lines])
+    beside: Any = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
+    beside |= {"va": "center_baseline"}
+
+    def write_right(y: int, gap: str, n: str, color: str) -> None:
+        axes.annotate(gap, (1, y), (8, 0), color=color, **beside)
+        axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **beside)
+
+    write_right(1, f"gap (%) [{style.COVERAGE}]", "n", style.GREY)
+    for place, (row, label) in enumerate(zip(lines, axes.get_yticklabels(), strict=True)):
+        if isinstance(row, str):
+            label.set_color(style.GREY)
+            continue
+        learner, y = row["kind"] == "learner", -place
+        look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
+        axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=4, alpha=0.5, **look)
+        mark = "D" if learner else "o"
+        (dot,) = axes.plot(row["gap"], y, mark, markersize=2.6, markeredgewidth=0, **look)
+        name = standings.shown_name(study, row["method"])
+        style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
+        label.set_weight("bold" if learner or not row["built_in"] else "normal")
+        write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
     axes.spines["left"].set_visible(False)
     to = standings.reference(study, tasks)
     where = "" if len(tasks) > 1 else f"{study.tasks[tasks[0]].label}: "
@@ -231,6 +230,14 @@ def draw_ranking(study: Study) -> Parts | None:
     axes.set_xlabel(f"{where}gap to {short} (%)")
     alt = f"Gap to the {to} by method: {spoken(shown, '{title} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
+
+
+def name_in_figure(study: Study, line: Any) -> str:
+    """Return the name left of a line of the figure: a heading, or a row with a method."""
+    name = line if isinstance(line, str) else standings.shown_name(study, line["method"])
+    if len(name) > LONGEST:  # its end may say on how many tasks
+        name = f"{name[: LONGEST - 20]}…{name[-19:]}"
+    return name
 
 
 CARDS = {

@@ -76,6 +76,22 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     return Estimate(value, float(low), float(high))
 
 
+def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Array]:
+    """Return both ends of the interval of the share of targets reached within each budget.
+
+    The percentile interval is of the bootstrap over runs within tasks; NaN if a task has too few
+    runs.
+    """
+    sizes = tuple(map(len, times))
+    if min(sizes) < FEWEST:
+        return np.full(len(budgets), math.nan), np.full(len(budgets), math.nan)
+    weights = np.repeat([1 / size / len(times) for size in sizes], sizes)
+    reached = [np.searchsorted(np.sort(run), budgets, "right") / len(run)
+               for of_task in times for run in of_task]  # fmt: skip
+    low, high = np.quantile((draws(sizes) * weights) @ np.array(reached), TAILS, axis=0)
+    return low, high
+
+
 @lru_cache(maxsize=4)  # methods mostly have as many runs as another
 def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     """Return the number of times that each resample draws each run, shape ``(resamples, runs)``.

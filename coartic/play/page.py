@@ -11,6 +11,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import coartic
+from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import Task, shipped_tasks
 
 FOLDER = Path(__file__).parent
@@ -37,13 +38,13 @@ def play_page(task: Task | None = None) -> str:
     )
 
 
-def player_figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -> str:
+def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
     """The figure as a part of a page, which has the styles of ``play.css`` and defines the colours
     that these name.
 
-    ``presets`` are what it offers (:func:`preset_of`); ``still`` stands where scripts are switched
-    off. ``more`` is for the scripts: the ``page`` to which links lead, None for none; ``first``,
-    what is chosen at first; ``cells`` of the table ``ranking`` that show films: row, column and
+    ``presets`` are what it offers (:func:`preset_of`). ``more`` is for the scripts: the ``page`` to
+    which links lead, None for none; ``first``, what is chosen at first; ``folder`` with the stored
+    runs, as a shell reads it; ``cells`` of the table ``ranking`` that show films: row, column and
     what to choose.
     """
     content = {"presets": presets, "version": coartic.__version__, **more}
@@ -52,7 +53,7 @@ def player_figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more:
         templates()
         .get_template("figure.html.jinja")
         .render(
-            still=still or part_of_page("still.svg"),
+            still=part_of_page("still.svg"),
             data=data.replace("<", "\\u003c"),
             model="\n".join(map(part_of_page, ("model.js", "worker.js"))),
             script="\n".join(map(part_of_page, ("picture.js", "play.js", "begin.js"))),
@@ -61,17 +62,19 @@ def player_figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more:
 
 
 def preset_of(task: Task) -> dict[str, Any]:
-    """A task as the figure offers it."""
+    """Return a task as the figure offers it, with its proven optimum, or None."""
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
-    return {"label": f"{task.label}{mark}", "task": content}
+    best = best_shipped(task)
+    optimum = best.reward if best and best.proven else None
+    return {"label": f"{task.label}{mark}", "task": content, "optimum": optimum}
 
 
 def up_or_down() -> dict[str, Any]:
     """One first goal before two others."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
-    return {**preset_of(up), "label": "Up or down", "others": down.goals[1:]}
+    return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 
 
 def part_of_page(name: str) -> str:

@@ -13,9 +13,8 @@ const FAR = 12; // length units or rad: no goal lies farther, no joint is turned
 const STRIDE = 2; // length units, to a new goal
 const ROLES = ["first", "second"];
 const NAMES = {
-  alone: "one goal at a time", learner: "the learner", plan: "the planner", you: "you",
+  alone: "the corrective process alone", learner: "the learner", plan: "the planner (local search)", you: "you",
 };
-const RANDOM_SEARCH = "random-search"; // among stored runs
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
 const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
@@ -287,6 +286,17 @@ class Play {
     this.refresh();
   }
 
+  /* The optimum of the task, where it is known. */
+  get optimum() {
+    const { goals, others } = this.state;
+    return !others && same(goals, this.preset.task.goals) ? this.preset.optimum : null;
+  }
+
+  /* The number of a goal, with a letter where each of two robots has its own. */
+  labelOf(k, g) {
+    return `${g + 1}${this.problems.length > 1 && g ? "ab"[k] : ""}`;
+  }
+
   /* ---- Time: both robots wait for each other at the goal they share, or that is before the moved one ---- */
 
   get shared() {
@@ -376,7 +386,7 @@ class Play {
       if (k && !g) return;
       const mover = this.main[k];
       stage.goal(goal, problem.radius, {
-        label: `${g + 1}`, movable: !this.editing, held: this.held && this.held.name === `${k} ${g}`,
+        label: this.labelOf(k, g), movable: !this.editing, held: this.held && this.held.name === `${k} ${g}`,
         colour: this.problems.length > 1 && !g ? colours.ink : colours[ROLES[k]],
         hit: mover.hits[g] !== undefined && mover.hits[g] <= this.row(mover),
       });
@@ -429,30 +439,28 @@ class Play {
 
   /* Posture difference of the robots at the goal that they share, in words and as a picture. */
   compare() {
-    const both = this.main.length > 1 ? this.postures_met : [];
-    this.find("together").hidden = !both.length || !both.every((runs) => runs.length);
+    const both = this.main.length > 1 && !this.editing ? this.postures_met : [];
+    this.find("inset").hidden = !both.length || !both.every((runs) => runs.length);
     [this.difference, this.by_chance] = [null, null];
-    if (this.find("together").hidden) return;
+    if (this.find("inset").hidden) return;
     this.difference = posture_difference(this.announced ? both.map((runs) => runs.slice(1)) : both);
     if (this.announced) this.difference.shifts = both.map(([before, after]) => distance_of(before, after));
     else {
-      const stored = this.stored(RANDOM_SEARCH);
-      const random = both.map((_, k) => (stored ? stored.films[k].reached : this.practised(`${k} random`).map(({ reached }) => reached[0])));
-      if (random.every((runs) => runs.length)) this.by_chance = posture_difference(random);
+      const random = both.map((_, k) => this.practised(`${k} random`).map(({ reached }) => reached[0]));
+      if (random.every((runs) => runs.length)) this.by_chance = posture_difference(random).deviations || 0;
+      if (this.stored(this.state.who)) this.by_chance = this.preset.by_chance;
     }
-    if (!this.state.open) return;
     const { inset, colours, problems: [problem] } = this;
     const { means } = this.difference;
     const points = both.flatMap((runs, k) => [...runs, means[k]].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
     const [x, y] = problem.goals[this.shared];
     inset.begin(around([...points, [x + 0.3, y + 0.2], ...means.map(([base_x, base_y]) => [base_x - 0.5, base_y - 0.1])], 0.3));
-    const thin = this.announced ? " Thin: before the goal moved." : both.some((runs) => runs.length > 1) ? " Thin: single runs; thick: their mean." : "";
-    this.find("enlarged").textContent = `At goal ${this.shared + 1}, enlarged.${thin}`;
     both.forEach((runs, k) => {
       runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
       inset.robot(problem, means[k], { colour: colours[ROLES[k]], alpha: 0.9 });
     });
-    inset.goal([x, y], problem.radius, { label: `${this.shared + 1}`, colour: colours.ink, hit: true });
+    inset.goal([x, y], problem.radius, { label: "", colour: colours.ink, hit: true });
+    inset.text(`at goal ${this.shared + 1}`, [8, 12], colours.soft, "left", 12);
   }
 
   /* Ticks needed against trials, on a logarithmic scale. */
@@ -463,7 +471,7 @@ class Play {
     if (!learns) return;
     const runs_of = (k) => Array.from({ length: SEEDS }, (_, seed) => this.result(`${k} run ${seed}`)).filter(Boolean);
     const runs = this.problems.flatMap((_, k) => runs_of(k));
-    const references = [...this.alone.map((trial) => -trial.reward), ...this.plan.map((plan) => plan && -plan.reward)].filter(Number.isFinite);
+    const references = [...this.alone.map((trial) => -trial.reward), ...this.plan.map((plan) => plan && -plan.reward), this.optimum ? -this.optimum : NaN].filter(Number.isFinite);
     const learned = runs.flatMap(({ snapshots }) => snapshots.map(({ reward }) => -reward));
     const all = [...references, ...learned].filter(Number.isFinite);
     if (!all.length) return;
@@ -488,9 +496,11 @@ class Play {
       context.strokeStyle = colours[ROLES[k]];
       level(this.alone[k].reward, [2, 4]);
       level(this.plan[k] && this.plan[k].reward, [8, 4]);
+      level(this.optimum || NaN, []);
       runs_of(k).forEach(({ snapshots }) => curve.path(snapshots.flatMap(({ trials, reward }, i) => (
         [snapshots[Math.max(0, i - 1)].reward, reward].map((each) => [x(trials), y(-each)]))), 1.5));
     });
+    curve.text("ticks, by trials", [right, top + 8], colours.soft, "right", 12);
     const at = Math.min(this.shown, Math.max(1, ...runs.map(({ made }) => made)));
     context.fillStyle = colours.ink;
     context.fillRect(x(at) - 0.75, top, 1.5, bottom - top);
@@ -501,14 +511,13 @@ class Play {
   /* What is to be seen, of one robot or of two. */
   get lead() {
     const { who, mate } = this.state;
-    const [{ free, goals, hands }] = this.problems;
+    const [{ goals, hands }] = this.problems;
     const two = this.main.length > 1;
-    const box = ["The box stands", "The box slides on its rail", "The box slides"][free.filter(Boolean).length];
     let seen = `the robot hits ${goals.length > 1 ? `goals 1 to ${goals.length} in turn` : "goal 1"}${hands.length > 1 ? ", with either hand" : ""}.`;
     if (two) seen = "both robots hit goal 1; then blue goes for the blue goals, orange for the orange ones.";
     if (this.announced) seen = `goal ${this.announced.goal + 1} has just moved. Blue is its next trial, orange a planner's.`;
     if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot, a posture for each goal.${two ? ` Orange: ${this.nameOf(mate)}.` : ""}`;
-    return `${capital(this.nameOf(who))}: ${seen} ${box}, the joints turn.${this.editing ? "" : " Goals can be dragged."}`;
+    return `${capital(this.nameOf(who))}: ${seen}${this.editing ? "" : " Goals can be dragged."}`;
   }
 
   nameOf(who) {
@@ -523,7 +532,7 @@ class Play {
     const far = "Distances are of box and joints together, in length units and radians.";
     if (announced) {
       const [learner, planner] = difference && main.length > 1 ? difference.shifts.map(short) : ["…", "…"];
-      return [`At goal ${announced.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner}.`, far];
+      return [`At goal ${announced.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner}.`, `${far} Thin: before the goal moved.`];
     }
     if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) return ["You are as fast as the planner!"];
     if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
@@ -533,20 +542,20 @@ class Play {
       const used = hands.length > 1 ? ` (${tried} ${letters_of(this.alone[0].hands)})` : "";
       const runs = this.practised("0 run").length;
       return [
-        `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} one goal at a time${used}.`,
+        `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
         runs > 1 && state.who === "learner" ? `Shown is the median of the learner's ${runs} runs.` : "",
       ];
     }
     if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) return ["They hit goal 1 with different hands."];
     if (!difference) return [""];
     const { deviations, distance, runs } = difference;
-    const { by_chance } = this;
-    const beside = (value) => (by_chance ? ` (random search: ${value})` : "");
     if (distance < 0.005) return ["At goal 1 the two robots stand alike."];
-    if (deviations === null) return [`At goal 1 the posture difference is ${short(distance)}${beside(by_chance && short(by_chance.distance))}.`, far];
+    const several = state.who === "learner" || (this.stored(state.who) && runs > 1);
+    if (!several) return [`At goal 1 the posture difference is ${short(distance)}.`, far];
+    const random = Number.isFinite(this.by_chance) ? ` (random search: ${this.by_chance.toFixed(1)})` : "";
     return [
-      `At goal 1 the posture difference is ${deviations.toFixed(1)} standard deviations${beside(by_chance && (by_chance.deviations || 0).toFixed(1))}.`,
-      `One standard deviation is how far single runs lie from their mean (${runs} runs each). Random search keeps the best of as many random trials.`,
+      `At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
+      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${runs} runs each). Random search keeps the best of as many random trials.`,
     ];
   }
 
@@ -559,8 +568,9 @@ class Play {
     if (main.length < 2) names = [capital(this.nameOf(state.who))];
     const scores = main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
     if (main.length > 1 && !you) return scores;
-    if (main.length < 2 && state.who !== "alone") scores.push(["ghost", "One goal at a time", this.alone[0].reward]);
-    if (this.plan[0] && state.who !== "plan") scores.push(["plan", "Planner that sees all goals", this.plan[0].reward]);
+    if (main.length < 2 && state.who !== "alone") scores.push(["ghost", "Corrective process alone", this.alone[0].reward]);
+    if (this.plan[0] && state.who !== "plan") scores.push(["bare", "Planner (local search)", this.plan[0].reward]);
+    if (this.optimum) scores.push(["bare", "Optimum (proven)", this.optimum]);
     return scores;
   }
 
@@ -574,7 +584,7 @@ class Play {
       const line = document.createElement("span");
       const figure = document.createElement("strong");
       line.className = role;
-      figure.textContent = Number.isFinite(reward) ? counted(-reward, "tick") : "no end";
+      figure.textContent = Number.isFinite(reward) ? counted(-reward, "tick") : "–";
       line.append(`${name} `, figure);
       return line;
     });
@@ -584,6 +594,9 @@ class Play {
       lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", play: this.playing ? "Pause" : "Play",
       count: `${this.main.map((mover, k) => `${this.main.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${mover.last + 1}`).join(", ")} ticks`,
     });
+    const stored = this.stored(state.who);
+    this.find("film").hidden = !stored;
+    if (stored) this.find("film").lastChild.textContent = `coartic animate ${stored.films.map(({ run }) => run).join(" ")} --in ${this.data.folder}`;
     if (state.who === "you") [this.find("hand").value] = this.own[state.edited - 1];
     this.find("practice").hidden = !learns;
     const trials = this.find("trials");
@@ -626,7 +639,7 @@ class Play {
       this.problems.forEach((problem, k) => problem.goals.forEach((goal, g) => {
         if (k && !g) return;
         const whose = this.problems.length > 1 && g ? (k ? " of orange" : " of blue") : "";
-        wanted.set(`${k} ${g}`, { at: goal, label: `Goal ${g + 1}${whose}`, move: (to) => this.moveGoal(k, g, to) });
+        wanted.set(`${k} ${g}`, { at: goal, label: `Goal ${this.labelOf(k, g)}${whose}`, move: (to) => this.moveGoal(k, g, to) });
       }));
     }
     const layer = this.find("handles");
@@ -968,8 +981,8 @@ class Play {
 
   /* The stage at twice its size, with the words beside it. */
   save() {
-    const { stage, data, colours } = this;
-    stage.density = 2;
+    const { stage, inset, data, colours } = this;
+    [stage.density, inset.density] = [2, 2];
     this.draw();
     const [width, height] = stage.size;
     const picture = new Picture(document.createElement("canvas"));
@@ -984,8 +997,9 @@ class Play {
     context.fillStyle = stage.colour("page");
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.drawImage(stage.canvas, 0, 0);
+    if (!inset.canvas.hidden) context.drawImage(inset.canvas, 2 * inset.canvas.offsetLeft, 2 * inset.canvas.offsetTop);
     lines.forEach((line, k) => picture.text(line, [24, 2 * height + 32 + 40 * k], colours.ink, "left", 28));
-    stage.density = 0;
+    [stage.density, inset.density] = [0, 0];
     this.draw();
     canvas.toBlob((blob) => this.download(blob, "coartic.png"));
   }
