@@ -150,7 +150,7 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
     assert "The learner" in part(page, "score").inner_text()
 
 
-def test_a_cell_of_the_ranking_opens_its_film(opened):
+def test_a_cell_of_the_ranking_opens_its_film_and_says_its_command(opened, traced):
     page = opened()
     cells = page.locator("#table-ranking .film-of")
     assert cells.count() > 5
@@ -158,6 +158,9 @@ def test_a_cell_of_the_ranking_opens_its_film(opened):
     row.locator(".film-of").click()
     assert part(page, "stored").input_value() == "hill-climbing"
     assert part(page, "preset").locator("option:checked").text_content() == "Two-armed 1 †"
+    run = typical_run(traced.cells["two-armed-1", "hill-climbing"].good)
+    command = rf"coartic animate {run[:8]} --in \S+"
+    assert re.fullmatch(command, part(page, "film").locator("code").inner_text())
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
     assert not page.get_by_role("button", name="Copy link").is_visible()
@@ -202,7 +205,7 @@ def test_without_scripts_all_is_there(browser, address):
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
     page.goto(address)
-    assert page.get_by_text("scripts are switched off here").is_visible()
+    assert page.locator(".still svg").is_visible()
     assert page.locator("#table-claims tbody tr").count() > 10
     assert not page.locator("#claims-search").is_visible()
     context.close()

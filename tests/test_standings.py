@@ -148,6 +148,13 @@ def test_crossings_by_brute_force():
         assert at == pytest.approx(share(budget))
     assert running_times.share_reached(spends) == pytest.approx(share(1e300))
     assert math.isnan(running_times.budget_for([spends[0][:2]], 0.5).low)  # too few runs
+    at = np.quantile(budgets, [0.1, 0.5])
+    drawn = [
+        np.mean([(part[rng.integers(0, len(part), len(part))][..., None] <= at).mean((0, 1))
+                 for part in spends], axis=0) for _ in range(2000)
+    ]  # fmt: skip
+    due = np.quantile(drawn, [0.025, 0.975], axis=0)
+    assert np.array(running_times.interval_by_budget(spends, at)) == pytest.approx(due, abs=0.015)
 
 
 def test_a_failed_run_reaches_nothing():
@@ -242,20 +249,24 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     assert TABLES["ranking"](one).loc["mine", "on ascending"] == pytest.approx(4.5 / 292)
 
 
-def test_the_ranking_figure_names_every_method_inside():
-    """Also those at the optimum and far away; with the gap, and its interval's ends."""
+def test_the_ranking_figure_has_every_name_gap_and_interval():
+    """Also of methods at the optimum and far away."""
     rewards = {"best": -292, "far": -3000, "dual-process/EC1": -305}
     runs = {("ascending", name): [reward] for name, reward in rewards.items()}
     seen = study(runs | {("ascending", "spread"): [-294, -296, -299, -301]})
     (axes,) = FIGURES["ranking"](seen).figure.axes
-    texts = [text.get_text() for text in axes.texts]
-    for words in ("0.0  best", "927.4  far", "learner EC1  4.5", "spread  1.9"):
-        assert any(sorted(words.split()) == sorted(text.split()) for text in texts), words
+    places = {text.get_text(): text.get_position()[1] for text in axes.get_yticklabels()}
+    right = {text.get_text(): text.xy[1] for text in axes.texts}
+    for name, gap in {"best": "0.0", "far": "927.4", "learner EC1": "4.5"}.items():
+        assert right[gap] == places[name]
+    (spread,) = (text for text in right if text.startswith("1.9 ["))
+    assert right[spread] == places["spread"]
     low, high = axes.get_xlim()
     drawn = [x for line in axes.lines for x in line.get_xdata()]
     assert low <= min(drawn)
     assert max(drawn) <= high
-    (ends,) = (line.get_xdata() for line in axes.lines if line.get_marker() == "|")
+    bars = [bar for bars in axes.collections for bar in bars.get_segments() if len(bar)]
+    (ends,) = (bar[:, 0] for bar in bars if bar[0, 1] == places["spread"])
     assert ends[0] < 100 * 5.5 / 292 < ends[1]
     assert len(axes.get_xlabel().removesuffix(" (%)").split()) <= 5
 
@@ -282,8 +293,8 @@ def test_what_a_method_did_not_run_on_leaves_it_its_gap_there():
     assert ranked.index.tolist()[:2] == ["mine", "cma-es/bandit"]
     assert ranked.gap["mine"] == pytest.approx(9 / 292)
     assert ranked.tasks[:3].tolist() == [1, 2, 2]
-    texts = [text.get_text() for text in FIGURES["ranking"](seen).figure.axes[0].texts]
-    assert any("mine (1 of 2 tasks)" in text for text in texts)
+    (axes,) = FIGURES["ranking"](seen).figure.axes
+    assert "mine (1 of 2 tasks)" in [text.get_text() for text in axes.get_yticklabels()]
     cells = costs.cells_with_targets(seen)
     assert [cell.task for cell in cells["mine"]] == ["ascending"]
     assert len(cells["cma-es/bandit"]) == 2

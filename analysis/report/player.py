@@ -15,6 +15,7 @@ from coartic.analysis.sections.coarticulation import shared_goal
 from coartic.analysis.sections.own import own_methods
 from coartic.analysis.standings import compared
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, typical_run
+from coartic.analysis.table import SHORT_ID
 from coartic.play.page import player_figure, preset_of
 from coartic.robot import HANDS
 
@@ -29,7 +30,12 @@ def player(study: Study) -> str:
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
         (up, down), first = shared.tasks, shared.method
-        both = {**preset_of(up), "label": f"{up.label} or {down.label}", "others": down.goals[1:], "optimum": None}
+        both = {
+            **preset_of(up),
+            "label": f"{up.label} or {down.label}",
+            "others": down.goals[1:],
+            "optimum": None,
+        }
         both["runs"] = methods_played(study, [up.name, down.name])
         every = every_random_search_for(study, shared)
         by_chance = [float(each.standardised_posture_difference) for each in every]
@@ -108,4 +114,4 @@ def film_of(study: Study, key: CellKey) -> dict[str, Any]:
         for movement in stored[run]
     ]
     ticks = sum(movement.ticks or 0 for movement in stored[run])
-    return {"run": run, "ticks": ticks, "movements": movements}
+    return {"run": run[:SHORT_ID], "ticks": ticks, "movements": movements}

@@ -192,7 +192,7 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
     frame = frame[["setting" not in names for names in classes_of(table, frame)]]
     columns = columns_of(table, frame)
     chosen = [c for want in IN_LATEX[table.id].split(", ") for c in columns if fnmatch(c, want)]
-    cells, heads, sides = [], [], ""
+    cells, heads, sides = list[list[str]](), [], ""
     for column in chosen:
         texts, numbers = texts_of(table, frame, column), is_number(frame[column])
         if len({*texts}) == 1 < len(texts) and not numbers:
@@ -201,7 +201,7 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
         side, longest = "r" if numbers else "l", max(map(len, texts))
         head = textwrap.wrap(columns[column], max(longest, 9), break_long_words=False)
         heads.append(f"\\shortstack[{side}]{{" + "\\\\{}".join(map(latex, head)) + "}")
-        breaks = not cells or not numbers and longest > LONGEST
+        breaks = not cells or (not numbers and longest > LONGEST)
         sides += ">{\\raggedright\\arraybackslash}X" if breaks else side
         cells.append(list(map(latex, texts)))
     # Two columns may have one header.

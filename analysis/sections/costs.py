@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -228,11 +227,11 @@ def draw_runtimes(study: Study) -> Parts | None:
     if data.empty:
         return None
     steps = []
-    for (method, spend), curve in data.groupby(["method", "spend"], sort=False):
+    for (label, spend), curve in data.groupby(["method", "spend"], sort=False):
         # No more than are seen.
         curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 150).round()).astype(int)]
-        cells = cells_with_targets(study)[method]
-        times = [times_of(study, cell, spend) for cell in cells]
+        cells = cells_with_targets(study)[str(label)]
+        times = [times_of(study, cell, str(spend)) for cell in cells]
         low, high = running_times.interval_by_budget(times, curve.budget.to_numpy())
         runs = sum(len(cell.runs) for cell in cells)
         steps.append(curve.assign(share_low=low, share_high=high, runs=runs))
@@ -264,8 +263,8 @@ def draw_runtimes(study: Study) -> Parts | None:
         axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
     panels[0].set_ylabel("targets reached (%)")
-    panels[0].annotate("half of the targets", (0, 50), (3, 2), color=style.GREY,
-                       xycoords=panels[0].get_yaxis_transform(), textcoords="offset points")  # fmt: skip
+    at, grey = panels[0].get_yaxis_transform(), style.GREY
+    panels[0].text(0.01, 51, "half of the targets", color=grey, va="bottom", transform=at)
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share).sort_values("share")

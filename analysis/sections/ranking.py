@@ -221,7 +221,7 @@ def draw_ranking(study: Study) -> Parts | None:
         (dot,) = axes.plot(row["gap"], y, mark, markersize=2.6, markeredgewidth=0, **look)
         name = standings.shown_name(study, row["method"])
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
-        label.set_weight("bold" if learner or not row["built_in"] else "normal")
+        label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
         write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
     axes.spines["left"].set_visible(False)
     to = standings.reference(study, tasks)

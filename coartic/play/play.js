@@ -13,7 +13,7 @@ const FAR = 12; // length units or rad: no goal lies farther, no joint is turned
 const STRIDE = 2; // length units, to a new goal
 const ROLES = ["first", "second"];
 const NAMES = {
-  alone: "the corrective process alone", learner: "the learner", plan: "the planner (local search)", you: "you",
+  alone: "corrective process alone", learner: "the learner", plan: "the planner (local search)", you: "you",
 };
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
