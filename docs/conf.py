@@ -14,7 +14,13 @@ project = "coartic"
 author = copyright = "The coartic developers"  # noqa: A001
 version = release = coartic.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_directives"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "site_directives",
+]
 source_suffix = {".md": "myst-nb"}
 exclude_patterns = ["examples"]
 
@@ -68,6 +74,12 @@ def sh(line, cell):
 '''
 
 
+def pictures_named(section):
+    """Give the pictures of a section its heading as their alternative text."""
+    heading, cell = section.partition("\n")[0].strip("# "), "```{code-cell} ipython3\n"
+    return section.replace(cell, f'{cell}:mystnb: {{image: {{alt: "{heading}"}}}}\n')
+
+
 def setup(app):
     """Let the pages be read in the repository and on the site alike."""
 
@@ -95,6 +107,7 @@ def setup(app):
         image = 'import IPython\nIPython.display.Image("\\1", width=360)'
         picture = f"{cell}:tags: [remove-input]\n{image}\n```"
         text = re.sub(r"<!-- picture (\S+) -->", picture, text)
+        text = "".join(map(pictures_named, re.split(r"(?m)^(?=## )", text)))
         source[0] = f"{_NOTEBOOK}{cell}:tags: [remove-cell]\n{_FIRST_CELL}```\n\n{text}"
 
     def bars(app, what, name, thing, options, lines):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import UnionType
@@ -14,7 +15,8 @@ from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
 from coartic.play.page import part_of_page, play_page, player_figure, preset_of, up_or_down
-from coartic.tasks.task import shipped_tasks
+from coartic.tasks.optima import BEST_KNOWN, best_shipped
+from coartic.tasks.task import Task, shipped_tasks
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
@@ -72,6 +74,36 @@ def margins() -> Iterator[str]:
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
 
 
+def tasks() -> Iterator[str]:
+    """Yield the table of the paper's tasks with their best known rewards."""
+
+    def row(task: Task) -> tuple[str, ...]:
+        best = best_shipped(task)
+        assert best is not None
+        free = [axis for axis in "xy" if axis not in task.locked_base]
+        goals = " ".join(f"({x:g}, {y:g})" for x, y in task.goals)
+        proof = "proven" if best.proven else f"none above {best.bound} is possible"
+        lacking = " and ".join(task.reconstructed) or "nothing"
+        base = f"from ({task.q0[0]:g}, {task.q0[1]:g}) along {' and '.join(free)}"
+        reward = f"{best.reward} ({proof})".replace("-", "−")
+        return f"`{task.name}`", " and ".join(task.hands), base, goals, reward, lacking
+
+    heads = "task", "hands", "base", "goals (length units)", "best known reward", "reconstructed"
+    yield from table(heads, map(row, shipped_tasks().values()))
+
+
+def families() -> Iterator[str]:
+    """Yield the table of the families with the number of proven optima."""
+    with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
+        instances = [*csv.DictReader(lines)]
+    rows = []
+    for family in dict.fromkeys(each["instance"].rpartition("/")[0] for each in instances):
+        best = [each for each in instances if each["instance"].startswith(f"{family}/")]
+        proven = sum(each["reward"] == each["bound"] for each in best)
+        rows.append((f"`{family}`", f"{proven} of {len(best)}"))
+    yield from table(("family", "optima proven"), rows)
+
+
 def columns() -> Iterator[str]:
     """Yield the table of the columns of view ``runs``."""
     from coartic.runs.record import COLUMNS
@@ -89,9 +121,15 @@ def play() -> Iterator[str]:
     yield "```"
 
 
-def add_page(app: Sphinx, failure: Exception | None) -> None:
-    """Put the page of the figure beside the index, with a link to it."""
+def finish(app: Sphinx, failure: Exception | None) -> None:
+    """Put the page of the figure beside the index, with a link to it, and give headings of the
+    navigation their level, which Sphinx leaves out."""
     if failure is None:
+        for path in Path(app.outdir).rglob("*.html"):
+            html = path.read_text("utf-8")
+            path.write_text(
+                html.replace('role="heading">', 'role="heading" aria-level="2">'), "utf-8"
+            )
         home = '<main>\n<p class="soft"><a href="index.html">coartic: findings, how-to</a></p>'
         page = play_page().replace("<main>", home, 1)
         (Path(app.outdir) / "play.html").write_text(page, encoding="utf-8")
@@ -130,5 +168,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Register the directive."""
     app.add_directive("made", Made)
     app.connect("autodoc-process-signature", plainly)
-    app.connect("build-finished", add_page)
+    app.connect("build-finished", finish)
     return {"parallel_read_safe": True}

@@ -94,6 +94,8 @@ def main() -> None:
     if os.path.lexists("matplotlibrc"):  # it can name programs to run: do not trust it
         with contextlib.chdir(os.path.dirname(__file__)):
             import matplotlib  # noqa: F401
+    if sys.argv[1:2] == ["help"]:
+        sys.argv[1:] = [*sys.argv[2:], "--help"]
     try:
         app(prog_name="coartic")
     except CoarticError as error:

@@ -13,6 +13,7 @@ import typer
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import check_limits
+from coartic.internal.text import did_you_mean, unknown
 
 if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
@@ -107,6 +108,9 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
             if Path(file := file_name(name)).is_file():
                 words = f"method {name!r} is not known: add --method-file {file}"
                 raise CoarticError(f"{words}, if it is defined there") from None
+            every = [*ids, *filter(None, ids.values())]
+            if did_you_mean(name, every):
+                raise CoarticError(unknown("method", name, every)) from None
             raise
     return meant
 

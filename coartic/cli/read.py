@@ -107,6 +107,8 @@ def trace(
     if row is None:
         say_pairs(traced.beginnings(TABLES[table], frame))
         return
+    titles = frame.attrs.get("titles", {})
+    row = given.id_named(row, {str(each): titles.get(each, "") for each in frame.index})
     if row not in frame.index:
         raise CoarticError(unknown("row", row, frame.index))
     ids = str(frame.run_ids.fillna("")[row]).split()

@@ -24,8 +24,11 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """Print an ``Error`` or a ``Warning`` on stderr, with the word before each line."""
-    say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
+    """Print an ``Error`` or a ``Warning`` on stderr; a terminal breaks lines between words."""
+    width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
+    whole_words = {"break_long_words": False, "break_on_hyphens": False}
+    for line in text.splitlines():
+        say(*textwrap.wrap(f"{kind}: {line}", width, **whole_words), stream=sys.stderr)
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
