@@ -295,7 +295,7 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
 
 def test_help_has_a_short_name(coartic):
     for command in ((), ("run",), ("trace",)):
-        assert coartic(*command, "-h") == coartic(*command, "--help")
+        assert coartic(*command, "-h") == coartic(*command, "--help") == coartic("help", *command)
 
 
 SURROUNDED = """
@@ -409,6 +409,8 @@ def test_play(coartic, tmp_path, monkeypatch):
     assert shown == [page.as_uri()]
     assert "--replace" in coartic("play", "--out", page)[2]
     assert "did you mean 'ascending'" in coartic("play", "ascendin")[2]
+    wrong = coartic("run", "quick", "--methods", "shortest-path", "--out", tmp_path / "runs")[2]
+    assert "did you mean 'shortest-path plan'" in wrong
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     assert "open it in a browser" in coartic("play", "--no-open")[1]
     assert len(shown) == 1

@@ -78,6 +78,11 @@ def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, coart
     for run, seed, reward in zip(runs, stored.seed, stored.reward, strict=True):
         line = [line for line in text.splitlines() if run[:SHORT_ID] in line][-1]
         assert {str(seed), f"−{-reward}"} <= set(line.split())
+    by_id, by_name = (
+        coartic("trace", "ranking", name, "--in", results)[1]
+        for name in ("hill-climbing", "Hill climbing")
+    )
+    assert by_id == by_name
     listed = coartic("trace", "methods", "--in", results)[1].splitlines()
     assert [line.partition("  ")[0] for line in listed if not line.startswith(" ")] == names
     of_another_row = frame.run_ids.iloc[1].split()[0]

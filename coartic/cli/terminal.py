@@ -26,9 +26,9 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 def complain(kind: str, text: str) -> None:
     """Print an ``Error`` or a ``Warning`` on stderr; a terminal breaks lines between words."""
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
-    whole_words = {"break_long_words": False, "break_on_hyphens": False}
+    wrap = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False).wrap
     for line in text.splitlines():
-        say(*textwrap.wrap(f"{kind}: {line}", width, **whole_words), stream=sys.stderr)
+        say(*wrap(f"{kind}: {line}"), stream=sys.stderr)
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
