@@ -197,7 +197,7 @@ SECTIONS = (
         caption="Best reward so far, mean over runs (ticks)",
         figure=learning.draw_learning_curves,
         sentence=learning.how_fast,
-        note="Gain: improvement over the initial solution. ∞: never improved.",
+        note="Gain: improvement over the corrective process alone. ∞: never improved.",
         folded=True,
     ),
     Section(

@@ -162,7 +162,7 @@ def runtimes(
             f"targets are {brief_value(targets)}: needed are numbers above 0 and up to 1"
         )
     if not spans(study):
-        raise CoarticError("no task has a best known reward above that of its initial solution")
+        raise CoarticError("no task has a best known reward above the corrective process alone")
     rows = []
     for name, cells in cells_with_targets(study).items():
         for spend in SPENDS:

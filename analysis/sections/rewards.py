@@ -212,5 +212,5 @@ def changed_hands(study: Study) -> str:
             if before not in commonest:
                 changes.append(f"on {marked(task)} from {before} to {' or '.join(commonest)}")
     if not changes:
-        return "The learner most often keeps the hands of the initial solution."
+        return "The learner most often keeps the initial hands."
     return f"The learner most often changes hands {listed(changes)}."

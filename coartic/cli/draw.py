@@ -62,7 +62,7 @@ def animate(
     ] = None,
     folder: given.In = Path("results"),
     initial: Annotated[
-        bool, typer.Option("--initial", help="Show the initial solution next to it.")
+        bool, typer.Option("--initial", help="Show the corrective process alone next to it.")
     ] = False,
     width: Annotated[int, given.within("--width", "Width in pixels.", 200, 3840)] = 800,
     replace: given.Replace = False,
@@ -75,7 +75,9 @@ def animate(
 
     check_film(out, replace=replace)
     if initial and other is not None:
-        raise CoarticError("--initial shows one run next to its initial solution: give one run.")
+        raise CoarticError(
+            "--initial shows one run next to the corrective process alone: give one run."
+        )
     movements = []
     for run_id in (run,) if other is None else (run, other):
         place, found = find_run(run_id, folder)
@@ -85,7 +87,7 @@ def animate(
     if initial:
         on = movements[0][1].task
         initial_solution = trajectory(on, corrective_trial(on, initial_hands(on)).movements)
-        movements.insert(0, (f"{on.label}\ninitial solution", initial_solution))
+        movements.insert(0, (f"{on.label}\ncorrective process alone", initial_solution))
     frames, ticks_a_second = write_film(movements, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 
