@@ -191,6 +191,8 @@ def test_in_print_every_picture_is_there_once_and_nothing_leaves_its_box(opened)
     assert figures
     for figure in figures:
         assert figure.locator(".drawn svg").is_visible()
+    marks = page.locator("#figure-ranking use")
+    assert "none" not in marks.evaluate_all("all => all.map(each => getComputedStyle(each).fill)")
     ink = page.evaluate("getComputedStyle(document.body).color")
     assert max(map(int, re.findall(r"\d+", ink))) < 80  # dark on white
 
