@@ -81,7 +81,7 @@ def tasks() -> Iterator[str]:
         best = best_shipped(task)
         assert best is not None
         free = [axis for axis in "xy" if axis not in task.locked_base]
-        goals = " ".join(f"({x:g}, {y:g})" for x, y in task.goals)
+        goals = " ".join(f"({x:g}, {y:g})" for x, y in task.goals).replace("-", "−")
         proof = "proven" if best.proven else f"none above {best.bound} is possible"
         lacking = " and ".join(task.reconstructed) or "nothing"
         base = f"from ({task.q0[0]:g}, {task.q0[1]:g}) along {' and '.join(free)}"
