@@ -12,7 +12,7 @@ from coartic.analysis.words import tally
 
 
 @table(
-    "task; method; runs; solved: -; reward± .1; gap: gap (%) .1; hands; trials; "
+    "task; method; runs; solved: -; reward± .1; reward_median: -; gap: gap (%) .1; hands; trials; "
     "forward_kinematics: forward-kinematics evaluations; solve_s: solving time (s); median_run"
 )
 def list_methods(study: Study) -> Rows:
@@ -39,4 +39,5 @@ def list_methods(study: Study) -> Rows:
         }
         if len(good):
             row["median_run"] = typical_run(good)[:SHORT_ID]
+            row["reward_median"] = good.reward.astype(float).median()
         yield f"{cell.task} {cell.label}", row

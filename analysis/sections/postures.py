@@ -14,7 +14,7 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import CONDITION_OF
 from coartic.analysis.published import published_cell
 from coartic.analysis.solutions import initial_solution
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, typical_run
 from coartic.drawing import BASE_GREY, MARKERS, box, draw_goals, number_goals
 from coartic.robot import HANDS
 
@@ -22,9 +22,9 @@ from coartic.robot import HANDS
 @figure(
     "Postures goal by goal",
     "Initial and learned solutions in the posture that hits each goal (black) and the one before "
-    "(grey), as in Figures 5 to 7 of the paper; of a condition the run with the median reward. "
-    "Marked: the arm that hits the goal, open squares the left, filled circles the right one. "
-    "Numbers: reward of the movement.",
+    "(grey), as in Figures 5 to 7 of the paper; of a condition the run with the reward nearest to "
+    "the median. Marked: the arm that hits the goal, open squares the left, filled circles the "
+    "right one. Numbers: reward of the movement.",
 )
 def draw_solutions(study: Study) -> Parts | None:
     """Draw the initial solution and each condition's median run, goal by goal."""
@@ -41,8 +41,9 @@ def draw_solutions(study: Study) -> Parts | None:
         if cells and (initial := initial_solution(task)) is not None:
             rows.append((task, "initial", initial))
         for condition, cell in sorted(cells.items()):
-            runs = sorted(study.executed(name, cell.label).runs, key=lambda run: -run.ticks)
-            rows.append((task, condition, runs[(len(runs) - 1) // 2]))
+            executed = study.executed(name, cell.label)
+            number = executed.run_ids.index(typical_run(cell.good))
+            rows.append((task, condition, executed.runs[number]))
     if not rows:
         return None
     most = max(len(task.goals) for task, *_ in rows)

@@ -83,11 +83,12 @@ def tabulate(study, plans):
 
 def tabulate_movements(gains):
     """What the last goal in view gains, in per cent of a movement that has it ahead, as in study
-    fourteen: all tasks that have it, and by number of goals."""
+    fourteen: all tasks that have it, by number of goals, and tasks with five goals or more."""
     h = gains.h[(gains.h > 0) & (gains.h <= 4)]
     gains = gains.loc[h.index].assign(gain=100 * gains.gain * gains.goals / (gains.goals - h))
     count = gains.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")
-    parts = [gains.assign(goals="all"), gains.assign(goals=count)]
+    many = gains[gains.goals >= 5].assign(goals="5 or more")
+    parts = [gains.assign(goals="all"), gains.assign(goals=count), many]
     every = pd.concat(part.sort_values(["goals", "h"]) for part in parts)
     table = means(every, ["goals", "h"], ["gain"]).rename(columns={"rows": "tasks"})
     table["median"] = every.groupby(["goals", "h"], sort=False).gain.median().to_numpy()
