@@ -2,8 +2,9 @@
 
     python docs/scripts/speed.py [--long]
 
-Times depend on the machine; compare ratios, and times of one call. ``--long`` also runs suite
-``comparison`` and 50,000 runs of a suite, which takes minutes.
+writes the ways into the page ``docs/how-fast.md``. Times depend on the machine; compare ratios, and
+times of one call. ``--long`` also runs suite ``comparison`` and 50,000 runs of a suite, which takes
+minutes.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import plain_loop
 
 from coartic import CONDITIONS, Objective, Task, execute, learn_many, load_task
 from coartic.baselines.cma_es import CMAES
@@ -31,7 +33,8 @@ from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Method, Session
 from coartic.model import PAPER
-from coartic.motion.batch import SLOTS, batch_for
+from coartic.motion.batch import SLOTS, batch_for, place
+from coartic.motion.compile import entry
 from coartic.motion.solution import movements_of
 from coartic.motion.trial import (
     ALL_STOP,
@@ -57,19 +60,62 @@ def main(*, is_long: bool = False) -> None:
     show_commands(is_long=is_long)
 
 
+PAGE = Path(__file__).parents[1] / "how-fast.md"
+HEAD = """\
+# How fast
+
+What a trial costs, by the way in which it is made: CPU microseconds of one core, medians, all
+measured in one run by `make speed`. Trials are around the solution of CMA-ES, so that few goals are
+missed. Times depend on the machine, ratios less.
+
+| way | {heads} |
+| --- | {rules} |
+"""
+FOOT = """
+The *plain loop* is the model as one would write it with Numba: one trial after the other, one
+control step after the other (`docs/scripts/plain_loop.py`). It needs the same ticks in every one of
+1,000 trials. The kernel works on many arms side by side and skips the steps in which the hand
+provably stays out of the goal. *Kinematics alone* is the time of the forward kinematics that the
+kernel computes, and so a limit for it.
+"""
+
+
+@entry
+def kinematics(count: int, repeats: int, batch: Any) -> None:
+    """Compute the forward kinematics of the first slots again and again."""
+    for _ in range(repeats):
+        place(batch.slots.at[0], count, True)
+
+
+def write_page(columns: list[dict[str, float]], tasks: tuple[str, ...]) -> None:
+    """Write the page: microseconds by way and task, and ratios to the plain loop."""
+    heads = " | ".join(f"{task}, µs a trial | times as fast as the plain loop" for task in tasks)
+    text = HEAD.format(heads=heads, rules=" | ".join(["---: | ---:"] * len(tasks)))
+    for way in columns[0]:
+        cells = (f"{us[way]:.2g} | {us['plain loop'] / us[way]:.2g}" for us in columns)
+        text += f"| {way} | {' | '.join(cells)} |\n"
+    PAGE.write_text(text + FOOT, encoding="utf-8")
+
+
 def show_ways() -> None:
     """Print what a trial costs through each public way, and what a call of the kernel costs that
-    makes none."""
+    makes none; write the page."""
     tasks = ("ascending", "two-armed-1")
+    medians: list[dict[str, float]] = [{} for _ in tasks]
     columns = [ways(load_task(name)) for name in tasks]
     heads = "".join(f"{name:>14}{'least':>8}{'most':>8}" for name in tasks)
     print(f"{'way':32}{heads}   CPU microseconds a trial, median")
     for distance in columns[0]:
         times = [_us(*column[distance]) for column in columns]
+        for of_task, (median, *_) in zip(medians, times, strict=True):
+            of_task[distance] = median
         print(
             f"{distance:32}" + "".join(f"{a:14.2f}{b:8.2f}{c:8.2f}" for a, b, c in times),
             flush=True,
         )
+    for of_task in medians:
+        del of_task["the empty call"]
+    write_page(medians, tasks)
 
 
 def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
@@ -95,6 +141,10 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
         return arms, compiled.parameters, *accounts, batch_for(task.robot)
 
     none, together, *alone = map(arguments, (targets[:0], targets, *targets[:100, None]))
+    plain = plain_loop.arguments(task, hands)
+    made = session.trials(hands, targets)
+    assert (plain_loop.trials(task.q0, targets, *plain) == made.ticks).all()
+    evaluations, batch = int(made.evaluations.sum()), batch_for(task.robot)
     env, many = TaskEnv(task), TaskVectorEnv(1000, task)
     shape = (len(best), *many.action_space.shape)
     actions = np.random.default_rng(0).uniform(-0.1, 0.1, shape)
@@ -106,6 +156,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
             env.step(action)
 
     return {
+        "plain loop": (1000, lambda: plain_loop.trials(task.q0, targets, *plain)),
         "the empty call": (100, lambda: [reach_kernel(*none) for _ in range(100)]),
         "kernel, one by one": (100, lambda: [reach_kernel(*each) for each in alone]),
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
@@ -113,6 +164,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
         "execute, one by one": (100, lambda: [execute(task, each) for each in solutions]),
         "environment, a step": (len(best), episode),
         "kernel, 1000 at once": (1000, lambda: reach_kernel(*together)),
+        "kinematics alone": (1000, lambda: kinematics(SLOTS, evaluations // SLOTS, batch)),
         "Session.trials, 10,000 at once": (
             10_000,
             lambda: session.trials(hands, np.tile(targets, (10, 1, 1))),
