@@ -24,6 +24,7 @@ AFTER = (30, 100, 1_000, 10_000)
 TRIALS = AFTER[-1]
 POINTS = 5.0
 """Points of the gain that count as a difference, set before the runs."""
+SHIFT_AFTER = (1, 2, 3, 10, 30, 100, 300, 1_000, 10_000)
 TIMES = 5.0
 """Times fewer trials that count as much fewer, set before the runs."""
 
@@ -142,6 +143,65 @@ def judge_claims(runs):
                 in_each("{} points less", more(PAPER, "hands", "gain_10000"), 0.0,
                         ("two-armed", "redundancy")),
             ),
+        ),
+    })  # fmt: skip
+
+
+def measure_shifts(raw):
+    """Measure shares of the shift after the change, a row for each task and setting.
+
+    ``share_N`` of the final shift that is there after N trials: sums over goals of products of
+    shifts, over sums of squares. ``log_half``: trials to half of it, interpolated, as a power of
+    ten. ``unchanged``: the share that as much practice without a change brings.
+    """
+    sums = raw.groupby(["setting", "task"], sort=False).sum(numeric_only=True).reset_index()
+    sums["family"] = sums.task.str.partition("/")[0]
+    shares = (sums[[f"dot_{n}" for n in SHIFT_AFTER]].div(sums.square, axis=0)).to_numpy()
+    powers, half = np.log10(SHIFT_AFTER), np.full(len(sums), np.nan)
+    for row, curve in enumerate(shares):
+        if curve[-1] == 1:  # else there is no shift; the first trial repeats what was practised
+            k = int((curve >= 0.5).argmax())
+            half[row] = np.interp(0.5, curve[k - 1 : k + 1], powers[k - 1 : k + 1])
+    named = {f"share_{n}": shares[:, k] for k, n in enumerate(SHIFT_AFTER)}
+    return sums.assign(**named, log_half=half, unchanged=sums.same / sums.square)
+
+
+def judge_shifts(shifts):
+    """The claims on an announced change, registered before any test instance was run."""
+    paper, planner = "0 0.05", "1 0.01 next-goal"
+
+    def of(column, setting, family):
+        rows = shifts[(shifts.setting == setting) & (shifts.family == family)]
+        return rows.set_index("task")[column]
+
+    how = "one-tailed bootstrap tests over 30 random tasks, one-armed and two-armed: "
+    families = FAMILIES[:2]
+    return judge({
+        "drift-makes-the-shift-quick": (
+            "With a drift of 1 and little noise half of the shift takes less than a fifth of the "
+            "paper's learner's trials. Refuted where it takes more.",
+            f"{how}the logarithm of the trials to half of the shift is lower by more than that of "
+            f"{TIMES:g}",
+            all_of(*(mean_beyond(f"{family}: 10^{{}} times fewer trials",
+                                 of("log_half", paper, family) - of("log_half", planner, family),
+                                 float(np.log10(TIMES))) for family in families)),
+        ),
+        "drift-shifts-within-ten-trials": (
+            "After ten trials more than a tenth of the shift is there with a drift of 1 and little "
+            "noise, and less than nine tenths: between the paper's learner and a planner. Refuted "
+            "where it is not between.",
+            f"{how}the share after ten trials above 0.1 and below 0.9",
+            all_of(*(mean_beyond(f"{family}: the share is {{}}",
+                                 of("share_10", planner, family), bound, side)
+                     for family in families for bound, side in ((0.1, "greater"), (0.9, "less")))),
+        ),
+        "shift-is-of-the-change": (
+            "With a drift of 1 and little noise less than half of the shift is there after as much "
+            "practice without a change. Refuted where it is more.",
+            f"{how}the shift without a change, projected, below 0.5",
+            all_of(*(mean_beyond(f"{family}: the share is {{}}",
+                                 of("unchanged", planner, family), 0.5, "less")
+                     for family in families)),
         ),
     })  # fmt: skip
 

@@ -88,3 +88,49 @@ def test_a_task_is_run_under_every_setting(monkeypatch):
     assert (rows.d <= rows.best_known).all()
     half = rows[rows.half < np.inf]
     assert (half.d >= (half.initial + half.best_known) / 2).all()
+
+
+def planted_shifts(settings):
+    """Stored shifts of 12 tasks of two families: half of the shift after the trials that a setting
+    takes, its share after ten, and all of it in the end."""
+    rows = []
+    for setting, (trials, ten) in settings.items():
+        for task in (f"{family}/v1/i{n:03d}" for family in STUDY.FAMILIES[:2] for n in range(12)):
+            shares = {n: 0.0 if n < trials else 0.5 for n in STUDY.SHIFT_AFTER}
+            shares |= {10: ten + int(task[-2:]) / 1000, 10_000: 1.0}
+            for square in (1.0, 3.0):  # two goals
+                dots = {f"dot_{n}": square * share for n, share in shares.items()}
+                rows.append(
+                    {"task": task, "setting": setting, "goal": 0, "same": 0.1, "square": square}
+                    | dots
+                )
+    return STUDY.measure_shifts(pd.DataFrame(rows))
+
+
+def test_verdicts_follow_the_shifts():
+    shifts = planted_shifts({"0 0.05": (1000, 0.0), "1 0.01 next-goal": (30, 0.2)})
+    of_paper, of_planner = (shifts[shifts.setting == s].iloc[0] for s in shifts.setting.unique())
+    assert (of_paper.log_half, of_paper.unchanged) == (3, 0.05)
+    assert of_planner.log_half == pytest.approx(np.log10(30))
+    assert STUDY.judge_shifts(shifts).verdict.eq("supported").all()
+    slow = planted_shifts({"0 0.05": (300, 0.0), "1 0.01 next-goal": (300, 0.0)})
+    judged = STUDY.judge_shifts(slow).verdict
+    assert judged["drift-makes-the-shift-quick"] == "not supported"
+    assert judged["drift-shifts-within-ten-trials"] == "not supported"
+
+
+def test_other_methods_and_shifts_of_a_task(monkeypatch):
+    """Planners make no trial; the first trial after a change repeats what was practised."""
+    for name, value in (("TRIALS", 40), ("AFTER", (5, 40)), ("RUNS", 1),
+                        ("SHIFT_AFTER", (1, 10, 40))):  # fmt: skip
+        monkeypatch.setattr(PROTOCOLS, name, value)
+    monkeypatch.setattr(PROTOCOLS, "OTHERS", {"posture planning": (PROTOCOLS.TwoGoals, 1)})
+    ((*_, start, known, first, last, _, _, _, hands),) = PROTOCOLS.run_others("ascending")
+    assert (first, hands) == (last, "RRR")
+    assert start < first <= known
+    task = "one-armed/v1/d000"
+    monkeypatch.setattr(PROTOCOLS, "SHIFT_TASKS", [task])
+    rows = PROTOCOLS.run_shifts(task)
+    assert {row[1] for row in rows} == {*PROTOCOLS.SHIFTED}
+    for *_, square, first, _, last in rows:
+        assert (first, last) == (0, pytest.approx(square))
