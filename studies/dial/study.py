@@ -3,8 +3,8 @@
     python studies/dial/protocols.py results/dial
     python studies/dial/study.py results/dial
 
-writes results.csv, claims.csv, figure.svg and the page, README.md; without a folder figure and
-page, of the stored tables.
+writes results.csv, claims.csv, shifts.csv, shift_claims.csv, figure.svg and the page, README.md;
+without a folder figure and page, of the stored tables.
 
 The *gain* of a run is the share of the way from the task's initial solution to the best known.
 """
@@ -166,6 +166,18 @@ def measure_shifts(raw):
     return sums.assign(**named, log_half=half, unchanged=sums.same / sums.square)
 
 
+def tabulate_shifts(shifts):
+    """Tabulate shares of the shift by family and setting, and quartiles of the trials to half."""
+    numbers = [*(f"share_{n}" for n in SHIFT_AFTER), "unchanged"]
+    table = means(shifts, ["family", "setting"], numbers).rename(columns={"rows": "tasks"})
+    trials = (10**shifts.log_half).groupby([shifts.family, shifts.setting], sort=False)
+    for share in (0.25, 0.5, 0.75):
+        column = trials.quantile(share).rename(f"half_{share:g}")
+        table = table.merge(column, left_on=["family", "setting"], right_index=True)
+    table.index = (table.family + " " + table.setting).rename("row")
+    return table
+
+
 def judge_shifts(shifts):
     """The claims on an announced change, registered before any test instance was run."""
     paper, planner = "0 0.05", "1 0.01 next-goal"
@@ -210,15 +222,21 @@ def judge_shifts(shifts):
 def draw(table):
     """Trials to a quarter and to half of the gain, and the gain after 100 trials, by drift."""
     figure, panels = figures.panels((1, 3), (figures.TWO, 2.6))
-    rows = table[table.group.isin(FAMILIES) & table.setting.isin(along(0.05))]
-    rows = rows.assign(x=rows.setting.str.partition(" ")[0].map(DRIFTS.index))
-    for number, (family, of_family) in enumerate(rows.groupby("group", sort=False)):
-        of_family = of_family.sort_values("x")
+    places = {setting: place for place, setting in enumerate([*along(0.05), *BESIDE])}
+    rows = table[table.group.isin(FAMILIES) & table.setting.isin(places)]
+    rows = rows.assign(x=rows.setting.map(places)).sort_values("x")
+    for number, family in enumerate(FAMILIES):
+        of_family = rows[rows.group == family]
         look = {"color": figures.PALETTE[number % len(figures.PALETTE)], "label": family}
-        for axes, share in zip(panels, ("quarter", "half"), strict=False):
-            trials = of_family[f"{share}_0.5"].clip(upper=2 * TRIALS)
-            axes.plot(of_family.x, trials, marker="o", markersize=3, **look)
-        figures.means(panels[2], of_family, x="x", y="gain_100", **look)
+        for dial in (True, False):  # the line ends where the dial ends
+            part = of_family[of_family.setting.isin(BESIDE) != dial]
+            for axes, share in zip(panels, ("quarter", "half"), strict=False):
+                trials = part[f"{share}_0.5"].clip(upper=2 * TRIALS)
+                of_trials = part.setting.isin(PLANNERS)  # which make none
+                axes.plot(part.x[~of_trials], trials[~of_trials], "o", markersize=3,
+                          linestyle="-" if dial else "", **look)  # fmt: skip
+            line = look if dial else look | {"linestyle": "", "label": None}
+            figures.means(panels[2], part, x="x", y="gain_100", **line)
     for axes, share in zip(panels, ("quarter", "half"), strict=False):
         axes.set_yscale("log")
         axes.set_yticks([1, 10, 100, 1_000, 10_000], ["1", "10", "100", "1000", "10 000"])
@@ -231,11 +249,19 @@ def draw(table):
         axes.axhline(TRIALS, color=figures.GREY, linewidth=0.6, linestyle=":")
     panels[2].set_ylabel("gain after 100 trials (%)")
     for axes in panels:
-        axes.set_xticks(range(len(DRIFTS)), DRIFTS)
-        axes.set_xlabel("drift κ")
+        axes.set_xticks(range(len(places)), [*DRIFTS, *BESIDE.values()], rotation=90)
+        axes.set_xlabel("drift κ, and other methods")
     figures.letters(panels)
     figures.legend(figure, panels[2].get_legend_handles_labels()[0], 5)
     return figure
+
+
+BESIDE = {
+    PLANNER: "1, σ 0.01", "CMA-ES": "CMA-ES", "posture planning": "posture plan",
+    "shortest path": "shortest path",
+}  # fmt: skip
+"""Settings right of the dial in the figure, with their names."""
+PLANNERS = tuple(BESIDE)[2:]
 
 
 def along(sigma):
@@ -245,8 +271,15 @@ def along(sigma):
 
 def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
-    runs = measure_runs(pd.read_csv(Path(folder) / "runs.csv"))
-    return {"results": tabulate(runs), "claims": judge_claims(runs)}
+    parts = [pd.read_csv(Path(folder) / f"{name}.csv") for name in ("runs", "others")]
+    runs = measure_runs(pd.concat(parts, ignore_index=True))
+    shifts = measure_shifts(pd.read_csv(Path(folder) / "shifts.csv"))
+    return {
+        "results": tabulate(runs),
+        "claims": judge_claims(runs),
+        "shifts": tabulate_shifts(shifts),
+        "shift_claims": judge_shifts(shifts),
+    }
 
 
 if __name__ == "__main__":
