@@ -159,7 +159,7 @@ def measure_shifts(raw):
     shares = (sums[[f"dot_{n}" for n in SHIFT_AFTER]].div(sums.square, axis=0)).to_numpy()
     powers, half = np.log10(SHIFT_AFTER), np.full(len(sums), np.nan)
     for row, curve in enumerate(shares):
-        if curve[-1] == 1:  # else there is no shift; the first trial repeats what was practised
+        if curve[-1] >= 0.5:  # else there is no shift; the first trial repeats what was practised
             k = int((curve >= 0.5).argmax())
             half[row] = np.interp(0.5, curve[k - 1 : k + 1], powers[k - 1 : k + 1])
     named = {f"share_{n}": shares[:, k] for k, n in enumerate(SHIFT_AFTER)}
