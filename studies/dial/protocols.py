@@ -177,7 +177,7 @@ def run_shifts(name):
 
 PARTS = {
     "runs": (run_task, COLUMNS, (*TASKS, *INSTANCES)),
-    "others": (run_others, COLUMNS, (*TASKS, *INSTANCES)),
+    "others": (run_others, COLUMNS, (*TASKS, *(name for name in INSTANCES if name[-3:] < "010"))),
     "shifts": (run_shifts, SHIFT_COLUMNS, SHIFT_TASKS),
 }
 """Files, the function that makes the rows of a task, their columns, and the tasks."""

@@ -45,10 +45,14 @@ def measure_runs(raw):
 
 
 def tabulate(runs):
-    """Tabulate gains and gaps: means over random tasks (tasks count alike) or over the runs on a
-    task of the paper; medians and quartiles of the trials to half of the gain."""
+    """Tabulate gains and gaps: means over random tasks (tasks count alike), over the first ten of
+    each family, or over the runs on a task of the paper; medians and quartiles of trials."""
     drawn = runs[runs.family.isin(FAMILIES)]
-    every = pd.concat([drawn.assign(group="random"), runs.assign(group=runs.family)])
+    first = drawn[drawn.task.str[-3:] < "010"]
+    every = pd.concat([
+        drawn.assign(group="random"), first.assign(group="first ten"),
+        runs.assign(group=runs.family),
+    ])  # fmt: skip
     unit = every.run.where(~every.family.isin(FAMILIES), 0)
     numbers = [*(f"gain_{n}" for n in AFTER), *(f"gap_{n}" for n in AFTER), "first"]
     by = ["group", "setting", "task", unit]
@@ -271,8 +275,9 @@ def along(sigma):
 
 def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
-    parts = [pd.read_csv(Path(folder) / f"{name}.csv") for name in ("runs", "others")]
-    runs = measure_runs(pd.concat(parts, ignore_index=True))
+    runs, others = (pd.read_csv(Path(folder) / f"{name}.csv") for name in ("runs", "others"))
+    is_first = ~others.family.isin(FAMILIES) | (others.task.str[-3:] < "010")
+    runs = measure_runs(pd.concat([runs, others[is_first]], ignore_index=True))
     shifts = measure_shifts(pd.read_csv(Path(folder) / "shifts.csv"))
     return {
         "results": tabulate(runs),
