@@ -140,7 +140,7 @@ def mean_of_goals(values: Array) -> float:
     "arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw postures at a goal before two different next goals, and random search beside them."""
+    """Draw postures at a goal before two different next goals, and those of random search."""
     shared = shared_goal(study)
     if shared is None:
         return None

@@ -67,9 +67,9 @@ OTHERS = {
     "posture planning": (TwoGoals, 1),
     "shortest path": (PathLength, 1),
 }
-"""Methods beside the learner, and their runs on a task; planners are the same in each."""
+"""Other methods than the learner, and their runs on a task; planners are the same in each."""
 SHIFTED = ("0 0.05", *(f"{kappa:g} 0.05 next-goal" for kappa in DRIFTS[1:]), "1 0.01 next-goal")
-"""Settings that practise, are told of a goal that has moved, and practise again."""
+"""Settings that practise, hear of a goal that has moved, and practise again."""
 SHIFT_TASKS = [f"{family}/v1/i{number:03d}" for number in range(30) for family in FAMILIES[:2]]
 SHIFT_AFTER = (1, 2, 3, 10, 30, 100, 300, 1_000, 10_000)
 """Trials after the change at which the solution is looked at; the last is all of practice."""
@@ -117,7 +117,7 @@ def trials_to_shares(best, start, known):
 
 
 def run_others(name):
-    """Run the methods beside the learner on a task; rows of :data:`COLUMNS`.
+    """Run the other methods on a task; rows of :data:`COLUMNS`.
 
     The gain counts from the learner's initial solution. A planner makes no trial: its plan is
     executed once. A method that fails gains nothing.

@@ -226,14 +226,14 @@ def judge_shifts(shifts):
 def draw(table):
     """Trials to a quarter and to half of the gain, and the gain after 100 trials, by drift."""
     figure, panels = figures.panels((1, 3), (figures.TWO, 2.6))
-    places = {setting: place for place, setting in enumerate([*along(0.05), *BESIDE])}
+    places = {setting: place for place, setting in enumerate([*along(0.05), *OTHERS])}
     rows = table[table.group.isin(FAMILIES) & table.setting.isin(places)]
     rows = rows.assign(x=rows.setting.map(places)).sort_values("x")
     for number, family in enumerate(FAMILIES):
         of_family = rows[rows.group == family]
         look = {"color": figures.PALETTE[number % len(figures.PALETTE)], "label": family}
         for dial in (True, False):  # the line ends where the dial ends
-            part = of_family[of_family.setting.isin(BESIDE) != dial]
+            part = of_family[of_family.setting.isin(OTHERS) != dial]
             for axes, share in zip(panels, ("quarter", "half"), strict=False):
                 trials = part[f"{share}_0.5"].clip(upper=2 * TRIALS)
                 of_trials = part.setting.isin(PLANNERS)  # which make none
@@ -253,19 +253,19 @@ def draw(table):
         axes.axhline(TRIALS, color=figures.GREY, linewidth=0.6, linestyle=":")
     panels[2].set_ylabel("gain after 100 trials (%)")
     for axes in panels:
-        axes.set_xticks(range(len(places)), [*DRIFTS, *BESIDE.values()], rotation=90)
+        axes.set_xticks(range(len(places)), [*DRIFTS, *OTHERS.values()], rotation=90)
         axes.set_xlabel("drift κ, and other methods")
     figures.letters(panels)
     figures.legend(figure, panels[2].get_legend_handles_labels()[0], 5)
     return figure
 
 
-BESIDE = {
+OTHERS = {
     PLANNER: "1, σ 0.01", "CMA-ES": "CMA-ES", "posture planning": "posture plan",
     "shortest path": "shortest path",
 }  # fmt: skip
 """Settings right of the dial in the figure, with their names."""
-PLANNERS = tuple(BESIDE)[2:]
+PLANNERS = tuple(OTHERS)[2:]
 
 
 def along(sigma):
