@@ -279,7 +279,7 @@ def next_goal(study: Study) -> str:
         )
         text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
     elif needed:
-        text += f". Run method {RANDOM_SEARCH} as well to tell"
+        text += f". To tell, add {RANDOM_SEARCH} to --methods, or run suite comparison"
     return f"{text}.{failed_runs(study, cells, ' and are not counted')}"
 
 
