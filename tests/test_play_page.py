@@ -237,6 +237,18 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     comes_back(page)
 
 
+def test_a_proven_optimum_is_shown_until_the_task_is_changed(opened):
+    page = settled(opened("preset=1&others="))
+    assert ticks(page, r"Optimum \(proven\)") == 292
+    page.get_by_role("button", name="Goal 2").focus()
+    page.keyboard.press("ArrowUp")
+    assert "Optimum" not in text(settled(page), "score")
+    page.get_by_role("button", name="Reset").click()
+    assert ticks(settled(page), r"Optimum \(proven\)") == 292
+    page.get_by_label("Task").select_option("3")  # two-armed 1, not proven
+    assert "Optimum" not in text(settled(page), "score")
+
+
 def test_the_link_holds_the_whole_state(opened, address):
     page = settled(opened())
     assert "posture difference" in text(page, "finding")
