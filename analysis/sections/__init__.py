@@ -171,7 +171,7 @@ SECTIONS = (
         "Cost",
         "What does it cost?",
         table=costs.list_runtimes,
-        caption="Cost of reaching a quarter and half of the targets",
+        caption="Cost of reaching shares of the targets",
         figure=costs.draw_runtimes,
         sentence=costs.what_it_costs,
         answer="Cost",
