@@ -78,7 +78,8 @@ SECTIONS = (
         sentence=coarticulation.next_goal,
         answer="Coarticulation",
         note="Postures are compared in length units and rad. Random search learns "
-        "nothing; the best of many is selected.",
+        "nothing; the best of many is selected. Its rows in the table are of all runs, figure and "
+        "sentence of the runs that improved on the corrective process.",
     ),
     Section(
         "paper",
