@@ -137,8 +137,8 @@ def mean_of_goals(values: Array) -> float:
     "One goal, two postures",
     "Postures of one method's runs when they hit a goal that two tasks share, and of random search "
     "with as many trials, at its strongest width, of the runs that improved on the corrective "
-    "process. Thick: mean posture; thin: every run. Dashed arrows lead to the next goal. The bar is "
-    "one length unit.",
+    "process. Thick: mean posture; thin: every run. Dashed arrows lead to the next goal. The bar "
+    "is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
     """Draw postures at a goal before two different next goals, and those of random search."""
