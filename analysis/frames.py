@@ -452,7 +452,7 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     for (subject, trial), rows in columns.groupby(["subject", "trial"], sort=False):
         ordered = rows.sort_values("goal")
         if ordered.goal.tolist() == [*range(1, len(task.goals) + 1)]:
-            postures, ticks = ordered[joints].to_numpy(), ordered.ticks.astype(int).tolist()
+            postures, ticks = ordered[joints].to_numpy(), ordered.ticks.round().astype(int).tolist()
             each = zip(ordered.hand, postures, ticks, strict=True)
             movements = tuple(Movement(g, hand, "learned", q, n)
                               for g, (hand, q, n) in enumerate(each, 1))  # fmt: skip

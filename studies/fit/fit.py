@@ -7,6 +7,9 @@ profile intervals.
 """
 
 import argparse
+import sys
+import warnings
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -164,7 +167,8 @@ def fit(frame, task, *, condition=None, noise=0.0):
     Returns
     -------
     DataFrame
-        A row for each subject: numbers of :func:`fit_subject`; ``trials``, ``lost`` trials and
+        A row for each subject with a hit after a complete trial, others are warned of: numbers of
+        :func:`fit_subject`; ``trials``, ``lost`` trials and
         ``missing`` hits of the others; ``improved``, the number of trials after the first that were
         better than all before; ``model`` and ``others`` (:func:`judge`).
     """
@@ -183,7 +187,8 @@ def fit(frame, task, *, condition=None, noise=0.0):
         }  # fmt: skip
         if not (tables_before(task, condition, trials, "best").stored >= 0).any():
             why = "no hit follows a complete trial; needed are two trials, the first with all goals"
-            raise CoarticError(f"subject {subject}: {why}")
+            warnings.warn(f"subject {subject} is left out: {why}", stacklevel=2)
+            continue
         row |= fit_subject(task, condition, trials, noise=noise, plan=plan)
         model, others = judge(row)
         rows.append({**row, "model": model, "others": " ".join(others)})
@@ -210,7 +215,9 @@ def sentence(row):
             for symbol, name in (("σ", "sigma"), ("ε", "epsilon"), ("κ", "kappa"))
             if name in row.index
         ]
-        doubts = ["A lost trial may have been the best"] * bool(row.lost + row.missing)
+        if not row.sigma_low > row.noise / 10:
+            return f"{text}. Motor noise explains all of σ, so no parameters are given."
+        doubts = ["A lost trial or hit may have been of the best"] * bool(row.lost + row.missing)
         doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
         doubt = f" {'. '.join(doubts)}: intervals can be too narrow, and the model wrong."
         return f"{text}. {', '.join(numbers)}.{doubt if doubts else ''}"
@@ -233,13 +240,19 @@ def main():
     )
     parser.add_argument("--out", help="CSV file for all numbers")
     given = parser.parse_args()
+    warnings.showwarning = lambda text, *_: print(f"warning: {text}", file=sys.stderr)
     try:
+        if not given.noise >= 0:
+            raise CoarticError(f"--noise is {given.noise:g}; needed is 0 or more")
+        if given.out and not Path(given.out).parent.is_dir():
+            raise CoarticError(f"--out {given.out}: there is no such folder")
         task = load_task(given.task)
         frame = read_hits(given.csv, task, ticks_per_unit=given.ticks_per_unit)
         condition = CONDITIONS[given.condition] if given.condition else None
         table = fit(frame, task, condition=condition, noise=given.noise)
     except CoarticError as error:
-        raise SystemExit(f"error: {error}") from None
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
     for _, row in table.iterrows():
         print(sentence(row))
     if given.out:

@@ -48,7 +48,10 @@ def read_hits(path, task, *, ticks_per_unit=1.0):
     needed = ["subject", "trial", "goal", "hand", "ticks", *joints]
     if missing := [name for name in needed if name not in frame]:
         raise CoarticError(f"{path} has no column {', '.join(missing)}; needed are "
-                           f"{', '.join(needed)} (or duration in place of ticks)")  # fmt: skip
+                           f"{', '.join(needed)} (or duration in place of ticks), separated by "
+                           "commas")  # fmt: skip
+    if not len(frame):
+        raise CoarticError(f"{path} has no hit: needed is a row for each")
 
     def refuse(wrong, column, wanted):
         if wrong.any():
@@ -71,7 +74,9 @@ def read_hits(path, task, *, ticks_per_unit=1.0):
         "goal",
         f"needed is a number from 1 to {last}",
     )
-    refuse(frame.ticks < 0, "ticks", "needed is 0 or more")
+    if "duration" not in frame:
+        refuse(frame.ticks % 1 != 0, "ticks", "needed is a whole number")
+    refuse(frame.ticks <= 0, "ticks", "needed is more than 0, from the hit before to this one")
     twice = frame.duplicated(["subject", "trial", "goal"])
     refuse(twice, "goal", "this subject, trial and goal have a line above already")
     for name in joints[2:]:
@@ -85,8 +90,16 @@ def read_hits(path, task, *, ticks_per_unit=1.0):
     if np.median(off) > 2 * task.radius:
         warnings.warn(
             f"{path}: in the median hit the hand is {np.median(off):.2g} length units from its "
-            "goal. Are the angles in rad, each measured from the link before, and is the task "
-            f"{task.name!r}?",
+            "goal. Are the angles in rad, each measured from the link before, the base in the "
+            f"length unit of the task, and is the task {task.name!r}?",
             stacklevel=2,
         )
-    return frame[needed].sort_values(["subject", "trial", "goal"], ignore_index=True)
+    frame = frame[needed].sort_values(["subject", "trial", "goal"], ignore_index=True)
+    ticks = frame.pivot_table("ticks", ["subject", "trial"], "goal").dropna()
+    if len(ticks) >= 10 and (ticks.diff(axis=1).iloc[:, 1:] > 0).all(axis=None):
+        warnings.warn(
+            f"{path}: in every trial ticks rise from goal to goal. Are they from the hit before, "
+            "and not from the start of the trial?",
+            stacklevel=2,
+        )
+    return frame

@@ -99,8 +99,8 @@ def test_lost_trials_and_hits_are_counted(people):
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
     found = FIT.fit(kept, TASK).iloc[0]
     assert (found.trials, found.lost, found.missing) == (60, 2, 2)
-    with pytest.raises(CoarticError, match="two trials"):
-        FIT.fit(first[first.trial == 1], TASK)
+    with pytest.warns(UserWarning, match="subject 0 is left out: .* two trials"):
+        assert not len(FIT.fit(first[first.trial == 1], TASK))
     with pytest.raises(CoarticError, match="EC1 does not use the left hand"):
         FIT.fit(first, TASK, condition=CONDITIONS["EC1"])
 
@@ -110,6 +110,9 @@ WRONG = {
     "line 4: hand is 'both'": lambda t: t.assign(hand=t.hand.where(t.index != 2, "both")),
     "line 3: goal is 9": lambda t: t.assign(goal=t.goal.where(t.index != 1, 9)),
     "line 2: trial is 0.5;": lambda t: t.assign(trial=t.trial.where(t.index != 0, 0.5)),
+    "line 3: ticks is 0": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, 0)),
+    "line 2: ticks is 7.5": lambda t: t.assign(ticks=t.ticks.where(t.index != 0, 7.5)),
+    "has no hit": lambda t: t[:0],
     "line 2: ticks is nan": lambda t: t.assign(ticks=t.ticks.where(t.index != 0)),
     "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
     "a line above": lambda t: pd.concat([t, t]),
@@ -128,6 +131,10 @@ def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
     timed = people.rename(columns={"ticks": "duration"})
     timed.assign(duration=timed.duration / 100).to_csv(path, index=False)
     assert FIT.read_hits(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
+    since_start = people.groupby(["subject", "trial"]).ticks.cumsum()
+    people.assign(ticks=since_start).to_csv(path, index=False)
+    with pytest.warns(UserWarning, match="from the hit before"):
+        FIT.read_hits(path, TASK)
     angles = [name for name in people if name[-1].isdigit()]
     people.assign(**np.degrees(people[angles] / 10)).to_csv(path, index=False)
     with pytest.warns(UserWarning, match="Are the angles in rad"):
@@ -141,6 +148,11 @@ def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
     page = (pages / "people.md").read_text("utf-8")
     assert all(line in page for line in capsys.readouterr().out.splitlines())
     assert example.stat().st_size < 30_000
+    for option in (("--noise", "-1"), ("--out", "no/such/folder.csv")):
+        monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", str(example), *option])
+        with pytest.raises(SystemExit, match="2"):
+            FIT.main()
+        assert capsys.readouterr().err.startswith(f"error: {option[0]}")
 
 
 def test_tables_count_whom_the_fit_recovers():
