@@ -112,7 +112,7 @@ def interval(
     Returns
     -------
     str
-        Such as ``7.8 [7.3, 8.1]``; the number alone if the ends are missing.
+        Such as ``7.8 [7.3, 8.1]``; the number alone if its ends are NaN or equal to it.
 
     Examples
     --------

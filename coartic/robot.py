@@ -83,7 +83,9 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 
 
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
-    """Derivative of point ``tip`` of a chain by the angle of ``joint`` (0-based).
+    """Derivative of point ``tip`` of a chain by the angle of ``joint``.
+
+    Index 0 is the shoulder; ``xs`` and ``ys`` are as :func:`chain` fills them.
 
     A rotation about a joint moves the tip at right angles to the line between
     them: a column of the geometric Jacobian, in length unit per rad.
