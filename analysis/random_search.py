@@ -45,7 +45,7 @@ def random_search_on(study: Study, task: str, trials: float = 0) -> list[str]:
     if not trials:
         return [*trials_by_label]
     fewest = min((each for each in trials_by_label.values() if each >= trials), default=None)
-    return [label for label, made in trials_by_label.items() if made == fewest]
+    return [label for label, count in trials_by_label.items() if count == fewest]
 
 
 def most_trials(study: Study, task: str, label: str) -> float:

@@ -193,8 +193,8 @@ def suite_jobs(
                         yield job(task, method, parameters, block.runs)
                     elif not is_open:
                         raise CoarticError(
-                            f"suite {suite.name!r}: {reason}; give what fits together a block of "
-                            "its own"
+                            f"suite {suite.name!r}: {reason}; put tasks and methods that fit "
+                            "together into a block of their own"
                         )
 
 

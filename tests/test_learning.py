@@ -514,5 +514,5 @@ def test_a_grid_counts_in_what_applies(tmp_path):
     suite.write_text(one_arm.replace("{GRID}", '{ base = ["EC1"], drift = [0.0, 0.3] }'))
     assert [job.cell.parameters["drift"] for job in plan_suite(suite)] == [0.0, 0.3]
     suite.write_text(one_arm.replace("{GRID}", '{ base = ["EC1", "EC4"] }'))
-    with pytest.raises(CoarticError, match="no left hand; give what fits together a block"):
+    with pytest.raises(CoarticError, match="no left hand; put tasks and methods"):
         plan_suite(suite)

@@ -273,7 +273,7 @@ def test_a_long_arm_is_named_with_a_factor_that_helps(links, locked_base):
     options = {"locked_base": locked_base, "radius": 0.1 * min(links)}
     reason = corrective_trial(arm_of(*links, **options), "R").reason
     numbers = re.search(r"is (\S+), and above 2 .* by ([0-9.]+),", reason).groups()
-    said, factor = map(float, numbers)
+    printed, factor = map(float, numbers)
     free = [k for k in (0, 1) if "xy"[k] not in locked_base]
 
     def largest(scale):
@@ -281,7 +281,7 @@ def test_a_long_arm_is_named_with_a_factor_that_helps(links, locked_base):
         straight = robot.jacobian(np.zeros(robot.dof), "right")[:, [*free, *range(3, robot.dof)]]
         return 0.05 * np.linalg.norm(straight, 2) ** 2
 
-    assert said == pytest.approx(largest(1.0), rel=0.01)
+    assert printed == pytest.approx(largest(1.0), rel=0.01)
     assert 1.7 < largest(1.0 / factor) < 2.0
     helped = arm_of(*links, scale=1.0 / factor, locked_base=locked_base)
     assert corrective_trial(helped, "R").completed

@@ -40,14 +40,14 @@ def test_the_first_forty_test_instances_of_every_family_have_one():
 def test_solutions_come_to_the_best_known_reward(family):
     """Executed, with the hands of the table, and no better than what is proven."""
     for name in (name for name in ROWS if name.startswith(f"{family}/")):
-        task, known = load_task(name), best_shipped(load_task(name))
-        assert known is not None
+        task, shipped = load_task(name), best_shipped(load_task(name))
+        assert shipped is not None
         assert ROWS[name]["essence"] == essence(task)
         execution = execute(task, movements_of(SOLUTIONS[name]))
-        assert (execution.reward, execution.hands) == (known.reward, known.hands)
-        assert known.bound is None or known.reward <= known.bound
+        assert (execution.reward, execution.hands) == (shipped.reward, shipped.hands)
+        assert shipped.bound is None or shipped.reward <= shipped.bound
         alone = corrective_trial(task, task.initial_hands).reward
-        assert alone is None or known.reward >= alone
+        assert alone is None or shipped.reward >= alone
 
 
 SOLVED = [entry for entry in shipped_optima() if entry.reward is not None]
@@ -137,9 +137,9 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
         *(run("free", "one", -301), run("free", "one", -300, setting="b=2")),
     ]
     radius = {"radius": 0.2}
-    own = [load_task("ascending").model_copy(update={"name": name, **radius})
+    changed = [load_task("ascending").model_copy(update={"name": name, **radius})
            for name in ("mine", "yours", "still", "free")]  # fmt: skip
-    study = study_of(rows, own)
+    study = study_of(rows, changed)
     tasks = [*study.tasks.values(), load_task("two-armed-2")]
     best = optima.best_known(study.stored, tasks)
     shipped = {name: best_shipped(load_task(name)) for name in ("descending", "two-armed-2")}

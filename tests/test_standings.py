@@ -421,5 +421,5 @@ SENTENCES = {
 
 @pytest.mark.parametrize("name", SENTENCES)
 def test_sentences_are_those_of_the_golden_page(name):
-    words, made = SENTENCES[name]
-    assert words(made()) == golden(name)
+    words, study_for = SENTENCES[name]
+    assert words(study_for()) == golden(name)

@@ -105,8 +105,8 @@ def test_a_cell_has_one_number_of_runs(tmp_path):
     task = tmp_path / "mine.toml"
     task.write_text(GOOD, encoding="utf-8")
     suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
-    own = plan_suite(tmp_path / "own.toml", tasks=[task])
-    assert {len(job.numbers) for job in own if job.cell.task.name == "mine"} == {7}
+    jobs = plan_suite(tmp_path / "own.toml", tasks=[task])
+    assert {len(job.numbers) for job in jobs if job.cell.task.name == "mine"} == {7}
 
 
 def test_own_task_runs_under_every_applicable_condition(tmp_path):
@@ -124,15 +124,15 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
     assert methods(other) == ["dual-process/EC1"]
     both = paper_cells(tasks=["ascending", str(path)])
     assert [cell.task.name for cell in both] == ["ascending"] + 4 * ["mine"]
-    made = [*map(load_task, ("two-armed-1", path, "two-armed/v1/i003"))]
-    again = paper_cells(tasks=made, methods=["EC4"])
-    assert [cell.task for cell in again] == made
+    tasks = [*map(load_task, ("two-armed-1", path, "two-armed/v1/i003"))]
+    again = paper_cells(tasks=tasks, methods=["EC4"])
+    assert [cell.task for cell in again] == tasks
     for name in ("ascending", "two-armed/v1/i003"):
-        impostor = made[1].model_copy(update={"name": name})
+        impostor = tasks[1].model_copy(update={"name": name})
         with pytest.raises(CoarticError, match=f"{name}' is already taken by a shipped task: give"):
             paper_cells(tasks=[impostor])
     with pytest.raises(CoarticError, match="name 'arm' is already taken by another task: give"):
-        paper_cells(tasks=[made[1].model_copy(update={"name": "arm"}), str(other)])
+        paper_cells(tasks=[tasks[1].model_copy(update={"name": "arm"}), str(other)])
 
 
 def test_ablations_of_the_learner_are_methods_of_their_own():

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 from coartic.estimates import FEWER_RESAMPLES, FEWEST, IN_CACHE, SEED, TAILS, Estimate, slices
 from coartic.robot import Array
 
-_MOST_RUNS_DRAWN = (
-    20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
-)
+_MOST_RUNS_DRAWN = 20_000_000  # in all resamples of a budget: of very many runs there are fewer
 RunningTimes = Sequence[Array]
 """Running times of a method: for each task the cost at which each run reaches each target, shape
 ``(runs, targets)``; infinite for a target that the run does not reach."""

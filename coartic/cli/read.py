@@ -125,8 +125,8 @@ def trace(
     if not len(behind):
         say("No runs stand behind this row.")
         return
-    known = {*registry(with_code=False), "dual-process"}
-    file = "" if known >= {*behind.method} else " --method-file FILE"
+    method_names = {*registry(with_code=False), "dual-process"}
+    file = "" if method_names >= {*behind.method} else " --method-file FILE"
     say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
     table_of_runs = traced.runs_behind(study, ids).astype(str).map(one_line)
     say(*table_of_runs.to_string(index=False).splitlines())

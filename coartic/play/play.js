@@ -882,7 +882,7 @@ class Play {
     [state.tick, state.trials] = [state.tick, state.trials].map(Math.round);
     this.find("more").open = Boolean(state.open);
     this.results.clear();
-    this.made = [];
+    this.your_trials = [];
     this.box = null;
     this.view = null;
     this.playing = false;
@@ -937,7 +937,7 @@ class Play {
 
   keep() {
     this.data.keep(this.link);
-    if (!this.state.own) this.made = [];
+    if (!this.state.own) this.your_trials = [];
     else if (this.editing) this.note();
   }
 
@@ -946,13 +946,13 @@ class Play {
     const [{ trial }] = this.main;
     const ticks = trial.hands.map((_, goal) => trial.movements.reduce((sum, movement) => sum + (movement.goal === goal ? movement.ticks : 0), 0));
     const hits = trial.hands.map((hand, goal) => [goal + 1, HANDS[hand], ticks[goal], ...trial.reached[goal]]);
-    if (!same(this.made.at(-1) || null, hits)) this.made.push(hits);
+    if (!same(this.your_trials.at(-1) || null, hits)) this.your_trials.push(hits);
   }
 
   /* Your trials, a row a hit: the format of studies/fit. */
   get csv() {
     const joints = this.problems[0].arms.flatMap(({ links }, hand) => links.map((_, k) => `${HANDS[hand]}_${k + 1}`));
-    const rows = this.made.flatMap((hits, trial) => hits.map((hit) => ["you", trial + 1, ...hit]));
+    const rows = this.your_trials.flatMap((hits, trial) => hits.map((hit) => ["you", trial + 1, ...hit]));
     return [["subject", "trial", "goal", "hand", "ticks", "base_x", "base_y", ...joints], ...rows].map((row) => `${row}\n`).join("");
   }
 

@@ -71,10 +71,10 @@ def trial(q0: Any, targets: Any, hands: Any, goals: Any, arms: Any, rules: Any, 
         spent, hit = move(q, targets[g], arm, goals[g], True, rules, x, y)
         ticks += spent
         if not hit:
-            found = q.copy()
-            if not correct(found, arm, goals[g], rules, free, x, y):
+            corrected = q.copy()
+            if not correct(corrected, arm, goals[g], rules, free, x, y):
                 return -1
-            spent, hit = move(q, found, arm, goals[g], False, rules, x, y)
+            spent, hit = move(q, corrected, arm, goals[g], False, rules, x, y)
             ticks += spent
             if not hit:
                 return -1

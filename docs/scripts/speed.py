@@ -142,9 +142,9 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
 
     none, together, *alone = map(arguments, (targets[:0], targets, *targets[:100, None]))
     plain = plain_loop.arguments(task, hands)
-    made = session.trials(hands, targets)
-    assert (plain_loop.trials(task.q0, targets, *plain) == made.ticks).all()
-    evaluations, batch = int(made.evaluations.sum()), batch_for(task.robot)
+    reference = session.trials(hands, targets)
+    assert (plain_loop.trials(task.q0, targets, *plain) == reference.ticks).all()
+    evaluations, batch = int(reference.evaluations.sum()), batch_for(task.robot)
     env, many = TaskEnv(task), TaskVectorEnv(1000, task)
     shape = (len(best), *many.action_space.shape)
     actions = np.random.default_rng(0).uniform(-0.1, 0.1, shape)

@@ -84,7 +84,7 @@ def base_of(task):
 def run_task(name):
     """Run every setting on a task; rows of :data:`COLUMNS`."""
     task, rows = load_task(name), []
-    one_armed, known = len(task.hands) == 1, -objective(task).best_known
+    one_armed, best_known = len(task.hands) == 1, -objective(task).best_known
     base = base_of(task)
     for setting, fields in SETTINGS.items():
         if one_armed and setting in ("hands", "all"):
@@ -94,25 +94,26 @@ def run_task(name):
         for number, run in enumerate(runs):
             best = np.maximum.accumulate(run.rewards.filled(-(10**9)))
             start = int(best[0])
-            reached = trials_to_shares(best, start, known)
+            reached = trials_to_shares(best, start, best_known)
             reached[reached > trials] = np.inf if trials == TRIALS else np.nan
             done = run.execute()
             alone = corrective_trial(task, done.hands)
             first = np.nan
             if alone.completed:
                 first = done.ticks_by_goal()[0] - alone.ticks_by_goal()[0]
-            after = [int(best[made - 1]) if made <= trials else "" for made in AFTER]
+            after = [int(best[n - 1]) if n <= trials else "" for n in AFTER]
             family = name.partition("/")[0]
             rows.append([
-                name, family, setting, number, start, known, *after, *reached, first, done.hands,
+                name, family, setting, number, start, best_known, *after, *reached, first,
+                done.hands,
             ])  # fmt: skip
     return rows
 
 
-def trials_to_shares(best, start, known):
+def trials_to_shares(best, start, best_known):
     """Return the trials until the best reward so far is a quarter and half of the way from a first
     reward to the best known, one more than all where it never is."""
-    targets = [np.ceil(start + share * (known - start)) for share in (0.25, 0.5)]
+    targets = [np.ceil(start + share * (best_known - start)) for share in (0.25, 0.5)]
     return np.searchsorted(best, targets) + 1.0
 
 
@@ -124,7 +125,7 @@ def run_others(name):
     """
     task, rows = load_task(name), []
     start = int(learn(task, base_of(task), seed=0, trials=1).rewards[0])
-    known = -objective(task).best_known
+    best_known = -objective(task).best_known
     for setting, (method, runs) in OTHERS.items():
         for number in range(runs):
             try:
@@ -135,12 +136,12 @@ def run_others(name):
                 rewards, hands = [start] * TRIALS, ""
             best = np.maximum.accumulate([-(10**9) if r is None else r for r in rewards])
             best = np.append(best, [best[-1]] * (TRIALS - len(best)))
-            reached = trials_to_shares(best, start, known)
+            reached = trials_to_shares(best, start, best_known)
             reached[reached > TRIALS] = np.inf
-            after = [int(best[made - 1]) for made in AFTER]
+            after = [int(best[n - 1]) for n in AFTER]
             family = name.partition("/")[0]
             rows.append([
-                name, family, setting, number, start, known, *after, *reached, np.nan, hands
+                name, family, setting, number, start, best_known, *after, *reached, np.nan, hands
             ])  # fmt: skip
     return rows
 

@@ -96,15 +96,15 @@ def tables_before(task, condition, trials, rule):
     (``rule`` "best"), always ("walk"), or if the entry is empty ("memoryless").
     """
     goals = len(task.goals)
-    known = [HANDS.index(hand) for hand in HANDS if hand in condition.hands]
+    allowed = [HANDS.index(hand) for hand in HANDS if hand in condition.hands]
     value, source, rows = np.full((goals, 3, 2), -np.inf), np.full((goals, 3, 2), -1), []
     for trial, hands in enumerate(trials.hands.tolist()):
         states = [*zip(range(goals), [2, *hands], hands, strict=False)]
         for goal, before, hand in states if source.max() >= 0 else []:
             if min(before, hand) >= 0:
-                greedy = max(known, key=lambda each, at=(goal, before): value[at][each])
+                greedy = max(allowed, key=lambda each, at=(goal, before): value[at][each])
                 after = (min(goal + 1, goals - 1), hand)
-                follower = max(known, key=lambda each, at=after: value[at][each])
+                follower = max(allowed, key=lambda each, at=after: value[at][each])
                 following = source[after][follower] if goal + 1 < goals else -1
                 stored = source[goal, before, hand]
                 rows.append((trial, goal, hand, greedy, stored, follower, following))
@@ -259,12 +259,12 @@ class Evidence(NamedTuple):
         nearest = values[least, np.arange(len(least))]
         covariance, prior = self.covariance(sigma, float(np.mean(DRIFTS)), noise, nearest)
         precision = linalg.inv(covariance) if noise else 1 / covariance
-        own = precision.diagonal() if noise else precision
+        diagonal = precision.diagonal() if noise else precision
         log_root = np.linalg.slogdet(covariance)[1] / 2 if noise else 0.0
         for _ in range(20 if noise else 1):
             mean = np.einsum("km,kmj->mj", weight[:, number], values)
-            others = precision @ mean - own[:, None] * mean if noise else 0 * mean
-            cost = own * (values**2).sum(axis=2) / 2 + (values * others).sum(axis=2)
+            others = precision @ mean - diagonal[:, None] * mean if noise else 0 * mean
+            cost = diagonal * (values**2).sum(axis=2) / 2 + (values * others).sum(axis=2)
             logs = [-np.bincount(number, each) - np.log(len(DRIFTS)) for each in cost]
             total = np.logaddexp.reduce(logs)
             weight = np.exp(logs - total)

@@ -217,7 +217,7 @@ def sentence(row):
         ]
         if not row.sigma_low > row.noise / 10:
             return f"{text}. Motor noise explains all of σ, so no parameters are given."
-        doubts = ["A lost trial or hit may have been of the best"] * bool(row.lost + row.missing)
+        doubts = ["A trial with lost hits may have been the best"] * bool(row.lost + row.missing)
         doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
         doubt = f" {'. '.join(doubts)}: intervals can be too narrow, and the model wrong."
         return f"{text}. {', '.join(numbers)}.{doubt if doubts else ''}"

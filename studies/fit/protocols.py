@@ -59,7 +59,7 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
     people, goals, dof, robot = len(seeds), len(task.goals), task.robot.dof, task.robot
     sigma, epsilon, kappa = (np.broadcast_to(each, people) for each in (sigma, epsilon, kappa))
     rngs = [np.random.default_rng(seed) for seed in seeds]
-    known = [HANDS.index(hand) for hand in HANDS if hand in condition.hands]
+    allowed = [HANDS.index(hand) for hand in HANDS if hand in condition.hands]
     first = ["LR".index(letter) for letter in initial_hands(task, condition.hands)]
     masks = explored_by(task, condition)
     value = np.full((people, goals, 3, 2), -np.inf)
@@ -72,18 +72,18 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
         drift = np.array(kappa, dtype=float)
         if model == "drawn" and trial:
             drift = np.array([DRIFTS[int(rng.random() * len(DRIFTS))] for rng in rngs])
-        made = []
+        visits = []
         for goal in range(goals):
             hands, targets = np.zeros(people, int), np.full((people, dof), np.nan)
             for n, rng in enumerate(rngs):
                 entries, where = value[n, goal, before[n]], stored[n, goal, before[n]]
-                hand = max(known, key=lambda each: entries[each])  # of equal ones the first
+                hand = max(allowed, key=lambda each: entries[each])  # of equal ones the first
                 if plan:
                     hand = plan[0][goal]
                 if trial == 0 and not plan:
                     hand = first[goal]
-                elif len(known) > 1 and rng.random() < epsilon[n]:
-                    hand = explored_hand(task, condition, q[n], goal, known, rng)
+                elif len(allowed) > 1 and rng.random() < epsilon[n]:
+                    hand = explored_hand(task, condition, q[n], goal, allowed, rng)
                 hands[n] = hand
                 target = where[hand]
                 if plan and hand == plan[0][goal]:
@@ -97,7 +97,7 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
                         p = np.array(q[n])
                         if goal + 1 < goals and np.isfinite(value[n, goal + 1, hand]).any():
                             following = value[n, goal + 1, hand]
-                            best = max(known, key=lambda each: following[each])
+                            best = max(allowed, key=lambda each: following[each])
                             middle = (q[n] + stored[n, goal + 1, hand, best]) / 2
                             p = np.where(masks[best], middle, p)
                         jacobian = robot.jacobian(target, HANDS[hand])
@@ -108,12 +108,12 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
                                   targets, locked_base=task.locked_base)  # fmt: skip
             going &= reached.hit
             total += reached.ticks
-            made.append((before, hands, reached.q))
+            visits.append((before, hands, reached.q))
             for n in np.flatnonzero(going):
                 rows.append([n, trial + 1, goal + 1, HANDS[hands[n]], reached.ticks[n],
                              *reached.q[n]])  # fmt: skip
             q, before = reached.q, hands
-        for goal, (state, hands, postures) in enumerate(made):
+        for goal, (state, hands, postures) in enumerate(visits):
             for n in np.flatnonzero(going):
                 entry = n, goal, state[n], hands[n]
                 better = -total[n] > value[entry]
@@ -126,14 +126,14 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
     return frame.sort_values(["subject", "trial", "goal"], ignore_index=True)
 
 
-def explored_hand(task, condition, q, goal, known, rng):
+def explored_hand(task, condition, q, goal, allowed, rng):
     """Return the hand of an exploration: random, or the hand closest to the goal."""
     if condition.hand_exploration == "closest":
         far = [np.linalg.norm(task.robot.forward_kinematics(q, hand) - task.goals[goal])
                for hand in HANDS]  # fmt: skip
         if abs(far[0] - far[1]) > 1e-9:
             return int(np.argmin(far))
-    return known[int(rng.random() * len(known))]
+    return allowed[int(rng.random() * len(allowed))]
 
 
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
@@ -195,11 +195,11 @@ def recover(cell):
         row = dict(zip(("task", "trials", "data", "repeat", "person", "true"),
                        (*cell, person, model), strict=True))  # fmt: skip
         try:
-            found = fit_subject(task, condition_for(task), there, noise=given, plan=plan,
+            estimates = fit_subject(task, condition_for(task), there, noise=given, plan=plan,
                                 intervals=model in ("best", "informed"))  # fmt: skip
         except np.linalg.LinAlgError:
-            found = {}
-        rows.append(row | truth | found)
+            estimates = {}
+        rows.append(row | truth | estimates)
     return pd.DataFrame(rows).reindex(columns=COLUMNS)
 
 

@@ -41,7 +41,9 @@ def tabulate(people):
     is less than twice the motor noise (``loud``) or not (``quiet``).
 
     ``people`` of all models: shares of them whose model has the least BIC (``right``), whose model
-    the fit excludes (``wrong``) and for whom no other model is left (``decided``). ``informed`` of
+    the fit excludes (``wrong``) and for whom no other model is left (``decided``).
+    ``excluded_drift``: largest drift of excluded people, true of the informed and estimated of
+    those who keep the best; infinite where others are excluded. ``informed`` of
     them: correlation, bias (of σ as a share), and coverage of intervals of each parameter;
     ``kappa_0_cover`` and ``kappa_0_bias`` of people who keep the best and have κ = 0.
     """
@@ -52,23 +54,26 @@ def tabulate(people):
     for key, of_cell in pd.concat([people, pooled, noisy]).groupby(by, sort=False):
         left = of_cell.model + " " + of_cell.others
         kept = [true in names.split() for true, names in zip(of_cell.true, left, strict=True)]
+        excluded = of_cell[~np.array(kept)]
+        drift = excluded.kappa.where(excluded.true == "best", np.inf)
+        drift = excluded.true_kappa.where(excluded.true == "informed", drift)
         row = dict(zip(by, key, strict=True)) | {
             "tasks": of_cell.task.nunique(), "people": len(of_cell),
             "right": (of_cell.model == of_cell.true).mean(), "wrong": 1 - np.mean(kept),
-            "decided": (of_cell.others == "").mean(),
+            "decided": (of_cell.others == "").mean(), "excluded_drift": drift.max(),
         }  # fmt: skip
         informed, best = (of_cell[of_cell.true == model] for model in ("informed", "best"))
         row["informed"] = len(informed)
         for name in PARAMETERS:
-            found = informed.dropna(subset=name)
-            truth, value = found[f"true_{name}"], found[name]
+            fitted = informed.dropna(subset=name)
+            truth, value = fitted[f"true_{name}"], fitted[name]
             if name == "sigma":
                 truth, value = np.log(truth), np.log(value)
-            if len(found) > 2:
+            if len(fitted) > 2:
                 row[f"{name}_r"] = np.corrcoef(truth, value)[0, 1]
                 row[f"{name}_bias"] = (value - truth).mean()
                 row[f"{name}_rmse"] = np.sqrt(((value - truth) ** 2).mean())
-                row[f"{name}_cover"] = covers(found, name).mean()
+                row[f"{name}_cover"] = covers(fitted, name).mean()
         row |= {"best": len(best), "kappa_0_bias": best.kappa.mean(),
                 "kappa_0_cover": covers(best, "kappa").mean()}  # fmt: skip
         rows[" ".join(map(str, key))] = row

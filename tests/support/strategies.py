@@ -122,8 +122,8 @@ def least_cost(task, hands, moving, starts, *, radius, square=False):
         return radius - np.linalg.norm(places - task.goal_array, axis=1)
 
     options = {"constraints": {"type": "ineq", "fun": room}, "options": {"maxiter": 500}}
-    found = [minimize(cost, start, method="SLSQP", tol=1e-10, **options) for start in starts]
-    return min(each.fun for each in found if room(each.x).min() > -1e-6)
+    minima = [minimize(cost, start, method="SLSQP", tol=1e-10, **options) for start in starts]
+    return min(each.fun for each in minima if room(each.x).min() > -1e-6)
 
 
 def shipped_optima():

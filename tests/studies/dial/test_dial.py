@@ -125,9 +125,9 @@ def test_other_methods_and_shifts_of_a_task(monkeypatch):
                         ("SHIFT_AFTER", (1, 10, 40))):  # fmt: skip
         monkeypatch.setattr(PROTOCOLS, name, value)
     monkeypatch.setattr(PROTOCOLS, "OTHERS", {"posture planning": (PROTOCOLS.TwoGoals, 1)})
-    ((*_, start, known, first, last, _, _, _, hands),) = PROTOCOLS.run_others("ascending")
+    ((*_, start, best_known, first, last, _, _, _, hands),) = PROTOCOLS.run_others("ascending")
     assert (first, hands) == (last, "RRR")
-    assert start < first <= known
+    assert start < first <= best_known
     task = "one-armed/v1/d000"
     monkeypatch.setattr(PROTOCOLS, "SHIFT_TASKS", [task])
     rows = PROTOCOLS.run_shifts(task)

@@ -49,20 +49,20 @@ def test_parameters_of_the_plain_learner_are_found():
     truth = {"sigma": 0.03, "epsilon": 0.25, "kappa": 0.5}
     fields = {"noise_sd": 0.03, "epsilon": 0.25, "drift": 0.5}
     people = by_reference(TASK, replace(CONDITIONS["EC4"], **fields), 60, seed=5)
-    found = FIT.fit(people, TASK).iloc[0]
-    assert (found.model, found.others) == ("informed", "")
+    fitted = FIT.fit(people, TASK).iloc[0]
+    assert (fitted.model, fitted.others) == ("informed", "")
     for name, value in truth.items():
-        assert found[f"{name}_low"] < value < found[f"{name}_high"]
-    assert found.kappa_high - found.kappa_low < 0.1
-    assert "κ = 0." in FIT.sentence(found)
+        assert fitted[f"{name}_low"] < value < fitted[f"{name}_high"]
+    assert fitted.kappa_high - fitted.kappa_low < 0.1
+    assert "κ = 0." in FIT.sentence(fitted)
 
 
 @pytest.mark.parametrize("model", ["best", "drawn", "walk", "memoryless", "planner"])
 def test_model_of_simulated_people_is_preferred(model):
     people = PROTOCOLS.simulate(TASK, model, 0.04, 0.3, seeds=[3], trials=60)
-    found = FIT.fit(people, TASK).iloc[0]
-    assert found.model == model
-    assert ("do not apply" in FIT.sentence(found)) == (model not in FIT.LEARNERS)
+    fitted = FIT.fit(people, TASK).iloc[0]
+    assert fitted.model == model
+    assert ("do not apply" in FIT.sentence(fitted)) == (model not in FIT.LEARNERS)
 
 
 def test_motor_noise_is_a_parameter(people):
@@ -78,10 +78,10 @@ def test_motor_noise_is_a_parameter(people):
 def test_where_two_models_explain_the_trials_no_parameters_are_given():
     """A learner that has found nothing better is one without memory."""
     people = PROTOCOLS.simulate(load_task("ascending"), "best", 0.05, 0.2, seeds=[2], trials=12)
-    found = FIT.fit(people, load_task("ascending")).iloc[0]
-    assert {"best", "memoryless"} <= {found.model, *found.others.split()}
-    assert "cannot distinguish" in FIT.sentence(found)
-    assert "κ" not in FIT.sentence(found)
+    fitted = FIT.fit(people, load_task("ascending")).iloc[0]
+    assert {"best", "memoryless"} <= {fitted.model, *fitted.others.split()}
+    assert "cannot distinguish" in FIT.sentence(fitted)
+    assert "κ" not in FIT.sentence(fitted)
 
 
 def test_signatures_of_recorded_trials_are_of_what_was_recorded():
@@ -97,8 +97,8 @@ def test_signatures_of_recorded_trials_are_of_what_was_recorded():
 def test_lost_trials_and_hits_are_counted(people):
     first = people[people.subject == 0]
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
-    found = FIT.fit(kept, TASK).iloc[0]
-    assert (found.trials, found.lost, found.missing) == (60, 2, 2)
+    fitted = FIT.fit(kept, TASK).iloc[0]
+    assert (fitted.trials, fitted.lost, fitted.missing) == (60, 2, 2)
     with pytest.warns(UserWarning, match="subject 0 is left out: .* two trials"):
         assert not len(FIT.fit(first[first.trial == 1], TASK))
     with pytest.raises(CoarticError, match="EC1 does not use the left hand"):
