@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Provenance, Start, Task, parse_task
     from coartic.trajectories import Trajectory, trajectory
 
-__version__ = "2.0.0"
+__version__ = "3.0.0"
 
 __all__ = [
     "ABLATIONS",
