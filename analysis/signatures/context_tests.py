@@ -117,25 +117,21 @@ def beyond_p(
     other: Sequence[Array],
     rng: np.random.Generator,
     *,
-    contrast: Sequence[float] | Array = (1.0, -1.0),
     resamples: int = RESAMPLES,
 ) -> float:
     """Test that a method's posture difference between contexts exceeds another method's, by
     permutation.
 
-    The posture difference is ‖Σ_k c_k m_k‖ for the mean configurations m_k in the contexts and the
-    weights c_k of ``contrast``: the distance of means for two contexts, the slope for several
-    positions. The statistic is the difference of the two methods' posture differences. Permutations
-    exchange the runs of both methods within each context.
+    The posture difference is the distance of the mean configurations in the two contexts. The
+    statistic is the difference of the two methods' posture differences. Permutations exchange the
+    runs of both methods within each context.
 
     Parameters
     ----------
     method, other : sequence of arrays, shape (runs, dof)
-        Configurations in each context, length unit and rad.
+        Configurations in each of the two contexts, length unit and rad.
     rng : numpy.random.Generator
         Generator of the permutations.
-    contrast : sequence of float, or array, shape (contexts,)
-        Weight of each context.
     resamples : int
         Number of permutations.
 
@@ -155,12 +151,11 @@ def beyond_p(
     """
     if min(map(len, (*method, *other))) < 2:
         return math.nan
-    weights = np.asarray(contrast, dtype=np.float64)
     pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]
 
-    def length(means: Sequence[Array]) -> Array:
-        total = sum(weight * mean for weight, mean in zip(weights, means, strict=True))
-        return np.asarray(np.linalg.norm(total, axis=-1))
+    def distance(means: Sequence[Array]) -> Array:
+        first, second = means
+        return np.asarray(np.linalg.norm(first - second, axis=-1))
 
     null = np.empty(resamples)
     for rows in slices(resamples, IN_MEMORY):
@@ -171,6 +166,6 @@ def beyond_p(
             total = pool[chosen].sum(axis=1)
             of_method.append(total / ours)
             of_other.append((pool.sum(axis=0) - total) / (len(pool) - ours))
-        null[rows] = length(of_method) - length(of_other)
-    observed, theirs = (length([q.mean(axis=0) for q in runs]) for runs in (method, other))
+        null[rows] = distance(of_method) - distance(of_other)
+    observed, theirs = (distance([q.mean(axis=0) for q in runs]) for runs in (method, other))
     return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))

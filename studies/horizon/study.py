@@ -114,7 +114,7 @@ def tabulate_signatures(plans):
 
 
 def judge_claims(study, plans):
-    """The claims, as they were registered; the second and third before the runs."""
+    """Judge the claims. The third was registered before the runs, the first two after them."""
     gaps = 100 * plans.pivot_table("gap", "task", "step").loc[plans.task.unique()]
     ahead = plans.groupby("task").ahead.first()[gaps.index]
     first = (gaps["0"] - gaps["1"]) - (gaps["1"] - gaps["all"])

@@ -1,26 +1,20 @@
-"""Does the way to a goal depend on where the goal before was, and where the next will be?
+"""Measure how the first movement depends on where later goals are.
 
     coartic run studies/locus/suite.toml
     python studies/locus/study.py results/locus
 
-writes results.csv, slopes.csv, figure.svg and the page, README.md; without a folder figure and
-page, of the stored tables.
-
-Postures at a goal are regressed on the height of its neighbour, as a locus equation of speech
-regresses a consonant's formant on the vowel that follows (Lindblom 1963; Sussman et al. 1991).
+writes results.csv, figure.svg and the page, README.md; without a folder figure and page, of the
+stored table.
 """
 
 import sys
-from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
-from coartic import load_task
-from coartic.analysis import beyond_p, figures, load, write_study
-from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis import figures, load, write_study
+from coartic.analysis.statistics.hypotheses import bootstrap_test
 
 RANDOM_SEARCH = "random-search"  # which methods that select one of their trials have to exceed
 SELECTS = ["dual-process/EC1", "cma-es/bandit"]
@@ -32,20 +26,16 @@ DRAWN = {  # methods in the figure, and their names
     "posture-based/two-goals": "postures for two goals",
     "trajectory-optimisation/squared-displacement": "minimum squared displacement",
 }
-HEIGHTS = np.array([-1.5, -1.0, -0.5, 0.0, 0.5, 1.0])
-WEIGHTS = (HEIGHTS - HEIGHTS.mean()) / ((HEIGHTS - HEIGHTS.mean()) ** 2).sum()
-"""Weights of values at these heights; the weighted sum is the least-squares slope."""
-BESIDE = [(1, 2), (3, 2), (2, 3), (2, 1)]  # a goal, and its neighbour that moves
 
 
 def measure_runs(study):
-    """Runs in the order of the suite, with the goal that is ``moving``, ``by`` how much upwards,
-    and the postures at all goals, ``q``."""
+    """Return the runs in the order of the suite, with the goal that is ``moving`` and ``by`` how
+    much upwards (length unit)."""
     moved = study.runs.task.str.extract(r"goal(?P<moving>\d)_0_(?P<by>.+)")
     runs = study.runs.assign(moving=moved.moving.astype(int), by=moved.by.astype(float))
     runs = runs.assign(first=study.signature("first"), total=0 - study.signature("whole"))
     cells = dict(list(runs[runs.status == "ok"].groupby(["task", "method"])))
-    return pd.concat([cells[key].assign(q=[*study.configurations(*key)]) for key in study.cells])
+    return pd.concat([cells[key] for key in study.cells])
 
 
 def tabulate(runs):
@@ -65,56 +55,6 @@ def tabulate(runs):
     return table.assign(total=groups.total.mean())
 
 
-def configurations_at(runs, method, goal, moving):
-    """Postures of a method at a goal, ``(runs, dof)`` for each height of its neighbour; tasks in
-    which a goal is moved by 0 are all the same."""
-    there = runs[(runs.method == method) & ((runs.moving == moving) | (runs.by == 0))]
-    return [np.array([q[goal - 1] for q in there.q[there.by == height]]) for height in HEIGHTS]
-
-
-def regress(postures):
-    """Slopes of mean postures, as runs of one task are no independent evidence of a line.
-
-    ``norm``: length of the vector of all joints' slopes (length unit and rad mixed, per length
-    unit; biased upwards), with ``p_holm``, yet uncorrected, of the test that permutes postures: at
-    least 2/6!. ``joint``: the one that changes most, with its ``slope`` and Student's interval.
-    """
-    means = np.array([at_height.mean(axis=0) for at_height in postures])
-    means = np.where(np.ptp(means, axis=0) > 1e-9, means - means.mean(axis=0), 0)  # rounding
-    slopes = WEIGHTS @ means
-    norm = np.linalg.norm(slopes)
-    permuted = np.linalg.norm(np.array([*permutations(WEIGHTS)]) @ means, axis=1)
-    joint = len(slopes) - 1 - np.abs(slopes[::-1]).argmax()
-    error = np.nan_to_num(stats.linregress(HEIGHTS, means[:, joint]).stderr)  # NaN without change
-    low, high = slopes[joint] + stats.t.ppf([0.025, 0.975], len(HEIGHTS) - 2) * error
-    row = {"norm": norm, "p_holm": (permuted >= norm * (1 - 1e-9)).mean(), "joint": joint}
-    return row | {"slope": slopes[joint], "slope_low": low, "slope_high": high}
-
-
-def tabulate_slopes(runs):
-    """Tabulate how the posture at a goal follows a neighbouring goal that moves, as :func:`regress`
-    measures it.
-
-    ``p_holm`` is corrected over the tests of a method; ``p_random_search`` is p of the test that
-    postures follow the neighbour more than in random search.
-    """
-    rows = {}
-    for (goal, moving), method in product(BESIDE, runs.method.unique()):
-        kind = "anticipatory" if goal < moving else "carry-over"
-        row = {"method": method, "goal": goal, "moving": moving, "kind": kind}
-        ours, random_search = (
-            configurations_at(runs, who, goal, moving) for who in (method, RANDOM_SEARCH)
-        )
-        row |= {"runs": sum(map(len, ours)), **regress(ours)}
-        if method in SELECTS:
-            rng = np.random.default_rng([0, goal, moving])
-            row["p_random_search"] = beyond_p(ours, random_search, rng, contrast=WEIGHTS)
-        rows[f"ascending {method} goal {goal} of {moving} right"] = row
-    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
-    names, p_holm = load_task("ascending").robot.joint_names, table.groupby("method").p_holm
-    return table.assign(joint=[names[k] for k in table.joint], p_holm=p_holm.transform(holm))
-
-
 @figures.styled
 def draw(table):
     """First movement by the height of goal 2 (a) and of goal 3 (b), a line for each method."""
@@ -131,8 +71,7 @@ def draw(table):
 
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
-    runs = measure_runs(study)
-    return {"results": tabulate(runs), "slopes": tabulate_slopes(runs)}
+    return {"results": tabulate(measure_runs(study))}
 
 
 if __name__ == "__main__":

@@ -133,22 +133,17 @@ def judge_claims(tasks):
     )
     return judge({
         "learner-aggressiveness-without-resistance": (
-            "In what the learner learns, goals with high aggressiveness have low resistance: the "
-            "two are less correlated than by chance. Of tongues it is said that they are highly "
-            "positively correlated.",
+            "In the learner, resistance and aggressiveness are less correlated than by chance.",
             f"{test}0 for the learner, by replays",
             below(LEARNER),
         ),
         "reaction-aggressiveness-without-resistance": (
-            "So it is where nothing is learned or planned: resistance and aggressiveness are less "
-            "correlated than by chance in the corrective process alone.",
+            "The same holds where nothing is learned or planned, in the corrective process alone.",
             f"{test}0 for the corrective process",
             below(ALONE),
         ),
         "not-as-in-tongues": (
-            "In no method are resistance and aggressiveness correlated as they are said to be in "
-            "tongues: not in the learner, nor in the planner of the shortest path, nor in reactive "
-            "control.",
+            "In no method does the correlation exceed chance by 0.5, our low bound for tongues.",
             f"{test}{TONGUES:g} for every method",
             all_of(*(below(method, TONGUES) for method in METHODS)),
         ),
