@@ -1,4 +1,4 @@
-"""Measure how much of the whole-task reward coarticulation needs.
+"""Measure how much of the reward for the whole task coarticulation needs.
 
     coartic run studies/dose/suite.toml
     python studies/dose/study.py results/dose
@@ -124,9 +124,8 @@ def judge_claims(study, runs):
     )
     return judge({
         "dose-moves-postures": (
-            "The reward of the whole task moves postures: where it counts in full, what is learned "
-            "leaves the next goal nearer than where each movement counts by itself, and nearer "
-            "than random search does.",
+            "With γ = 1 postures leave the next goal nearer than with γ = 0, and nearer than in "
+            "random search.",
             "one-tailed bootstrap tests over random tasks, of noiseless replays: with γ = 1 "
             "postures of base and chosen arm leave the next goal nearer by more than 1 tick more "
             "than with γ = 0, and nearer than that of random search",
@@ -138,8 +137,7 @@ def judge_claims(study, runs):
             ),
         ),
         "dose-slows-first-movements": (
-            "The reward of the whole task slows the first movement: it takes longer where it "
-            "counts in full than where each movement counts by itself.",
+            "With γ = 1 the first movement takes longer than with γ = 0.",
             "one-tailed bootstrap test over random tasks, of noiseless replays: with γ = 1 the "
             "first movement takes more than 1 tick longer than with γ = 0, each against the "
             "corrective process with the same hands",
@@ -147,15 +145,13 @@ def judge_claims(study, runs):
                         first["all 1"] - first["all 0"], TICK),
         ),
         "dose-saves": (
-            "The reward of the whole task pays: where it counts in full, what is learned saves "
-            "more ticks than where each movement counts by itself.",
+            "With γ = 1 learning saves more ticks than with γ = 0.",
             f"{of_saved}with γ = 1 more than 1 point more than with γ = 0",
             saves("all 1", "all 0"),
         ),
         "no-step-at-a-small-dose": (
-            "A little of the other movements' rewards does not do what the whole task's reward "
-            "does: with γ = 0.1 learning saves less, and slows the first movement less, than "
-            "half-way from each by itself to the whole task's reward.",
+            "With γ = 0.1 learning saves less, and slows the first movement less, than half-way "
+            "between γ = 0 and γ = 1.",
             "one-tailed bootstrap tests over random tasks, of noiseless replays: the mean of γ = 0 "
             "and γ = 1 less that of γ = 0.1 is above 0, of the ticks that are saved and of those "
             "by which the first movement is longer",
@@ -167,21 +163,19 @@ def judge_claims(study, runs):
             ),
         ),
         "half-a-dose-saves-less": (
-            "Half of the other movements' rewards (γ = 0.5) saves less than the whole task's "
-            "reward.",
+            "With γ = 0.5 learning saves less than with γ = 1.",
             f"{of_saved}with γ = 1 more than 1 point more than 0.5",
             saves("all 1", "all 0.5"),
         ),
         "three-quarters-suffice": (
-            "The whole task's reward is more than it takes: with γ = 0.75 learning saves as much, "
-            "to a point of the initial solution's ticks. This is against the paper, which calls "
-            "the whole task's reward crucial.",
+            "With γ = 0.75 learning saves as much as with γ = 1, to one percentage point of the "
+            "initial solution's ticks.",
             f"{of_saved}with γ = 0.75 less than 1 point less than with γ = 1",
             saves("all 0.75", "all 1", -GAIN),
         ),
         "earlier-movements-count": (
-            "Earlier movements' rewards count as well: where each movement is credited with later "
-            "ones alone, in full, learning saves less than with the whole task's reward.",
+            "Credited with later movements alone, learning saves less than with all movements' "
+            "rewards.",
             f"{of_saved}with γ = 1 more than 1 point more where all movements count than where "
             "later ones alone do",
             saves("all 1", "later 1"),
