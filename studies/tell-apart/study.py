@@ -37,7 +37,6 @@ def share_by_task(changes):
     return shares.assign(
         **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
         drift=shares["same"] / shares.square, from_anew=np.log10(shares.anew / shares.among) / 2,
-        first=(shares.ticks_1 - shares.ticks_10000) / shares.cases,
         gap=100 * (shares.ticks_10000 / shares.ticks_anew - 1),
     )  # fmt: skip
 
@@ -47,11 +46,10 @@ def tabulate(changes, starts, steps):
 
     Shares vary between tasks, so that ``share_1`` has its median and its ``pooled`` value, sums
     over tasks, as well, and the trials to half their quartiles. ``unlike``: tasks on which two
-    learners who learn the changed task anew differ by more than the learner shifts.
+    learners of the changed task differ by more than the learner shifts.
     """
     shares = share_by_task(changes)
-    columns = [*(f"share_{n}" for n in AFTER), "shift", "half", "drift", "from_anew", "first",
-               "gap"]  # fmt: skip
+    columns = [*(f"share_{n}" for n in AFTER), "shift", "half", "drift", "from_anew", "gap"]
     by = shares.assign(unlike=shares.among > shares.square).groupby(
         ["distance", "model"], sort=False
     )
@@ -111,18 +109,18 @@ def judge_claims(changes, starts, steps):
             mean_beyond("The shift is {}", shares["shift"]["planner, all goals"], 2 * NOISE),
         ),
         "learner-ends-where-learning-anew-ends": (
-            "After the change the learner ends where those end who learn the changed task anew.",
+            "After the change the learner ends where learners of the changed task end.",
             rule + "logarithm of its distance to them over that between them below 0.1",
             mean_beyond("The logarithm is {}", shares["from_anew"]["learner"], 0.1, "less"),
         ),
         "learner-ends-as-well": (
-            "Its final number of ticks is as good.",
+            "The learner's final number of ticks is as good.",
             rule + "less than 2 % more ticks than learning anew",
             mean_beyond("It needs {} % more", shares["gap"]["learner"], 2, "less"),
         ),
         "starts-keep-learners-apart": (
-            "Learners who practised from different starts stay apart when tested from a third, and "
-            "after as much practice from there.",
+            "Learners from different starts stay apart when tested from a third, and after as much "
+            "practice from there.",
             "one-tailed bootstrap test over test tasks: mean logarithm of the distance between "
             "groups over that within above 0.1 (a ratio of 1.26), at once and after 10,000 trials",
             all_of(
