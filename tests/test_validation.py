@@ -12,10 +12,10 @@ from coartic import CoarticError, builtin_tasks, load_task
 from coartic.analysis.figures import picture
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.registry import registry
+from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER
-from coartic.internal.text import did_you_mean
+from coartic.internal.text import RENAMED, did_you_mean
 from coartic.tasks.families import FAMILY_FOLDER, read_family
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
@@ -254,6 +254,15 @@ def test_a_name_as_tables_and_figures_have_it_is_understood(name, meant):
 @pytest.mark.parametrize("name", ["", "-", "qqq", "."])
 def test_what_is_like_no_name_has_no_hint(name):
     assert did_you_mean(name, [*builtin_tasks(), *KNOWN]) == ""
+
+
+def test_a_method_of_version_2_is_known_by_its_present_id():
+    present = set(built_in(with_code=False))
+    assert set(RENAMED.values()) < present
+    assert not set(RENAMED) & present
+    meant = did_you_mean("nullspace-qp/next-goal", present)
+    assert meant == "; since version 3.0.0 it is 'posture-qp/goals-ahead'"
+    assert did_you_mean("guesses", ["guessing"]) == "; did you mean 'guessing'?"
 
 
 @pytest.mark.parametrize(

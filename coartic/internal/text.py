@@ -82,12 +82,26 @@ def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
     return plain(f"{type(thing).__name__}({', '.join(parts)})", LONGEST_LINE)
 
 
+RENAMED = {
+    "guesses": "random-search",
+    "guesses/hands": "random-search/hands",
+    "random-search/climbing": "hill-climbing",
+    "corrective-alone/every": "corrective-alone/best-hands",
+    "nullspace-qp/none": "posture-qp/current-goal",
+    "nullspace-qp/next-goal": "posture-qp/goals-ahead",
+    "trajectory-optimisation/squared-changes": "trajectory-optimisation/squared-displacement",
+}
+"""Ids of methods that version 3.0.0 renamed."""
+
+
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """``; did you mean 'a'?`` with the name that is nearest; empty where none is near.
 
     Near are names that differ in small letters and punctuation, begin so, are spelt alike or end in
-    the same word, in this order.
+    the same word, in this order. A method of version 2.0.0 has its present id instead.
     """
+    if RENAMED.get(name) in (names := list(names)):
+        return f"; since version 3.0.0 it is {RENAMED[name]!r}"
     words = {each: re.findall(r"[^\W_]+", each.lower()) for each in (name, *names)}
     meant = words.pop(name)
     if not meant:
