@@ -80,7 +80,7 @@ def list_against_learner(study: Study) -> Rows:
 
 @table(
     "method; gap[]: gap (%) .1; tasks: number of tasks; information: use of the reward; "
-    "better: better on; worse: worse on; on *: {} (%) .1; runs"
+    "better: better than the learner on (tasks); worse: worse on (tasks); on *: {} (%) .1; runs"
 )
 def list_ranking(study: Study) -> Rows:
     """List gaps over all tasks and on each, methods from files first, settings after their method.

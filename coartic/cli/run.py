@@ -127,8 +127,8 @@ def perform_and_say(
 
     with interruptible(saved), display:
         if include:
-            display.line(f"Copying {' and '.join(include)}.")
             plan = include_folders(plan, include, out)
+            display.line(f"Included the runs of {' and '.join(include)}.")
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(plan, out, executor=executor, watch=display.update)
     say(str(progress))
