@@ -104,10 +104,10 @@ def setup(app):
             r"```(?:toml|python)\n# (\S+\.(?:toml|py))\n", cell + r"%%writefile \1\n", source[0]
         )
         text = text.replace("```sh\n", cell + "%%sh\n").replace("```python\n", cell)
-        image = 'import IPython\nIPython.display.Image("\\1", width=360)'
-        picture = f"{cell}:tags: [remove-input]\n{image}\n```"
-        text = re.sub(r"<!-- picture (\S+) -->", picture, text)
         text = "".join(map(pictures_named, re.split(r"(?m)^(?=## )", text)))
+        image = 'import IPython\nIPython.display.Image("\\1", width=360)'
+        options = ':mystnb: {image: {alt: "\\2"}}\n:tags: [remove-input]'
+        text = re.sub(r"<!-- picture (\S+): (.+) -->", f"{cell}{options}\n{image}\n```", text)
         source[0] = f"{_NOTEBOOK}{cell}:tags: [remove-cell]\n{_FIRST_CELL}```\n\n{text}"
 
     def bars(app, what, name, thing, options, lines):

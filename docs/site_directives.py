@@ -116,7 +116,7 @@ def play() -> Iterator[str]:
     yield "```{raw} html"
     yield f"<style>{part_of_page('play.css')}</style>"
     yield player_figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
-    yield '<p><a href="play.html">On a page of its own</a>; with a task of yours:'
+    yield '<p><a href="play.html">Open this on its own page</a>; with your own task:'
     yield " <code>coartic play TASK</code></p>"
     yield "```"
 

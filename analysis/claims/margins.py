@@ -8,7 +8,7 @@ FEW = 0.25
 """Share of runs up to which runs are few. The paper speaks of none, of about half (9 and 11 of 20)
 and of all of its runs; the bounds lie midway."""
 MOST = 0.75
-"""Share of runs beyond which runs are most; between :data:`FEW` and this share runs are about half.
+"""Share of runs beyond which runs are most; between ``FEW`` and this share runs are about half.
 The share was 0.8 in the first version of the register, and was lowered when it turned out that even
 20 of 20 runs could not exceed it after Holm's correction (adjusted p = 0.104)."""
 SPREAD = 1.0
