@@ -88,58 +88,64 @@ def judge_claims(runs):
     how = "one-tailed bootstrap tests over 40 random tasks, in each family, of the gain "
     return judge({
         "information-in-exploration-brings-much": (
-            "A drift of 0.3 with the paper's noise brings more after 100 trials, in every family. "
-            "Refuted where a family gains less.",
-            f"{how}after 100 trials: with κ = 0.3 more than {POINTS:g} points more than with 0",
+            "κ = 0.3 with the paper's noise gains more after 100 trials than no drift, in every "
+            "family.",
+            f"{how}after 100 trials: with κ = 0.3 more than {POINTS:g} points more than with 0"
+            "; refuted where a family gains less",
             in_each("{} points more with κ = 0.3", more(INFORMED, PAPER), POINTS),
         ),
         "information-makes-quick": (
-            "With a drift of 1 and little noise a quarter of the gain takes less than a fifth of "
-            "the paper's learner's trials, in every family. Refuted where it takes more.",
+            "With κ = 1 and little noise a quarter of the gain takes less than a fifth of the "
+            "paper's learner's trials, in every family.",
             "one-tailed bootstrap tests over random tasks, in each family, of the logarithm of the "
             f"trials to a quarter of the gain: κ = 1, σ = 0.01 takes {TIMES:g} times fewer than "
-            "the paper's learner",
+            "the paper's learner"
+            "; refuted where it takes more",
             in_each("10^{} times fewer trials", more(PAPER, PLANNER, "log_quarter"),
                     float(np.log10(TIMES))),
         ),
         "information-in-correction-brings-little": (
-            "A pull of 0.05 in correction brings less than half of what a drift of 0.3 brings "
-            "after 100 trials, in every family. Refuted where it brings more than half.",
-            f"{how}after 100 trials: what κ = 0.3 adds is more than twice what β = 0.05 adds",
+            "A pull of 0.05 in correction brings less than half of what κ = 0.3 brings after 100 "
+            "trials, in every family.",
+            f"{how}after 100 trials: what κ = 0.3 adds is more than twice what β = 0.05 adds"
+            "; refuted where it brings more than half",
             in_each("{} points more than twice the pull's", lambda family:
                     of(INFORMED, "gain_100", family) - of(PAPER, "gain_100", family)
                     - 2 * (of("correction", "gain_100", family) - of(PAPER, "gain_100", family))),
         ),
         "planning-alone-is-short-sighted": (
-            "With a drift of 1 and no noise learning stops early: with noise of 0.01 it gains more "
-            "in the end, in every family. Refuted where noise gains nothing.",
+            "κ = 1 gains more in the end with noise of 0.01 than without noise, in every family.",
             f"{how}after 10,000 trials: with σ = 0.01 more than {POINTS:g} points more than "
-            "without noise",
+            "without noise"
+            "; refuted where noise gains nothing",
             in_each("{} points more with noise", more(PLANNER, "1 0", "gain_10000"), POINTS),
         ),
         "wrong-information-helps-less": (
-            "A drift of 0.3 towards the start of the trial gains less after 100 trials than "
-            "towards the next goal, in every family. Refuted where it gains as much.",
-            f"{how}after 100 trials: towards the next goal more than {POINTS:g} points more",
+            "κ = 0.3 towards the start of the trial gains less after 100 trials than towards the "
+            "next goal, in every family.",
+            f"{how}after 100 trials: towards the next goal more than {POINTS:g} points more"
+            "; refuted where it gains as much",
             in_each("{} points more towards the next goal", more(INFORMED, "0.3 0.05 start"),
                     POINTS),
         ),
         "wrong-information-harms": (
-            "A drift of 1 towards the start of the trial gains less in the end than no drift, in "
-            "every family with two arms. Refuted where it gains more.",
-            f"{how}after 10,000 trials: without drift more than {POINTS:g} points more",
+            "κ = 1 towards the start of the trial gains less in the end than no drift, in every "
+            "family with two arms.",
+            f"{how}after 10,000 trials: without drift more than {POINTS:g} points more"
+            "; refuted where it gains more",
             in_each("{} points more without drift", more(PAPER, "1 0.05 start", "gain_10000"),
                     POINTS, two_armed),
         ),
         "drawn-drift-is-as-good": (
-            "A drift that each trial draws gains as much after 100 trials as one of 0.3, to five "
-            "points, in every family. Refuted where it gains less.",
-            f"{how}after 100 trials: drawn drift less than {POINTS:g} points less than κ = 0.3",
+            "A drift that each trial draws gains as much after 100 trials as κ = 0.3, to five "
+            "points, in every family.",
+            f"{how}after 100 trials: drawn drift less than {POINTS:g} points less than κ = 0.3"
+            "; refuted where it gains less",
             in_each("{} points more with a drawn drift", more("drawn", INFORMED), -POINTS),
         ),
         "information-about-hands": (
-            "Hands by the nearest posture gain more than random ones after 100 trials on long "
-            "tasks, and less in the end where few hands are to be chosen (two-armed, redundancy).",
+            "Hands by the nearest posture gain more than random hands after 100 trials on long "
+            "tasks, and less in the end on two-armed and redundancy tasks.",
             f"{how}: on long tasks after 100 trials more than {POINTS:g} points more, on two-armed "
             "and redundancy tasks after 10,000 less",
             all_of(
@@ -194,27 +200,29 @@ def judge_shifts(shifts):
     families = FAMILIES[:2]
     return judge({
         "drift-makes-the-shift-quick": (
-            "With a drift of 1 and little noise half of the shift takes less than a fifth of the "
-            "paper's learner's trials. Refuted where it takes more.",
+            "With κ = 1 and little noise half of the shift takes less than a fifth of the paper's"
+            " learner's trials.",
             f"{how}the logarithm of the trials to half of the shift is lower by more than that of "
-            f"{TIMES:g}",
+            f"{TIMES:g}"
+            "; refuted where it takes more",
             all_of(*(mean_beyond(f"{family}: 10^{{}} times fewer trials",
                                  of("log_half", paper, family) - of("log_half", planner, family),
                                  float(np.log10(TIMES))) for family in families)),
         ),
         "drift-shifts-within-ten-trials": (
-            "After ten trials more than a tenth of the shift is there with a drift of 1 and little "
-            "noise, and less than nine tenths: between the paper's learner and a planner. Refuted "
-            "where it is not between.",
-            f"{how}the share after ten trials above 0.1 and below 0.9",
+            "After ten trials with κ = 1 and little noise, between a tenth and nine tenths of the"
+            " shift is there: more than in the paper's learner, less than in a planner.",
+            f"{how}the share after ten trials above 0.1 and below 0.9"
+            "; refuted where it is not between",
             all_of(*(mean_beyond(f"{family}: the share is {{}}",
                                  of("share_10", planner, family), bound, side)
                      for family in families for bound, side in ((0.1, "greater"), (0.9, "less")))),
         ),
         "shift-is-of-the-change": (
-            "With a drift of 1 and little noise less than half of the shift is there after as much "
-            "practice without a change. Refuted where it is more.",
-            f"{how}the shift without a change, projected, below 0.5",
+            "With κ = 1 and little noise less than half of the shift is there after as much "
+            "practice without a change.",
+            f"{how}the shift without a change, projected, below 0.5"
+            "; refuted where it is more",
             all_of(*(mean_beyond(f"{family}: the share is {{}}",
                                  of("unchanged", planner, family), 0.5, "less")
                      for family in families)),

@@ -130,7 +130,7 @@ def fourth_gains(arms, than, gains):
     """A claim on the fourth goal ahead: its statement, its test, and what was seen."""
     side = "greater" if than == "more" else "less"
     return (
-        f"Of fourteen goals for {arms} the fourth goal ahead gains {than} than 1 %.",
+        f"With {arms} the fourth goal ahead of fourteen gains {than} than 1 %.",
         "one-tailed bootstrap test over random tasks with fourteen goals: from three goals ahead "
         f"to four the planner gains {than} than 1 % of a mean movement, for each movement that has "
         "a fourth goal ahead",
@@ -197,26 +197,26 @@ def judge_claims(study, plans, repeats):
         "fourth-of-fourteen-gains-little-on-two-arms": fourth_gains("two arms", "less", two),
         "fourth-of-fourteen-gains-more-on-two-arms": fourth_gains("two arms", "more", two),
         "horizon-is-a-number-of-goals": (
-            "A horizon is a number of goals: with fourteen goals, two goals ahead gain as much as "
-            "two of seven, rather than one of seven.",
+            "A horizon is a number of goals: two goals ahead of fourteen gain as much as two of "
+            "seven, not as one of seven.",
             pairs_test.format("more"),
             mean_beyond(sentence, nearer),
         ),
         "horizon-is-a-share-of-goals": (
-            "A horizon is a share of the goals that are left: with fourteen goals, two goals ahead "
-            "gain as much as one of seven, rather than two of seven.",
+            "A horizon is a share of the goals that are left: two goals ahead of fourteen gain as"
+            " much as one of seven, not as two of seven.",
             pairs_test.format("less"),
             mean_beyond(sentence, nearer, 0.0, "less"),
         ),
         "learner-behind-no-goal-ahead": (
-            "The learner loses more than the planner that looks no goal ahead.",
+            "The learner has a larger gap than the planner without a goal ahead.",
             "one-tailed bootstrap test over random tasks with fourteen goals: the learner's gap is "
             "higher by more than 1 %",
             mean_beyond("The learner loses {} points more than the planner",
                         learner - at(plans, MANY, 0, "gap"), GAIN),
         ),
         "cma-es-behind-one-goal-ahead": (
-            "CMA-ES, with one arm, loses more than the planner with one goal ahead.",
+            "With one arm CMA-ES has a larger gap than the planner with one goal ahead.",
             "one-tailed bootstrap test over random tasks with fourteen goals for one arm: the gap "
             "of CMA-ES is higher by more than 1 %",
             mean_beyond("CMA-ES loses {} points more than the planner",

@@ -120,29 +120,29 @@ def judge_claims(gaps):
     behind = [after[h].sub(points["planner", 0, h, 0], axis=0) for h in range(5)]
     claims = {
         "larger-views-gain-more-by-practice": (
-            "Practice gains more where more goals are in view: from a sixteenth of it on, more "
-            "with two goals ahead than with none.",
+            "From a sixteenth of practice on, agents gain more with two goals ahead than with "
+            "none.",
             f"from {EARLY:,} trials on the gap falls by more with two goals ahead than with none",
             beyond(0, {"practice gains {} points more with two goals ahead than with none":
                        (early[2] - after[2]) - (early[0] - after[0])}),
         ),
         "larger-views-gain-longer": (
-            "Larger views go on gaining for longer: the last three quarters of practice gain more "
-            "with four goals ahead than with none.",
+            "In the last three quarters of practice, agents gain more with four goals ahead than "
+            "with none.",
             f"from {LATER:,} trials on the gap falls by more with four goals ahead than with none",
             beyond(0, {"the last three quarters gain {} points more with four goals ahead than "
                        "with none": (later[4] - after[4]) - (later[0] - after[0])}),
         ),
         "practice-lengthens-the-horizon": (
-            "Practice lengthens the horizon: the second, third and fourth goal ahead together gain "
-            "more after all practice than after a sixteenth of it.",
+            "The second, third and fourth goal ahead together gain more after all practice than "
+            "after a sixteenth.",
             "from one goal ahead to four the gap falls by more after all practice than after "
             f"{EARLY:,} trials",
             beyond(0, {"the second to fourth goals ahead gain {} points more after practice":
                        (after[1] - after[4]) - (early[1] - early[4])}),
         ),
         "first-goal-ahead-gains-agents-most": (
-            "Goals beyond the first ahead still help agents after all practice, but gain less "
+            "After all practice, goals beyond the first ahead still help agents, but gain less "
             "together than the first.",
             "after all practice the gap falls from one goal ahead to four, and by more from none "
             "to one",
@@ -152,8 +152,8 @@ def judge_claims(gaps):
             }),
         ),
         "agents-behind-planner": (
-            "With two, three and four goals ahead agents end more than 1 % behind the planner that "
-            "sees as much.",
+            "With two, three and four goals ahead, agents end more than 1 % behind the planner "
+            "with the same view.",
             "with two, three and four goals ahead the gap of agents after all practice is higher "
             f"by more than {GAIN:g} points than that of the planner that sees as much",
             beyond(GAIN, {
