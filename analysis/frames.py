@@ -15,9 +15,9 @@ from contextlib import suppress
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
-from scipy import stats
 
 from coartic import Execution, Movement, Task
 from coartic.analysis.optima import gap_share
@@ -356,7 +356,7 @@ def are_separated(first: Array, second: Array, level: float) -> bool:
     :func:`separation`."""
     few, many = sorted((first, second), key=len)
     if len(few) > 1:
-        return bool(stats.mannwhitneyu(few, many, alternative="two-sided").pvalue < level)
+        return bool(scipy.stats.mannwhitneyu(few, many, alternative="two-sided").pvalue < level)
     most = 0.025 * len(many)
     return bool(min((many >= few[0]).sum(), (many <= few[0]).sum()) <= most)
 

@@ -5,7 +5,7 @@ taken as known without error. Intervals are of the BCa bootstrap, and the edge c
 all in :func:`bootstrap_estimate`. Resampling has one seed, :data:`SEED`, which has nothing to do
 with the seeds of the runs.
 
-scipy.stats is imported where it is needed: it takes longer than drawing a figure.
+scipy imports its modules where they are first used: scipy.stats takes longer than a figure.
 
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
@@ -20,6 +20,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from coartic.robot import Array
@@ -141,13 +142,11 @@ def bootstrap_estimate(
         return Estimate(value, value, value, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
-    from scipy import stats
-
     with warnings.catch_warnings():
         # scipy warns where BCa is undefined; that case is dealt with below.
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)
         warnings.simplefilter("ignore", RuntimeWarning)
-        result = stats.bootstrap(
+        result = scipy.stats.bootstrap(
             samples,
             statistic,
             n_resamples=resamples,

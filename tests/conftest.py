@@ -135,32 +135,47 @@ def browser():
         started.close()
 
 
-@pytest.fixture
-def visited(browser):
-    """Opens a page; what it logs, throws or asks the network for fails the test."""
-    problems, contexts = [], []
+@pytest.fixture(scope="session")
+def pages(browser):
+    """Pages by the options of their contexts. They stay, as a new page starts two processes."""
+    return {}
 
-    def visit(link, width=1280, **options):
-        context = browser.new_context(viewport={"width": width, "height": 900}, **options)
-        context.set_default_timeout(180_000)  # ms; a machine may be busy
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda message: problems.append(message.text))
-        page.on("pageerror", lambda error: problems.append(str(error)))
-        page.on(
-            "request",
-            lambda asked: (
-                None
-                if asked.url.startswith(("file:", "data:", "blob:"))
-                else problems.append(asked.url)
-            ),
-        )
+
+@pytest.fixture
+def visited(browser, pages):
+    """Opens a page; what it logs, throws or asks the network for fails the test."""
+    problems, opened = [], []
+    listeners = {
+        "console": lambda message: problems.append(message.text),
+        "pageerror": lambda error: problems.append(str(error)),
+        "request": lambda request: (
+            None
+            if request.url.startswith(("file:", "data:", "blob:"))
+            else problems.append(request.url)
+        ),
+    }
+
+    def visit(link, width=1280, color_scheme="light", reduced_motion="no-preference", **options):
+        key = repr(options)
+        if key not in pages:
+            context = browser.new_context(**options)
+            context.set_default_timeout(180_000)  # ms; a machine may be busy
+            pages[key] = context.new_page()
+        page = pages[key]
+        page.set_viewport_size({"width": width, "height": 900})
+        page.emulate_media(media="screen", color_scheme=color_scheme, reduced_motion=reduced_motion)
+        page.mouse.move(0, 0)
+        for event, listener in listeners.items():
+            page.on(event, listener)
+        opened.append(page)
         page.goto(link)
         return page
 
     yield visit
-    for context in contexts:
-        context.close()
+    for page in opened:
+        for event, listener in listeners.items():
+            page.remove_listener(event, listener)
+        page.goto("about:blank")
     assert problems == []
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, all_higher
@@ -158,7 +158,7 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
             [count, total - count],
             [int(of_random_search.sum()), int((~of_random_search).sum())],
         ]
-        p = float(stats.fisher_exact(table, alternative="greater").pvalue)
+        p = float(scipy.stats.fisher_exact(table, alternative="greater").pvalue)
         more = min(does.mean() - of_random_search.mean(), does.mean() - margins.FEW)
         tests.append(Estimate(more, p=p, n=(total, len(of_random_search))))
         against.append(share_test(count, total, margins.FEW, "less"))

@@ -12,7 +12,7 @@ from operator import itemgetter
 from statistics import mode
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 from coartic import Execution, Hand, Task
 from coartic.analysis.claims import margins
@@ -122,7 +122,7 @@ def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, near: Array) -> 
     rng = np.random.default_rng(SEED)
     best = math.inf
     for start in (first, *(first + rng.normal(0, 0.3, (8, len(joints))))):
-        reach = optimize.minimize(
+        reach = scipy.optimize.minimize(
             lambda change: (change @ change, 2 * change),
             start,
             jac=True,
@@ -207,7 +207,7 @@ def most_do(words: str, does: Sequence[bool], *, claimed: bool = True) -> Findin
     more = share_test(count, total, margins.MOST, "greater")
     fewer = share_test(count, total, margins.MOST, "less")
     side = "greater" if claimed else "less"
-    limits = stats.binomtest(count, total, alternative=side).proportion_ci()
+    limits = scipy.stats.binomtest(count, total, alternative=side).proportion_ci()
     limit = f"at least {limits.low:.0%}" if claimed else f"at most {limits.high:.0%}"
     if limits.low > 0 or limits.high < 1:
         words += f", {limit} of all (95 %)"
@@ -227,7 +227,7 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
     does = [each == hands for each in read.hands(task, label)]
     count, total = sum(does), len(does)
     share = count / total
-    low, high = stats.binomtest(count, total).proportion_ci()
+    low, high = scipy.stats.binomtest(count, total).proportion_ci()
     cell = published_cell(task, who_is(label))
     assert cell is not None
     published, of_published = cell[hands], sum(s.runs for of, s in cell.items() if of)
@@ -239,7 +239,7 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
     unlike = Estimate(
         share - published.runs / of_published,
         n=(total, of_published),
-        p=float(stats.fisher_exact(table).pvalue),
+        p=float(scipy.stats.fisher_exact(table).pvalue),
     )
     words = runs_that(read, task, label, hands, does)
     return Finding(

@@ -14,7 +14,7 @@ from functools import cached_property
 from itertools import combinations, takewhile
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from coartic import Hand, Task
 from coartic.analysis.signatures.context_tests import (
@@ -65,7 +65,7 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     """
     equivalent, other = (
         float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
-        for basis in (linalg.null_space(jacobian), linalg.orth(jacobian.T))
+        for basis in (scipy.linalg.null_space(jacobian), scipy.linalg.orth(jacobian.T))
     )
     return equivalent, other
 

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from coartic.estimates import (
@@ -106,9 +107,7 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
     mean, n = float(values.mean()), (len(values),)
     if len(values) < 2:
         return Estimate(mean, n=n)
-    from scipy import stats  # as in estimates
-
-    result = stats.permutation_test(
+    result = scipy.stats.permutation_test(
         (values,),
         np.mean,
         permutation_type="samples",
@@ -126,9 +125,7 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
 
     The value of the estimate is the difference ``count / total - share``.
     """
-    from scipy import stats  # as in estimates
-
-    p = float(stats.binomtest(count, total, share, alternative).pvalue)
+    p = float(scipy.stats.binomtest(count, total, share, alternative).pvalue)
     return Estimate(count / total - share, p=p, n=(total,))
 
 
@@ -199,7 +196,5 @@ def difference_to_published(
     if total == 0.0:
         return Estimate(value, value, value, n=sizes)
     freedom = total**2 / sum(part**2 / free for part, free in parts)
-    from scipy import special  # as in estimates
-
-    half = float(special.stdtrit(freedom, TAILS[1])) * math.sqrt(total)
+    half = float(scipy.special.stdtrit(freedom, TAILS[1])) * math.sqrt(total)
     return Estimate(value, value - half, value + half, n=sizes)

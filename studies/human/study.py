@@ -109,7 +109,9 @@ def bootstrap(sides, statistic, level):
     if count < 2:
         return value, np.nan, np.nan, count
     drawn = np.random.default_rng(0).integers(count, size=(RESAMPLES, count))
-    away = (np.array([*map(difference, drawn)]) - value) * np.sqrt(count / (count - 1))
+    different, which = np.unique(drawn, axis=0, return_inverse=True)
+    values = np.array([*map(difference, different)])[which.ravel()]
+    away = (values - value) * np.sqrt(count / (count - 1))
     return value, *(value + np.quantile(away, [level / 2, 1 - level / 2])), count
 
 

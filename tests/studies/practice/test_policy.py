@@ -119,14 +119,19 @@ def test_the_trial_is_that_of_a_plain_loop(name):
     assert execute(task, result.solution).ticks == session.meter.movement_ticks == total
 
 
-def test_practice_is_kept_and_helps_on_other_tasks(monkeypatch):
+def test_practice_helps_on_other_tasks():
     policy = practice.recall(1, 3, TRIALS, PAPER)
     tasks = practice.draw_tasks(np.random.default_rng(5), 300)
     nothing = practice.Network([np.zeros_like(weight) for weight in policy.weights])
     before, after = (ticks(network, *tasks, 1).sum(axis=0) for network in (nothing, policy))
     assert (before - after).mean() > max(0.02 * before.mean(), 3 * (before - after).std() / 17)
-    *_, (_, again) = practice.practise(1, 3, TRIALS, PAPER)
+
+
+def test_practice_is_kept(monkeypatch):
+    few = 5 * practice.BATCH
+    *_, (_, practised) = practice.practise(1, 3, few, PAPER)
+    practice.recall(1, 3, few, PAPER)
     monkeypatch.setattr(practice, "practise", None)
     practice.recall.cache_clear()
-    kept = practice.recall(1, 3, TRIALS, PAPER)
-    assert all(map(np.array_equal, kept.weights, again.weights))
+    kept = practice.recall(1, 3, few, PAPER)
+    assert all(map(np.array_equal, kept.weights, practised.weights))
