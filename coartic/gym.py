@@ -215,7 +215,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         for number in {*state.task[rows].tolist()}:
             self.task_at(number)
         state.q[rows] = self.starts[state.task[rows]]
-        observe(self.state)
+        observe(*self.state)
 
     def move(self, actions: ArrayLike, rows: RowIndex = slice(None)) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
@@ -227,7 +227,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         if chosen.shape != shape:
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
         self.state.actions[rows] = chosen
-        refused = step_robots(self.state)
+        refused = step_robots(*self.state)
         if refused >= 0:
             which = f" of robot {refused}" if self.num_envs > 1 else ""
             raise ValueError(f"the action{which} has NaN; it must be numbers")
@@ -313,7 +313,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         """Begin a trial."""
         super().reset(seed=whole_seed(seed))
         check_no_options(options)
-        self.robots.begin(slice(None), self.np_random.integers(len(self.robots.tasks), size=1))
+        self.robots.begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
         return self.robots.state.seen[0].copy(), self._info()
 
     def step(

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.motion.batch import SLOTS, Batch, Slots, batch_for, robot_parameters
+from coartic.motion.batch import SLOTS, Batch, batch_for, robot_parameters
 from coartic.motion.compile import entry, fill_row, inlined, inner
 from coartic.motion.trial import (
     MOVE,
@@ -67,7 +67,10 @@ class VectorState(NamedTuple):
     """Reward of a step in which the corrective process fails."""
     runs: NDArray[np.void]
     """Runs of a lot of robots with each hand, shape ``(H, SLOTS)``."""
-    slots: Slots
+    at: NDArray[np.void]
+    """Rows of their slots, and those that a correction and a movement need, as in a batch."""
+    corrected: Array
+    moved: Array
     accounts: NDArray[np.void]
     """Accounts of these robots' goals, shape ``(SLOTS,)``."""
     indices: Numbers
@@ -103,7 +106,9 @@ class VectorState(NamedTuple):
             joints=joints,
             sides=sides,
             runs=np.stack([batch.runs] * len(sides)),
-            slots=batch.slots,
+            at=batch.at,
+            corrected=batch.corrected,
+            moved=batch.moved,
             accounts=empty_accounts(robot, SLOTS, 1).goals[:, 0],
             indices=np.zeros(SLOTS, np.int64),
             **constants,  # type: ignore[arg-type]
@@ -151,8 +156,10 @@ def step_lot(count: int, robot: Any, state: Any) -> None:
             set_off(run, state.q[n])
             begin(run, state.goals[state.task[n], state.goal[n]])
             run.hand = state.sides[h]
-        find_corrections(count, robot, Batch(state.runs[h], state.slots))
-    batch, others = Batch(state.runs[0], state.slots), state.runs[len(state.sides) - 1]
+        batch = Batch(state.runs[h], state.at, state.corrected, state.moved)
+        find_corrections(count, robot, batch)
+    batch = Batch(state.runs[0], state.at, state.corrected, state.moved)
+    others = state.runs[len(state.sides) - 1]
     for i in range(count):
         n = state.indices[i]
         aim(batch.runs[i], others[i], state.movable[state.task[n]], state.actions[n], state)
@@ -170,9 +177,10 @@ def step_lot(count: int, robot: Any, state: Any) -> None:
 
 
 @entry
-def observe(state: Any) -> None:
+def observe(*fields: Any) -> None:
     """Fill in what each robot sees: whether there is a goal, places of goals from the base, joints,
     and, where there is room for it, whether the robot can move them."""
+    state = VectorState(*fields)
     goals, joints = state.ahead + 1, len(state.joints)
     for n in range(len(state.task)):
         seen, task = state.seen[n], state.task[n]
@@ -190,11 +198,12 @@ def observe(state: Any) -> None:
 
 
 @entry
-def step_robots(state: Any) -> int:
+def step_robots(*fields: Any) -> int:
     """Let all robots whose trial goes on reach for their next goal.
 
     Returns -1; or, and then nothing is done, the number of a robot whose action has NaN.
     """
+    state = VectorState(*fields)
     last = len(state.task) - 1
     for n in range(last + 1):
         for figure in state.actions[n]:
@@ -209,5 +218,5 @@ def step_robots(state: Any) -> int:
             if count == SLOTS or (n == last and count > 0):
                 step_lot(count, state.parameters[kind], state)
                 count = 0
-    observe(state)
+    observe(*state)
     return -1

@@ -21,7 +21,7 @@ from threading import RLock
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
@@ -396,12 +396,12 @@ class Session:
         self.check_solution(solution)
         with self.lock:
             self._affordable(1)
-            with inside(self._of_run):
-                (execution,) = execute_many(self._compiled, [solution])
+            note_trials(0 if self._of_run else 1)
+            (execution,) = execute_many(self._compiled, [solution])
             if isinstance(execution, Exception):
                 raise execution
             self._count(
-                pack_rewards([execution.reward]).tobytes(),
+                pack_rewards([execution.reward]),
                 execution.ticks,
                 execution.evaluations,
                 execution.iterations,
@@ -483,7 +483,7 @@ class Session:
             if better.any():
                 made = int(better.argmax()) + 1
                 accounts = Accounts._make(each[:made] for each in accounts)
-        self._count(accounts.rewards.tobytes(), *np.add.reduce(accounts.counts).tolist())
+        self._count(accounts.rewards, *np.add.reduce(accounts.counts).tolist())
         return accounts
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
@@ -501,16 +501,16 @@ class Session:
 
     def _count(
         self,
-        rewards: bytes,
+        rewards: array[int] | NDArray[np.int64],
         ticks: int,
         evaluations: int,
         iterations: int,
         corrections: int,
         failed: int,
     ) -> None:
-        """Count trials by their rewards, 8 bytes each, and what they took in all."""
+        """Count trials with these rewards, and what they took in all."""
         before, meter = len(self._rewards), self._meter
-        self._rewards.frombytes(rewards)
+        self._rewards.frombytes(rewards.tobytes())
         meter.trials += len(self._rewards) - before
         meter.movement_ticks += ticks
         meter.forward_kinematics += evaluations
@@ -518,6 +518,11 @@ class Session:
         meter.jacobians += iterations
         meter.corrections += corrections
         meter.failed_trials += failed
+
+    @property
+    def trials_made(self) -> int:
+        """Number of trials made so far."""
+        return self._meter.trials
 
     @property
     def trials_left(self) -> int | None:

@@ -6,6 +6,7 @@ method of the benchmark that consists of such a function and of what minimises i
 
 from __future__ import annotations
 
+import math
 import os
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from coartic.internal.limits import MOST_TRIALS, WIDTHS, brief_value, check_limi
 from coartic.internal.text import counted
 from coartic.learner.learning import TRIALS
 from coartic.method import (
+    MOST_COUNT,
     BudgetError,
     Information,
     Method,
@@ -117,7 +119,7 @@ class Objective:
     __slots__ = (
         *("joints", "configurations", "dim", "bounds", "evaluations", "best_cost", "best_hands"),
         *("_asked", "_best_targets", "_best_x", "_better", "_codes", "_end", "_entries", "_hands"),
-        *("_no_targets", "_process", "_session", "_task"),
+        *("_process", "_session", "_targets", "_task"),
     )  # no others are set by mistake, such as a budget
 
     def __init__(
@@ -132,7 +134,8 @@ class Objective:
         check_limits("half_width", half_width, *WIDTHS)
         self._session, self._task, self._process = session, task, os.getpid()
         self._asked: dict[str, Any] = {"hands": hands, "half_width": half_width, "trials": trials}
-        self._end = None if trials is None else session.meter.trials + trials
+        limits = [limit for limit in (trials, session.trials_left) if limit is not None]
+        self._end = session.trials_made + min(limits, default=MOST_COUNT)
         sequences = sequences_of(session) if hands is None else [hands]
         sequences = sequences[: self._trials_left(len(sequences))]
         shape = (len(sequences), session.goals_count, session.dof)
@@ -150,7 +153,7 @@ class Objective:
         self.configurations: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
         self._codes = session.hand_codes(self.hands, 1)
-        self._no_targets = np.full((1, *self.joints.shape), np.nan)
+        self._targets = np.full((1, *self.joints.shape), np.nan)
         self._entries = np.flatnonzero(self.joints)
         self.dim = len(self._entries)
         """Number of parameters."""
@@ -329,13 +332,13 @@ class Objective:
             raise ValueError(
                 f"x has shape {point.shape}; needed is ({self.dim},) or ({self.dim}, N)"
             )
-        if hands is not None or not point @ point <= LARGEST_ENTRY:  # NaN, or far: to be looked at
+        # NaN, or far: to be looked at.
+        if hands is not None or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
             return float(self.many(point[None], hands)[0])
         with self._session.lock:
             self._trials_left(1)
-            targets = self._no_targets.copy()
-            targets.put(self._entries, point)
-            made = self._session.make_trials(self._codes, targets)
+            self._targets.put(self._entries, point)
+            made = self._session.make_trials(self._codes, self._targets)
             cost = float(min(-made.rewards.item(), FAILED))
             self.evaluations += 1
             if cost < self.best_cost:
@@ -410,7 +413,7 @@ class Objective:
 
     def _trials_of(self, points: Array, codes: Hands | None) -> tuple[Hands, Configs]:
         """Hands ``(N, G)``, and targets ``(N, G, dof)``, NaN for joints that have none."""
-        targets = np.repeat(self._no_targets, len(points), axis=0)
+        targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
         codes = np.repeat(self._codes, len(points), axis=0) if codes is None else codes
         return codes, targets
@@ -432,15 +435,10 @@ class Objective:
             raise ValueError("points have infinite entries; needed are finite ones")
 
     def _trials_left(self, wanted: int) -> int:
-        """Return how many of ``count`` trials are left."""
+        """Return how many of the trials wanted are left. Raises BudgetError if none is."""
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
-        left = self._session.trials_left
-        if self._end is not None:
-            own = self._end - self._session.meter.trials
-            left = own if left is None else min(own, left)
-        if left is None:
-            return wanted
+        left = self._end - self._session.trials_made
         if left <= 0 < wanted:
             raise BudgetError("all trials of the budget are made")
         return min(wanted, left)

@@ -99,7 +99,7 @@ def length(at):
     return at[0]["x"][-1, 0]
 
 def reach_of(links):
-    at = batch_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).slots.at
+    at = batch_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).at
     at["length"][:] = 1.0
     return length(at)
 """

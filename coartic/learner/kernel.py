@@ -234,8 +234,8 @@ def nearest_posture(informed: Any, n: int, robot: Any, learner: Any, workspace: 
         for hand in learner.hands:
             run.hand = hand
             fill_row(run.target, run.q)
-            load(batch.slots.at[0], 0, n, run, arm_of(robot, hand))
-            correct_slots(batch.slots, 1, robot, batch.runs)
+            load(batch.at[0], 0, n, run, arm_of(robot, hand))
+            correct_slots(batch, 1, robot)
             workspace.counts[n, ITERATIONS] += run.iterations
             square = 0.0
             for j in range(len(run.q)):

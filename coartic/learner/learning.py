@@ -228,8 +228,10 @@ def learn_together(
     learn_kernel(compiled.parameters, learner, tables, results, rngs, workspace)
     wall = time.perf_counter() - clock
 
+    given = [[[Movement(1, "right", "learned")]] * len(task.goals)] * runs
+
     def movements(accounts: NDArray[np.void]) -> list[tuple[Movement, ...]]:
-        each = movements_in(accounts, dof, [[["learned"]] * len(task.goals)] * runs)
+        each = movements_in(accounts, dof, given)
         completed = accounts["hit"][:, -1]
         return [tuple(some) if whole else () for some, whole in zip(each, completed, strict=True)]
 

@@ -96,24 +96,18 @@ def arm_of(robot: Any, hand: int) -> Any:
 # ---- Runs and slots ----
 
 
-class Slots(NamedTuple):
-    """Slots and the arms in them."""
-
-    at: Any
-    """The rows, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
-    corrected: Any
-    """The rows of an arm that is corrected: the same memory, shape ``(rows, SLOTS)``. Only to be
-    copied: some are integers."""
-    moved: Any
-    """The rows of an arm that moves."""
-
-
 class Batch(NamedTuple):
     """Runs side by side, and the slots in which their arms are moved and corrected."""
 
     runs: Any
     """A record each, shape ``(N,)``."""
-    slots: Slots
+    at: Any
+    """The rows of the slots, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
+    corrected: Any
+    """The rows of an arm that is corrected: the same memory, shape ``(rows, SLOTS)``. Only to be
+    copied: some are integers."""
+    moved: Any
+    """The rows of an arm that moves."""
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
@@ -140,7 +134,7 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     record, corrected, moved = layout(links_for(robot))
     at = np.zeros(1, record)
     rows = at.view(np.float64).reshape(-1, SLOTS)
-    return Batch(np.zeros(count, record_type(fields)), Slots(at, rows[corrected], rows[moved]))
+    return Batch(np.zeros(count, record_type(fields)), at, rows[corrected], rows[moved])
 
 
 @cache

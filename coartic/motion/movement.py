@@ -216,13 +216,13 @@ def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -
 
 
 @shared
-def move_slots(slots: Any, count: int, stop_on_arrival: bool, robot: Any, runs: Any) -> None:
+def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> None:
     """Move the first ``count`` slots until each has ended.
 
     Each run's ``q``, from which it started to its ``target``, becomes the configuration in
     which it stopped; ``hit`` and ``ticks`` of its record are set.
     """
-    at, evaluations, step = slots.at[0], 0, robot.model.step
+    at, evaluations, step = batch.at[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
     squares = largest_square(rims[0]), largest_square(rims[1])
     near = set_off(at, count, step)
@@ -243,7 +243,7 @@ def move_slots(slots: Any, count: int, stop_on_arrival: bool, robot: Any, runs: 
         for slot in range(count - 1, -1, -1):
             if at.status[slot] == GOING:
                 continue
-            run = runs[at.run[slot]]
+            run = batch.runs[at.run[slot]]
             q, target = run.q, run.target
             at_end = at.step[slot] == at.last[slot]
             fraction = 0.0 if at_end else at.step[slot] * step / at.distance[slot]
@@ -254,7 +254,7 @@ def move_slots(slots: Any, count: int, stop_on_arrival: bool, robot: Any, runs: 
             run.ticks = int(at.step[slot]) + 1
             run.evaluations += evaluations
             count -= 1
-            compact(slots.moved, slot, count)
+            compact(batch.moved, slot, count)
             ended -= 1
             if ended == 0:
                 break
@@ -264,8 +264,8 @@ def move_slots(slots: Any, count: int, stop_on_arrival: bool, robot: Any, runs: 
 def move_kernel(stop_on_arrival: bool, robot: Any, batch: Any) -> None:
     """Move the only run."""
     run = batch.runs[0]
-    start(batch.slots.at[0], 0, 0, run, arm_of(robot[0], run.hand))
-    move_slots(batch.slots, 1, stop_on_arrival, robot[0], batch.runs)
+    start(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
+    move_slots(batch, 1, stop_on_arrival, robot[0])
 
 
 def move(
@@ -378,7 +378,7 @@ def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int,
 
 
 @inlined
-def descend_to_goals(slots: Any, count: int, robot: Any, runs: Any, pull: Any) -> None:
+def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
     """Let **A** descend in the first ``count`` slots until each has ended.
 
     The ``target`` of each run becomes what its slot ends with; ``converged`` and ``iterations`` of
@@ -386,7 +386,7 @@ def descend_to_goals(slots: Any, count: int, robot: Any, runs: Any, pull: Any) -
     runs and fills in the rows ``pull``: what an iteration adds to the base and to the joints of the
     arm at its iterate ``q``, zero for what is locked.
     """
-    at, iteration = slots.at[0], 0
+    at, iteration = batch.at[0], 0
     square = largest_square(robot.model.correction_tolerance)
     near = are_near(at, count)
     while count > 0:
@@ -394,18 +394,18 @@ def descend_to_goals(slots: Any, count: int, robot: Any, runs: Any, pull: Any) -
         find_statuses(at, count, square)
         ended = count
         if iteration < robot.model.max_iterations:
-            ended, near = descend(at, count, robot, runs, pull)
+            ended, near = descend(at, count, robot, batch.runs, pull)
         if ended > 0:
             for slot in range(count - 1, -1, -1):
                 if at.status[slot] == GOING and iteration < robot.model.max_iterations:
                     continue
-                run = runs[at.run[slot]]
+                run = batch.runs[at.run[slot]]
                 store(at, slot, run.target)
                 run.converged = at.status[slot] == _AT_GOAL
                 run.iterations = iteration + (at.status[slot] == _STUCK)
                 run.evaluations += run.iterations + 1
                 count -= 1
-                compact(slots.corrected, slot, count)
+                compact(batch.corrected, slot, count)
                 ended -= 1
                 if ended == 0:
                     break
@@ -461,23 +461,23 @@ def pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
 
 
 @shared
-def pull_slots(slots: Any, count: int, robot: Any, runs: Any) -> None:
+def pull_slots(batch: Any, count: int, robot: Any) -> None:
     """**A** with the pull to the preferred posture in the first ``count`` slots."""
-    descend_to_goals(slots, count, robot, runs, pull_to_preferred)
+    descend_to_goals(batch, count, robot, pull_to_preferred)
 
 
 @shared
-def correct_slots(slots: Any, count: int, robot: Any, runs: Any) -> None:
+def correct_slots(batch: Any, count: int, robot: Any) -> None:
     """The paper's **A** in the first ``count`` slots (:func:`descend_to_goals`)."""
-    descend_to_goals(slots, count, robot, runs, None)
+    descend_to_goals(batch, count, robot, None)
 
 
 @entry
 def correct_kernel(robot: Any, batch: Any) -> None:
     """Correct the target of the only run."""
     run = batch.runs[0]
-    load(batch.slots.at[0], 0, 0, run, arm_of(robot[0], run.hand))
-    correct_slots(batch.slots, 1, robot[0], batch.runs)
+    load(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
+    correct_slots(batch, 1, robot[0])
 
 
 def correct(

@@ -12,7 +12,6 @@ import math
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
 from typing import Any, Literal
 
 import numpy as np
@@ -181,6 +180,7 @@ def execute(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
+    note_trials(1)
     (execution,) = execute_many(compiled_task(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
@@ -211,34 +211,25 @@ def execute_many(
     In their order, each as if it were alone; in place of an execution, the error that
     :func:`execute` raises for such a solution.
     """
-    plans: list[Plan | Refused] = []
+    executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
         try:
-            plans.append(movements_by_goal(compiled.task, solution))
+            plan = movements_by_goal(compiled.task, solution)
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
-            plans.append(error)
-    note_trials(len(plans))
-    straight = [plan for plan in plans if isinstance(plan, list) and not has_path(plan)]
-    made = iter(make_straight(compiled, straight))
-    executions: list[Execution | Refused] = []
-    for plan in plans:
-        if not isinstance(plan, list):
-            executions.append(plan)
+            executions.append(error)
         else:
-            outcome = make_one_by_one(compiled, plan) if has_path(plan) else next(made)
-            executions.append(execution_of(compiled, plan, *outcome))
-    return executions
+            executions.append(make_one_by_one(compiled, plan) if has_path(plan) else plan)
+    straight = iter(make_straight(compiled, [x for x in executions if isinstance(x, list)]))
+    return [next(straight) if isinstance(x, list) else x for x in executions]
 
 
 Plan = list[list[Movement]]
 """The movements of a solution, goal by goal."""
-Outcome = tuple[list[Movement], NDArray[np.void]]
-"""The movements made, and the accounts of all goals, shape ``(G,)``."""
 
 
 def has_path(plan: Plan) -> bool:
     """Return whether a movement of a plan follows a path."""
-    return any(movement.kind == "path" for movements in plan for movement in movements)
+    return "path" in [movement.kind for movements in plan for movement in movements]
 
 
 def with_targets(movements: list[Movement]) -> list[Movement | None]:
@@ -247,51 +238,54 @@ def with_targets(movements: list[Movement]) -> list[Movement | None]:
 
     None comes first where no movement is made at once: the hand may be in the goal already.
     """
-    given = takewhile(lambda movement: movement.target is not None, movements)
-    return [None, *given] if movements[0].kind == "corrective" else [*given]
+    given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
+    for movement in movements:
+        if movement.target is None:
+            break
+        given.append(movement)
+    return given
 
 
-def make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Outcome]:
-    """Make the movements of plans without paths side by side."""
+def make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
+    """Execute plans without paths side by side."""
     if not plans:
         return []
     given = [[with_targets(movements) for movements in plan] for plan in plans]
     most = max([len(of_goal) for of_plan in given for of_goal in of_plan])
-    hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
-    targets = np.empty((*hands.shape, most, compiled.starts.shape[1]))
-    stops = np.empty(targets.shape[:3], dtype=np.bool_)
-    targets[:], stops[:] = np.nan, True
-    for n, of_plan in enumerate(given):
-        for g, of_goal in enumerate(of_plan):
-            for m, movement in enumerate(of_goal):
-                if movement is not None:
-                    targets[n, g, m] = movement.target
-                    stops[n, g, m] = movement.kind != "corrective"
-    accounts = make_trials(compiled, hands, targets, stops).goals
-    kinds = [[[m.kind if m else None for m in of_goal] for of_goal in each] for each in given]
-    return [*zip(movements_in(accounts, compiled.task.robot.dof, kinds), accounts, strict=True)]
+    rows = [m for each in given for some in each for m in some + [None] * (most - len(some))]
+    hands = [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
+    stay, shape = [math.nan] * compiled.starts.shape[1], (len(plans), -1, most)
+    accounts = make_trials(
+        compiled,
+        np.array(hands).reshape(shape[:2]),
+        np.array([stay if m is None else m.target for m in rows]).reshape(*shape, len(stay)),
+        np.array([m is None or m.kind != "corrective" for m in rows]).reshape(shape),
+    ).goals
+    made = movements_in(accounts, compiled.task.robot.dof, given)
+    return [execution_of(compiled, *each) for each in zip(plans, made, accounts, strict=True)]
 
 
 def movements_in(
-    accounts: NDArray[np.void], dof: int, kinds: Iterable[Iterable[Sequence[Kind | None]]]
+    accounts: NDArray[np.void], dof: int, given: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
     """Return the movements of N trials from the accounts of their goals, up to the first goal
     missed.
 
-    ``kinds`` of the movements to given targets, by trial and goal; None for those that were not
-    made.
+    ``given`` has the movements to given targets, by trial and goal, as the kernel takes them: of
+    those made, their kinds.
     """
     names = ("hand", "hit", "ticks", "corrections", "moved")
     columns = [accounts[name].tolist() for name in names]
     targets, trials = accounts["target"][..., :dof], []
-    for n, of_trial in enumerate(kinds):
+    for n, of_trial in enumerate(given):
         movements: list[Movement] = []
         of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
         for g, (of_goal, side, hit, total, corrections, moved) in enumerate(of_goals):
             goal, hand, before = g + 1, HANDS[side], len(movements)
-            for m, kind in enumerate(of_goal):
-                if kind is not None and moved[m]:
-                    movements.append(Movement(goal, hand, kind, targets[n, g, m], moved[m]))
+            for m, movement in enumerate(of_goal):
+                if movement is not None and moved[m]:
+                    target = targets[n, g, m]
+                    movements.append(Movement(goal, hand, movement.kind, target, moved[m]))
             if corrections:
                 ticks = total - sum(moved)
                 corrected = accounts["corrected"][n, g, :dof]
@@ -304,8 +298,8 @@ def movements_in(
     return trials
 
 
-def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Outcome:
-    """Make the movements of a plan that has paths, one after the other."""
+def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
+    """Execute a plan that has paths, one movement after the other."""
     task, model, q = compiled.task, compiled.model, compiled.starts[0]
     made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
@@ -337,7 +331,7 @@ def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Outcome:
         account["iterations"], account["evaluations"] = iterations, evaluations
         if not hit:
             break
-    return made, goals
+    return execution_of(compiled, plan, made, goals)
 
 
 def execution_of(
@@ -435,12 +429,13 @@ def check_point(task: Task, point: Any) -> Array:
     """The point, with its base held (:func:`hold_base`). Raises ValueError for what is no
     configuration of the robot, and where it moves a locked base coordinate."""
     usual = isinstance(point, np.ndarray) and point.dtype == np.float64
-    # A sum of squares is quick to compute, and not below a limit where an entry is NaN.
-    if not usual or point.shape != task.q0.shape or not point @ point <= LARGEST_ENTRY:
+    # A length is quick to compute, and not below a limit where an entry is NaN.
+    if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
         point = configuration(task.robot, point)
     held: Array = point
-    if task.locked_base and any(held[k] != task.q0[k] for k in map("xy".index, task.locked_base)):
-        held = hold_base(task, held.copy())
+    for k in map("xy".index, task.locked_base):
+        if held[k] != task.q0[k]:
+            return hold_base(task, held.copy())
     return held
 
 

@@ -180,19 +180,19 @@ def count_goal(goal: Any, counts: Any) -> None:
 def move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
     """Move those of the first ``count`` runs that are acting to their targets, in place; with
     ``stops`` a movement ends on arrival, too."""
-    at, slot = batch.slots.at[0], 0
+    at, slot = batch.at[0], 0
     for i in range(count):
         if batch.runs[i].acting:
             start(at, slot, i, batch.runs[i], arm_of(robot, batch.runs[i].hand))
             slot += 1
     if slot > 0:
-        move_slots(batch.slots, slot, stops, robot, batch.runs)
+        move_slots(batch, slot, stops, robot)
 
 
 @inlined
 def find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
     """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
-    at, slot = batch.slots.at[0], 0
+    at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
         run.acting, run.converged = run.corrects and run.going and not run.hit, False
@@ -201,7 +201,7 @@ def find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
             fill_row(run.target, run.q)
             load(at, slot, i, run, arm_of(robot, run.hand))
             slot += 1
-    descend(batch.slots, slot, robot, batch.runs)
+    descend(batch, slot, robot)
 
 
 @shared
@@ -315,8 +315,13 @@ def reach_lot(
 
 
 @entry
-def reach_kernel(arms: Any, robot: Any, goals: Any, counts: Any, rewards: Any, batch: Any) -> None:
-    """Let every arm reach for its goals, in lots."""
+def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any) -> None:
+    """Let every arm reach for its goals, in lots.
+
+    ``others`` are the entries of :class:`Requests` and then those of a batch: a tuple with names
+    takes Numba half a microsecond.
+    """
+    arms, batch = Requests(*others[:5]), Batch(*others[5:])
     count, room = len(arms.targets), len(batch.runs)
     for first in range(0, count, room):
         reach_lot(first, min(room, count - first), arms, robot[0], goals, counts, batch)
@@ -357,7 +362,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Account
             batch = idle.pop()  # no other thread gets it
         except IndexError:
             batch = batch_for(robot)
-        reach_kernel(some, parameters, *results, batch)
+        reach_kernel(parameters, *results, *some, *batch)
         idle.append(batch)
 
     if count >= 2 * SHARE:

@@ -85,7 +85,7 @@ computes, and so a lower limit for the kernel.
 def kinematics(count: int, repeats: int, batch: Any) -> None:
     """Compute the forward kinematics of the first slots again and again."""
     for _ in range(repeats):
-        place(batch.slots.at[0], count, True)
+        place(batch.at[0], count, True)
 
 
 def write_page(columns: list[dict[str, float]], tasks: tuple[str, ...]) -> None:
@@ -139,7 +139,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
         some = codes[: len(targets)]
         arms = Requests(compiled.starts, some, targets[:, :, None], ALL_STOP, compiled.goals)
         accounts = empty_accounts(task.robot, len(targets), len(task.goals))
-        return arms, compiled.parameters, *accounts, batch_for(task.robot)
+        return compiled.parameters, *accounts, *arms, *batch_for(task.robot)
 
     none, together, *alone = map(arguments, (targets[:0], targets, *targets[:100, None]))
     plain = plain_loop.arguments(task, hands)
@@ -163,7 +163,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
         "Session.trial, one by one": (100, lambda: [session.trial(each) for each in solutions]),
         "execute, one by one": (100, lambda: [execute(task, each) for each in solutions]),
-        "environment, a step": (len(best), episode),
+        "environment, a step": (25 * len(best), lambda: [episode() for _ in range(25)]),
         "kernel, 1000 at once": (1000, lambda: reach_kernel(*together)),
         "kinematics alone": (1000, lambda: kinematics(SLOTS, evaluations // SLOTS, batch)),
         "Session.trials, 10,000 at once": (
