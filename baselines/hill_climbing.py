@@ -38,7 +38,7 @@ class HillClimbing(Method):
         first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
         attempts = Attempts(session, self.parameters)
         most, ahead = len(letters) ** session.goals_count, 1
-        explored = attempts.explored
+        explored, dim = attempts.explored, attempts.explored.sum()
         centres: dict[str, Array] = {}  # their values, (G, dof); NaN for the other joints
         rewards: dict[str, float] = {}  # a trial with more moves the centre
         hopeless: set[str] = set()  # A alone does not complete them, ever
@@ -63,7 +63,7 @@ class HillClimbing(Method):
                     if hands not in centres:
                         break
                     drawn.append(hands)
-                    noise.append(rng.standard_normal(explored.sum()))
+                    noise.append(rng.standard_normal(dim))
                     states.append(rng.bit_generator.state)
                 if drawn:
                     than = np.array([rewards[hands] for hands in drawn])
