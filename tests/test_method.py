@@ -22,7 +22,7 @@ def test_a_budget_that_ends_within_a_batch():
     assert len(session.trials(hands[:4], targets[:4]).ticks) == 4
     rest = session.trials(hands[4:], targets[4:])
     np.testing.assert_array_equal(rest.rewards, unlimited.rewards[4:7])
-    assert (session.meter.trials, session.trials_left, len(session.rewards)) == (7, 0, 7)
+    assert (session.trials_made, session.trials_left, len(session.rewards)) == (7, 0, 7)
     assert len(session.trials([], targets[:0]).ticks) == 0
     with pytest.raises(BudgetError, match="all 7 trials"):
         session.trials(hands, targets)
