@@ -10,6 +10,7 @@ from coartic import corrective_trial, drawing, initial_hands, load_task
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.learning import learning_curves
+from coartic.analysis.sections.ranking import name_in_figure
 from tests.support.made_up import row, runs_of, study_of
 from tests.support.suites import KNOWN, ROOT
 
@@ -25,6 +26,11 @@ def test_robots_and_goals_are_drawn_where_they_are():
     for line, hand in zip(axes.lines, ("left", "right"), strict=True):
         due = task.robot.joint_positions(task.q0 + 1.0, hand)
         np.testing.assert_array_equal(line.get_xydata(), due)
+
+
+def test_a_long_name_keeps_its_end(traced):
+    for letters, name in ((44, 22 * "a" + 22 * "b"), (60, f"{24 * 'a'}…{19 * 'b'}")):
+        assert name_in_figure(traced, letters // 2 * "a" + letters // 2 * "b") == name
 
 
 def test_every_figure_that_runs_allow(traced):

@@ -143,6 +143,14 @@ def test_text_from_files_is_escaped():
     assert r"\textbackslash{}input\textbraceleft{}x\textbraceright{}" in latex
 
 
+@pytest.mark.parametrize("rows", [render.MOST_LINES, render.MOST_LINES + 1])
+def test_a_table_higher_than_a_page_is_continued(rows):
+    names = [f"method {number}" for number in range(rows)]
+    frame = pd.DataFrame({"method": names, "reward": -1.5, "run_ids": ""}, index=names)
+    latex = render.latex_table(TABLES["methods"], frame.rename_axis("row"), "Methods")
+    assert latex.count("Methods, continued") == rows - render.MOST_LINES
+
+
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
 def test_no_text_is_a_formula_of_a_spreadsheet(text, tmp_path):
     """And it is read as it was; numbers stay numbers."""

@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import CoarticError, Movement, corrective_trial, execute, load_task
+from coartic import (
+    CoarticError,
+    Movement,
+    corrective_trial,
+    execute,
+    initial_hands,
+    load_task,
+)
+from coartic.analysis.sections import TABLES
 from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
@@ -172,6 +180,7 @@ def test_failures_are_kept_as_data(tmp_path):
     assert list(study.runs.status) == ["infeasible"] * 4
     assert study.runs.reason.str.len().min() > 20
     assert study.runs.reward.isna().all()
+    assert TABLES["methods"](study)[["runs", "solved"]].to_numpy().tolist() == [[2, 0]] * 2
     assert list(study.runs.failed_trials[:2]) == [5, 5]
     assert [np.isnan(curve).tolist() for _, curve in study.rewards()] == [[True] * 5] * 2
     assert study.solutions.empty
@@ -207,6 +216,9 @@ def test_every_method_makes_the_trials_that_it_is_told(tmp_path, goals, policy, 
     assert runs.status.unique().tolist() == ["ok"]
     assert runs.trials.unique().tolist() == [budget or 20]
     assert list(runs.initial_trials) == [searched] * 3 + [searched if goals > 3 else 0] * 4
+    if goals > 3:  # the best hands are not known
+        alone = corrective_trial(task, initial_hands(task)).reward
+        assert runs.corrective_best.unique().tolist() == [alone]
 
 
 def test_the_runs_of_a_batch_are_scored():

@@ -92,6 +92,7 @@ def test_signatures_of_recorded_trials_are_of_what_was_recorded():
     for each in (signature.each for signature in SIGNATURES.values()):
         assert each(recorded)[run.best_trial] == pytest.approx(each(best)[0], nan_ok=True)
     assert len(solutions_of(task, people.drop(index=[0, 5])).runs) == 18
+    assert len(solutions_of(task, people.sort_values("goal", ascending=False)).runs) == 20
 
 
 def test_lost_trials_and_hits_are_counted(people):
