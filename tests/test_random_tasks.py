@@ -152,6 +152,34 @@ def test_claims_of_generality(monkeypatch):
     assert "fewer than 3 instances of one-armed/v1" in jerk.evidence
 
 
+def test_a_claim_that_one_family_does_not_judge_says_what_the_others_show():
+    """Random search improves on the corrective process on two tasks of a family alone."""
+    study = with_signatures(rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8))
+
+    def by_hands(name, task, label, *, every=False):
+        if label == RANDOM_SEARCH and task.startswith("long/") and int(task[-1]) > 1:
+            return {}
+        return study.signature_by_hands(name, task, label, every=every)
+
+    seen = MadeUp(study, **vars(study) | {"signature_by_hands": by_hands})
+    entry = judge_claims(seen, [CLAIMS["arm-coarticulation-in-general"]]).iloc[0]
+    assert entry.verdict == "undecided"
+    said, _, shown = entry.evidence.partition(". ")
+    assert said.endswith("can be judged of long/v1, more than random search")
+    assert "long/v1: 2.68 [" in shown  # the mean of 2, and 3 + n / 10, over n = 0 to 7
+    assert "aligned/v1, more than random search: 1.3" in shown
+    assert "long/v1, more than random search" not in shown
+
+
+def test_gaps_have_intervals_in_each_family():
+    study = rewarded({**RISING, EC4: lambda n: -540 - n}, families=TWO, count=8)
+    row = dict(random_tasks.list_family_gaps.rows(study))[EC4]
+    for family in TWO:
+        value, low, high = (row[f"in {family}{ending}"] for ending in ("", "_low", "_high"))
+        assert value == pytest.approx((40 + 3.5) / 500)
+        assert 40 / 500 < low < value < high < 47 / 500
+
+
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
     rewards = rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8)

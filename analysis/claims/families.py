@@ -24,7 +24,7 @@ from coartic.analysis.methods import (
 )
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.standings import best_of_instances
-from coartic.analysis.words import estimate, number
+from coartic.analysis.words import estimate, listed, number
 from coartic.estimates import FEWEST, mean
 
 OF_ONE_ARM = ("one-armed/v1",)
@@ -40,9 +40,10 @@ def in_every_family(
 ) -> Finding:
     """Test comparisons in the mean over the instances of each family.
 
-    Differences of rewards are in per cent of the best known reward.
+    Differences of rewards are in per cent of the best known reward. Where a comparison has too few
+    instances in a family, the claim is not judged, and the evidence has the other comparisons.
     """
-    findings, parts = [], []
+    findings, parts, few = [], [], []
     for name, compare in comparisons:
         for family in families:
             values = []
@@ -53,15 +54,22 @@ def in_every_family(
                     unit = 1.0 if first.quantity else 100 / abs(best.reward)
                     values.append(unit * float(first.numbers.mean() - other))
             if len(values) < FEWEST:
-                raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
+                few.append(f"{family}{name}")
+                continue
             findings.append(mean_beyond("", values, margin))
             digits, unit_of = (2, "") if first.quantity else (1, " %")
             seen = estimate(mean(values), digits) + unit_of
             quantity = first.quantity or "gain as a share of the best known reward"
             many = f"{number(median(values), digits)}{unit_of} on the median one"
             parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances, {many}"))
+    if not findings:
+        raise MissingError(f"fewer than {FEWEST} instances of {listed(few)} can be judged")
     finding = all_of(*findings)
-    return replace(finding, evidence=all_positive(finding.tests, parts).evidence)
+    evidence = all_positive(finding.tests, parts).evidence
+    if few:
+        seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
+        return Finding(None, seen)
+    return replace(finding, evidence=evidence)
 
 
 def reported_instances(read: Reader, family: str) -> dict[str, BestKnown]:

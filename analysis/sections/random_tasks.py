@@ -54,7 +54,8 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
     "in *: {} (%) .1"
 )
 def list_family_gaps(study: Study) -> Rows:
-    """List gaps to the best known reward over families with two arms, and in each family."""
+    """List gaps to the best known reward over families with two arms, and in each family, with
+    intervals about other tasks."""
     every, rows = solved(study), list[tuple[str, Row]]()
     families = every.family.unique()
     hands = every.task.map({name: len(task.hands) for name, task in study.tasks.items()})
@@ -70,7 +71,7 @@ def list_family_gaps(study: Study) -> Rows:
                 row |= other_tasks(both).columns(column)
         row |= {f"in {family}": math.nan for family in families}
         for family, part in by_family(of_method, "gap").items():
-            row[f"in {family}"] = other_tasks({family: part}).value
+            row |= other_tasks({family: part}).columns(f"in {family}")
         rows.append((str(method), row | runs_of(*of_method.cell)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
@@ -128,12 +129,20 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
 def on_random_tasks(study: Study) -> str:
     """Say the gaps of the nearest methods to the best known reward, over families with two arms."""
     best = best_of_instances(study)
-    gaps = list_family_gaps(study).dropna(subset="gap").gap
+    gaps = list_family_gaps(study).dropna(subset="gap")
     gaps = gaps[gaps.index.isin(headline_methods(study.methods.loc[gaps.index]))].head(4)
     if not len(gaps):
         return ""
     rows = study.methods.loc[gaps.index].to_dict("records")
-    ends = [f"{called(row)} {percent(gap)}" for row, gap in zip(rows, gaps, strict=True)]
+    families = gaps.filter(regex="^in .*/v[0-9]+$")
+    ranges = [
+        f" ({number(100 * least, 1)} to {percent(most)} by family)" if least < most else ""
+        for least, most in zip(families.min(axis=1), families.max(axis=1), strict=True)
+    ]
+    ends = [
+        f"{called(row)} {percent(gap)}{by}"
+        for row, gap, by in zip(rows, gaps.gap, ranges, strict=True)
+    ]
     first, *others = ends
     learner = [end for row, end in zip(rows[1:], others, strict=True) if is_learner(row)]
     second = learner or others[:1]
