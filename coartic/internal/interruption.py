@@ -6,6 +6,7 @@ temporary folders. Runs that are stored stay stored.
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -45,21 +46,30 @@ def catch_signals() -> None:
 
 
 def _interrupt_again(lost: UnraisableHookArgs) -> None:
-    """Repeat an interruption that Python could not pass on, after 10 ms.
+    """Repeat an interruption that Python could not pass on.
 
     No exception leaves a destructor or the callback of a library, such as the callback by which
-    LLVM loads a kernel. Python hands the exception to this hook and goes on.
+    LLVM loads a kernel. Python hands the exception to this hook and goes on. A signal that comes
+    before the hook has returned is ignored, as its exception would be lost, too; so the signal is
+    sent three times, and ignored once it was raised.
     """
     if lost.exc_type is not KeyboardInterrupt or not _heard:
         sys.__unraisablehook__(lost)
         return
     number, _ = _heard[-1]
+    main = threading.main_thread().ident or 0
+
+    def send() -> None:
+        for pause in (0.01, 0.1, 1.0):
+            time.sleep(pause)
+            if hasattr(signal, "pthread_kill"):
+                signal.pthread_kill(main, number)
+            else:
+                signal.raise_signal(number)
+
+    _heard[-1] = number, math.inf
+    threading.Thread(target=send, daemon=True).start()
     _heard[-1] = number, -_CLEANING_S
-    if hasattr(signal, "pthread_kill"):
-        main = threading.main_thread().ident
-        threading.Timer(0.01, lambda: signal.pthread_kill(main or 0, number)).start()
-    else:
-        threading.Timer(0.01, signal.raise_signal, [number]).start()
 
 
 @contextmanager

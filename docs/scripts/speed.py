@@ -66,8 +66,8 @@ HEAD = """\
 
 How much time a trial takes, by the function that makes it: CPU microseconds of one core, medians,
 all measured in one run by `make speed`. Trials lie around the solution of CMA-ES, so they miss
-few goals. Rows of environments count a step (one goal), not a trial of three or four goals. Times
-depend on the machine, ratios less.
+few goals; trials of environments lie around the postures of the corrective process. Times depend on
+the machine, ratios less.
 
 | way | {heads} |
 | --- | {rules} |
@@ -122,8 +122,8 @@ def show_ways() -> None:
 def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     """Ways to make trials: how many each makes, and a function that makes them.
 
-    They are around what CMA-ES finds, so that few goals are missed; those of the environments are
-    others, around what the corrective process does, and count by their steps.
+    They lie around the solution of CMA-ES, so that few goals are missed; trials of environments lie
+    around the postures of the corrective process.
     """
     session = Session(task, 0, CMAES.information)
     solution = CMAES(CMAES.Parameters(trials=3000)).solve(session).solution
@@ -163,7 +163,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
         "Session.trial, one by one": (100, lambda: [session.trial(each) for each in solutions]),
         "execute, one by one": (100, lambda: [execute(task, each) for each in solutions]),
-        "environment, a step": (25 * len(best), lambda: [episode() for _ in range(25)]),
+        "environment, one by one": (25, lambda: [episode() for _ in range(25)]),
         "kernel, 1000 at once": (1000, lambda: reach_kernel(*together)),
         "kinematics alone": (1000, lambda: kinematics(SLOTS, evaluations // SLOTS, batch)),
         "Session.trials, 10,000 at once": (
@@ -171,7 +171,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
             lambda: session.trials(hands, np.tile(targets, (10, 1, 1))),
         ),
         "objective.many, 1000 at once": (1000, lambda: cost.many(targets[:, cost.joints])),
-        "environments, a step of 1000": (1000 * len(best), lambda: [*map(many.step, actions)]),
+        "environments, 1000 at once": (1000, lambda: [*map(many.step, actions)]),
     }
 
 
