@@ -93,7 +93,7 @@ def write_page(columns: list[dict[str, float]], tasks: tuple[str, ...]) -> None:
     heads = " | ".join(f"{task}, µs a trial | times as fast as the plain loop" for task in tasks)
     text = HEAD.format(heads=heads, rules=" | ".join(["---: | ---:"] * len(tasks)))
     for way in columns[0]:
-        cells = (f"{us[way]:.2g} | {us['plain loop'] / us[way]:.3g}" for us in columns)
+        cells = (f"{us[way]:.3g} | {us['plain loop'] / us[way]:.3g}" for us in columns)
         text += f"| {way} | {' | '.join(cells)} |\n"
     PAGE.write_text(text + FOOT, encoding="utf-8")
 
