@@ -24,35 +24,28 @@ from coartic.analysis.words import listed, number, percent
 def solved(study: Study) -> pd.DataFrame:
     """Return a row for each compared method on each instance with a solved run, by family.
 
-    Columns ``method``, ``family``, ``task``, ``cell``, and arrays over the solved runs, shape
-    ``(n,)``: ``gap`` to the best known reward, as a share of it, and ``to_bound``, the gap to the
-    proven bound; None without a bound.
+    Columns ``method``, ``family``, ``task``, ``cell``, and ``gap``: the gaps of the solved runs to
+    the best known reward, as shares of it, shape ``(n,)``.
     """
     instances = best_of_instances(study)
     families = dict.fromkeys(str(study.tasks[name].family) for name in instances)
     rows = []
     for family, (method, cells) in itertools.product(families, compared(study).items()):
-        for name, best in instances.items():
+        for name in instances:
             cell = cells.get(name)
             if study.tasks[name].family == family and cell is not None and len(cell.good):
-                bound = None if best.bound is None else gap_share(cell.rewards, best.bound)
-                rows.append((method, family, name, cell, cell.gaps, bound))
-    return pd.DataFrame(rows, columns=["method", "family", "task", "cell", "gap", "to_bound"])
+                rows.append((method, family, name, cell, cell.gaps))
+    return pd.DataFrame(rows, columns=["method", "family", "task", "cell", "gap"])
 
 
-def by_family(rows: pd.DataFrame, column: str) -> Scores:
-    """Return the values of a column by family and instance, without missing values."""
-    rows = rows[rows[column].notna()]
+def by_family(rows: pd.DataFrame) -> Scores:
+    """Return the gaps of instances by family."""
     return {
-        str(family): [*of_family[column]]
-        for family, of_family in rows.groupby("family", sort=False)
+        str(family): [*of_family.gap] for family, of_family in rows.groupby("family", sort=False)
     }
 
 
-@table(
-    "method; instances; gap[]: gap (%) .1; to_bound[]: gap to the proven bound (%) .1; "
-    "in *: {} (%) .1"
-)
+@table("method; instances; gap[]: gap (%) .1; in *: {} (%) .1")
 def list_family_gaps(study: Study) -> Rows:
     """List gaps to the best known reward over families with two arms, and in each family, with
     intervals about other tasks."""
@@ -64,13 +57,12 @@ def list_family_gaps(study: Study) -> Rows:
         row: Row = {"method": method, "instances": len(of_method), "gap": math.nan}
         if (of_two_arms := of_method.family.isin(two_armed)).any():
             row["instances"] = int(of_two_arms.sum())  # the gap is a mean over these
-        for column in ("gap", "to_bound"):
-            scores = by_family(of_method, column)
-            if two_armed and two_armed <= scores.keys():
-                both = {family: part for family, part in scores.items() if family in two_armed}
-                row |= other_tasks(both).columns(column)
+        scores = by_family(of_method)
+        if two_armed and two_armed <= scores.keys():
+            both = {family: part for family, part in scores.items() if family in two_armed}
+            row |= other_tasks(both).columns("gap")
         row |= {f"in {family}": math.nan for family in families}
-        for family, part in by_family(of_method, "gap").items():
+        for family, part in scores.items():
             row |= other_tasks({family: part}).columns(f"in {family}")
         rows.append((str(method), row | runs_of(*of_method.cell)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
@@ -93,7 +85,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
     parts = []
     for _, part in rows.groupby(["method", "family"], sort=False):
-        mean = other_tasks(by_family(part, "gap")).columns("mean")
+        mean = other_tasks(by_family(part)).columns("mean")
         parts.append(part.assign(gap=part.gap.map(np.mean), **mean, instances=len(part))[columns])
     data = pd.concat(parts, ignore_index=True)
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
