@@ -69,13 +69,12 @@ findings: $(READY)
 	done
 	$(BIN)/python docs/make_findings.py --from $(OUT)
 
-# Every study, or those of make studies STUDIES="horizon dose": its suite, with its own families and
-# methods, then its tables, figure and page. All of them take over two hours.
+# Every study, or those of make studies STUDIES="horizon dose": its suite, with its own families,
+# then its tables, figure and page. All of them take over two hours.
 studies: $(READY)
 	@for study in $(STUDIES); do \
 	  files=""; \
 	  for file in studies/$$study/*.v*.toml; do [ -e $$file ] && files="$$files --family-file $$file"; done; \
-	  for file in studies/$$study/policy.py; do [ -e $$file ] && files="$$files --method-file $$file"; done; \
 	  if [ -e studies/$$study/protocols.py ]; then $(BIN)/python studies/$$study/protocols.py; else \
 	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; fi && \
 	  $(BIN)/python studies/$$study/study.py $(OUT)/$$study || exit; \

@@ -26,12 +26,6 @@ SMALL = ROOT / "tests" / "studies"
 INSTANCES = {
     "fourteen-one/v1/i017": "bad507514407bc5c",
     "fourteen-two/v1/i017": "b39b17fca94fc804",
-    "eight/v1/i017": "7dd1266a67c6c0ae",
-    "eight/v1/d003": "fe32db1ce229687c",
-    "eight/v1/2027-041": "301760ae38388046",
-    "neighbours/v1/i017": "0e79b9c21b5c13a5",
-    "neighbours/v1/d003": "743e924318e9ee41",
-    "neighbours/v1/2027-041": "18c65bdef8d0a624",
     "seven-one/v1/i017": "a5e8d899533de3da",
     "seven-two/v1/i017": "66b839fbe0b33d6d",
 }
