@@ -1,4 +1,4 @@
-"""Measure the dial from trial and error to planning on tasks that nobody tuned on.
+"""Measure the dial from trial and error to planning on tasks on which it was not tuned.
 
     python studies/dial/protocols.py results/dial
     python studies/dial/study.py results/dial
@@ -14,19 +14,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from settings import AFTER, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TIMES, TRIALS
+from shifts import judge_shifts, measure_shifts, tabulate_shifts
 
 from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
 
-FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
-PAPER, INFORMED, PLANNER = "0 0.05", "0.3 0.05 next-goal", "1 0.01 next-goal"
-DRIFTS = ("0", "0.03", "0.1", "0.3", "1")
-AFTER = (30, 100, 1_000, 10_000)
-TRIALS = AFTER[-1]
 POINTS = 5.0
 """Points of the gain that count as a difference, set before the runs."""
-SHIFT_AFTER = (1, 2, 3, 10, 30, 100, 300, 1_000, 10_000)
-TIMES = 5.0
-"""Times fewer trials that count as much fewer, set before the runs."""
 
 
 def measure_runs(raw):
@@ -157,84 +151,20 @@ def judge_claims(runs):
     })  # fmt: skip
 
 
-def measure_shifts(raw):
-    """Measure shares of the shift after the change, a row for each task and setting.
-
-    ``share_N`` of the final shift that is there after N trials: sums over goals of products of
-    shifts, over sums of squares. ``log_half``: trials to half of it, interpolated, as a power of
-    ten. ``unchanged``: the share that as much practice without a change brings.
-    """
-    sums = raw.groupby(["setting", "task"], sort=False).sum(numeric_only=True).reset_index()
-    sums["family"] = sums.task.str.partition("/")[0]
-    shares = (sums[[f"dot_{n}" for n in SHIFT_AFTER]].div(sums.square, axis=0)).to_numpy()
-    powers, half = np.log10(SHIFT_AFTER), np.full(len(sums), np.nan)
-    for row, curve in enumerate(shares):
-        if curve[-1] >= 0.5:  # else there is no shift; the first trial repeats what was practised
-            k = int((curve >= 0.5).argmax())
-            half[row] = np.interp(0.5, curve[k - 1 : k + 1], powers[k - 1 : k + 1])
-    named = {f"share_{n}": shares[:, k] for k, n in enumerate(SHIFT_AFTER)}
-    return sums.assign(**named, log_half=half, unchanged=sums.same / sums.square)
-
-
-def tabulate_shifts(shifts):
-    """Tabulate shares of the shift by family and setting, and quartiles of the trials to half."""
-    numbers = [*(f"share_{n}" for n in SHIFT_AFTER), "unchanged"]
-    table = means(shifts, ["family", "setting"], numbers).rename(columns={"rows": "tasks"})
-    trials = (10**shifts.log_half).groupby([shifts.family, shifts.setting], sort=False)
-    for share in (0.25, 0.5, 0.75):
-        column = trials.quantile(share).rename(f"half_{share:g}")
-        table = table.merge(column, left_on=["family", "setting"], right_index=True)
-    table.index = (table.family + " " + table.setting).rename("row")
-    return table
-
-
-def judge_shifts(shifts):
-    """The claims on an announced change, registered before any test instance was run."""
-    paper, planner = "0 0.05", "1 0.01 next-goal"
-
-    def of(column, setting, family):
-        rows = shifts[(shifts.setting == setting) & (shifts.family == family)]
-        return rows.set_index("task")[column]
-
-    how = "one-tailed bootstrap tests over 30 random tasks, one-armed and two-armed: "
-    families = FAMILIES[:2]
-    return judge({
-        "drift-makes-the-shift-quick": (
-            "With κ = 1 and little noise half of the shift takes less than a fifth of the paper's"
-            " learner's trials.",
-            f"{how}the logarithm of the trials to half of the shift is lower by more than that of "
-            f"{TIMES:g}"
-            "; refuted where it takes more",
-            all_of(*(mean_beyond(f"{family}: 10^{{}} times fewer trials",
-                                 of("log_half", paper, family) - of("log_half", planner, family),
-                                 float(np.log10(TIMES))) for family in families)),
-        ),
-        "drift-shifts-within-ten-trials": (
-            "After ten trials with κ = 1 and little noise, between a tenth and nine tenths of the"
-            " shift is there: more than in the paper's learner, less than in a planner.",
-            f"{how}the share after ten trials above 0.1 and below 0.9"
-            "; refuted where it is not between",
-            all_of(*(mean_beyond(f"{family}: the share is {{}}",
-                                 of("share_10", planner, family), bound, side)
-                     for family in families for bound, side in ((0.1, "greater"), (0.9, "less")))),
-        ),
-        "shift-is-of-the-change": (
-            "With κ = 1 and little noise less than half of the shift is there after as much "
-            "practice without a change.",
-            f"{how}the shift without a change, projected, below 0.5"
-            "; refuted where it is more",
-            all_of(*(mean_beyond(f"{family}: the share is {{}}",
-                                 of("unchanged", planner, family), 0.5, "less")
-                     for family in families)),
-        ),
-    })  # fmt: skip
+OTHERS = {
+    PLANNER: "1, σ 0.01", "CMA-ES": "CMA-ES", "posture planning": "posture plan",
+    "shortest path": "shortest path",
+}  # fmt: skip
+"""Settings right of the dial in the figure, with their names."""
+PLANNERS = tuple(OTHERS)[2:]
 
 
 @figures.styled
 def draw(table):
     """Trials to a quarter and to half of the gain, and the gain after 100 trials, by drift."""
     figure, panels = figures.panels((1, 3), (figures.TWO, 2.6))
-    places = {setting: place for place, setting in enumerate([*along(0.05), *OTHERS])}
+    names = {setting: setting.split()[0] for setting in DIAL} | OTHERS
+    places = {setting: place for place, setting in enumerate(names)}
     rows = table[table.group.isin(FAMILIES) & table.setting.isin(places)]
     rows = rows.assign(x=rows.setting.map(places)).sort_values("x")
     for number, family in enumerate(FAMILIES):
@@ -249,36 +179,19 @@ def draw(table):
                           linestyle="-" if dial else "", **look)  # fmt: skip
             line = look if dial else look | {"linestyle": "", "label": None}
             figures.means(panels[2], part, x="x", y="gain_100", **line)
-    for axes, share in zip(panels, ("quarter", "half"), strict=False):
+    for axes, share in zip(panels, ("a quarter", "half"), strict=False):
         axes.set_yscale("log")
         axes.set_yticks([1, 10, 100, 1_000, 10_000], ["1", "10", "100", "1000", "10 000"])
         axes.minorticks_off()
-        axes.set_ylabel(
-            f"trials to a {share} of the gain"
-            if share == "quarter"
-            else "trials to half of the gain"
-        )
+        axes.set_ylabel(f"trials to {share} of the gain")
         axes.axhline(TRIALS, color=figures.GREY, linewidth=0.6, linestyle=":")
     panels[2].set_ylabel("gain after 100 trials (%)")
     for axes in panels:
-        axes.set_xticks(range(len(places)), [*DRIFTS, *OTHERS.values()], rotation=90)
+        axes.set_xticks(range(len(names)), names.values(), rotation=90)
         axes.set_xlabel("drift κ, and other methods")
     figures.letters(panels)
     figures.legend(figure, panels[2].get_legend_handles_labels()[0], 5)
     return figure
-
-
-OTHERS = {
-    PLANNER: "1, σ 0.01", "CMA-ES": "CMA-ES", "posture planning": "posture plan",
-    "shortest path": "shortest path",
-}  # fmt: skip
-"""Settings right of the dial in the figure, with their names."""
-PLANNERS = tuple(OTHERS)[2:]
-
-
-def along(sigma):
-    """Settings along the dial towards the next goal, with this noise."""
-    return [f"0 {sigma}", *(f"{kappa} {sigma} next-goal" for kappa in DRIFTS[1:])]
 
 
 def measure(folder):

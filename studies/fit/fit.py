@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from evidence import NODES, condition_for, evidence_in, plan_for, tables_before, trials_of
-from hits import read_hits
+from evidence import NODES, evidence_in
+from hits import read_hits, trials_of
+from models import condition_for, plan_for, tables_before
 from scipy import optimize, stats
 
 from coartic import CONDITIONS, CoarticError, load_task

@@ -1,12 +1,15 @@
-"""Read the trials of people from a CSV file with a row for each hit."""
+"""What was recorded: the trials of people, from a CSV file with a row for each hit."""
 
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from coartic import CoarticError
 
+HANDS = ("left", "right")
+"""Hands in the order in which arrays count them."""
 LARGEST_ANGLE = 20.0
 """Angle, rad, beyond which a recorded angle is taken for degrees."""
 
@@ -103,3 +106,25 @@ def read_hits(path, task, *, ticks_per_unit=1.0):
             stacklevel=2,
         )
     return frame
+
+
+class Trials(NamedTuple):
+    """Trials of a subject, from the first to the last number; G goals."""
+
+    hands: np.ndarray
+    """Hands as places in HANDS, shape ``(T, G)``; -1 for a hit that is missing."""
+    postures: np.ndarray
+    """Shape ``(T, G, dof)``; NaN for a hit that is missing."""
+    rewards: np.ndarray
+    """Minus the ticks, shape ``(T,)``; NaN where a hit of the trial is missing."""
+
+
+def trials_of(frame, task):
+    """Return the trials of one subject from rows of :func:`read_hits`."""
+    shape = int(frame.trial.max()), len(task.goals)
+    hands, ticks = np.full(shape, -1), np.full(shape, np.nan)
+    postures = np.full((*shape, task.robot.dof), np.nan)
+    at = frame.trial.to_numpy(int) - 1, frame.goal.to_numpy(int) - 1
+    hands[at], ticks[at] = frame.hand.map(HANDS.index), frame.ticks
+    postures[at] = frame[[*task.robot.joint_names]]
+    return Trials(hands, postures, -ticks.sum(axis=1))

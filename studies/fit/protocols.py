@@ -22,16 +22,17 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a process for each core
 
 import numpy as np
 import pandas as pd
-from evidence import DRIFTS, condition_for, explored_by, plan_for, projection, trials_of
+from evidence import DRIFTS
 from fit import MODELS, fit_subject
+from hits import HANDS, trials_of
+from models import condition_for, explored_by, plan_for, projection
 
 from coartic import initial_hands, load_task
 from coartic.motion.trial import reach_goals
-from coartic.robot import HANDS
 
 
 def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, plan=None):
-    """Return the hits of N simulated people, a frame in the format of :func:`fit.read_hits`.
+    """Return the hits of N simulated people, a frame in the format of :func:`hits.read_hits`.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
     condition : ExplorationCondition, optional
         The condition: its hands and its explored joints.
     plan : tuple of ndarray, optional
-        Hands and postures of the planner; by default those of :func:`evidence.plan_for`.
+        Hands and postures of the planner; by default those of :func:`models.plan_for`.
 
     Returns
     -------
@@ -169,7 +170,7 @@ def cells():
 
 @cache
 def plan_of(name):
-    """Return :func:`evidence.plan_for` of a task by its name."""
+    """Return :func:`models.plan_for` of a task by its name."""
     return plan_for(load_task(name))
 
 

@@ -5,7 +5,7 @@
 
 writes results.csv, effects.csv, figure.svg and the page, README.md; without a folder figure and
 page, of the stored tables. human.toml has the findings, the models and how verdicts are made,
-measures.py what is measured. There are no claims beside the findings.
+models.py the runs of each model, measures.py what is measured. The findings are in place of claims.
 """
 
 import sys
@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from measures import MEASURES, MODELS, tidy
+from measures import MEASURES
+from models import MODELS, tidy
 
-from coartic.analysis import figures, interval, load, write_study
+from coartic.analysis import figures, load, write_study
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
@@ -123,14 +124,9 @@ def verdict_of(tests):
 
 
 def tabulate(effects):
-    """Verdicts of models on findings, with the effect of each measure; a star: it is built so."""
-    pairs = ["finding", "model"]
-    there = effects[effects.tasks > 0].drop_duplicates([*pairs, "measure"])
-    sizes = [interval(row, "value", digits=2) for row in there.to_dict("records")]
-    sizes = there.assign(sizes=sizes).groupby(pairs).sizes.agg("; ".join)
-    cells = effects.drop_duplicates(pairs).set_index(pairs)
+    """Verdicts of models on findings; a star: it follows from how the model is built."""
+    cells = effects.drop_duplicates(["finding", "model"]).set_index(["finding", "model"])
     words = cells.verdict + cells.built_in.map({True: " *", False: ""})
-    words += (": " + sizes).reindex(words.index, fill_value="")
     table = pd.DataFrame({name: words[:, name] for name in MODELS}).add_prefix("of ")
     table.insert(0, "finding", [finding["statement"] for finding in FINDINGS.values()])
     return table.rename_axis("row")
@@ -141,8 +137,7 @@ def draw(table):
     """A grid with a mark for each verdict; in a circle where it follows from how it is built."""
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 4.6))
     models = table.drop(columns="finding").rename(columns=lambda name: name.removeprefix("of "))
-    for (y, x), words in np.ndenumerate(models):
-        verdict = words.partition(":")[0]
+    for (y, x), verdict in np.ndenumerate(models):
         mark, color = MARKS[verdict.removesuffix(" *")]
         axes.text(x, y, mark, color=color, ha="center", va="center", fontsize=10)
         if verdict.endswith("*"):

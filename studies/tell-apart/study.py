@@ -1,23 +1,28 @@
 """Measure which experiment would distinguish trial and error from planning.
 
-    python studies/tell-apart/protocols.py      # five minutes of one core
-    python studies/tell-apart/study.py          # results, power, claims, figure.svg, README.md
+    python studies/tell-apart/protocols.py results/tell-apart
+    python studies/tell-apart/study.py results/tell-apart
+
+writes the protocols' rows (changes.csv, starts.csv, steps.csv), results.csv, power.csv, claims.csv,
+figure.svg and the page, README.md; without a folder figure and page, of the stored tables.
 
 All predictions with their rules are in :func:`judge_claims`, committed before the test instances
 were run.
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from protocols import AFTER, NOISE
+from announced import HALF, trials_to_half
+from changes import AFTER
+from people import NOISE
 from scipy import stats
 
 from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
 
-HERE = Path(__file__).parent
-HALF, EXPERIMENTS = 0.5, 2000
+EXPERIMENTS = 2000
 
 
 def share_by_task(changes):
@@ -28,12 +33,7 @@ def share_by_task(changes):
     shares = changes.groupby(["distance", "model", "task"], sort=False)
     shares = shares.sum(numeric_only=True, min_count=1).reset_index()
     numbers = {f"share_{n}": shares[f"dot_{n}"] / shares.square for n in AFTER}
-    half = np.full(len(shares), np.nan)
-    for row, curve in enumerate(np.array(list(numbers.values())).T):
-        if curve[-1] >= HALF:  # else there is no shift
-            k = int((curve >= HALF).argmax())
-            part = slice(k - 1, k + 1)
-            half[row] = np.interp(HALF, curve[part], np.log10(AFTER[part])) if k else 0.0
+    half = [trials_to_half(curve, AFTER) for curve in np.array(list(numbers.values())).T]
     return shares.assign(
         **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
         drift=shares["same"] / shares.square, from_anew=np.log10(shares.anew / shares.among) / 2,
@@ -228,12 +228,14 @@ def draw(table):
     return figure
 
 
-def measure(changes, starts, steps):
+def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
+    rows = {name: pd.read_csv(Path(folder) / f"{name}.csv")
+            for name in ("changes", "starts", "steps")}  # fmt: skip
     makers = {"results": tabulate, "claims": judge_claims, "power": find_power}
-    return {name: make(changes, starts, steps) for name, make in makers.items()}
+    tables = {name: make(**rows) for name, make in makers.items()}
+    return tables | {name: table.set_index("task") for name, table in rows.items()}
 
 
 if __name__ == "__main__":
-    written = [pd.read_csv(HERE / f"{name}.csv") for name in ("changes", "starts", "steps")]
-    write_study(HERE, measure(*written), draw)
+    write_study(Path(__file__).parent, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)

@@ -60,7 +60,11 @@ def _say(answers, what, arguments):
 
 
 def program(path):
-    """The module of a file beside which it imports others, as where it is run."""
+    """The module of a file that imports others from its folder, as where it is run: modules of the
+    same names from other folders are forgotten."""
+    for other in path.parent.glob("*.py"):
+        if getattr(sys.modules.get(other.stem), "__file__", None) != str(other):
+            sys.modules.pop(other.stem, None)
     sys.path.insert(0, str(path.parent))
     spec = importlib.util.spec_from_file_location(f"{path.parent.name}_{path.stem}", path)
     module = importlib.util.module_from_spec(spec)

@@ -1,4 +1,4 @@
-"""The dial: gains, and verdicts, of runs that nobody ran."""
+"""The dial: gains, and verdicts, of planted runs."""
 
 from pathlib import Path
 
@@ -12,7 +12,9 @@ from tests.support.processes import program
 FOLDER = Path(__file__).parents[3] / "studies" / "dial"
 
 
-STUDY, PROTOCOLS = (program(FOLDER / f"{name}.py") for name in ("study", "protocols"))
+STUDY, PROTOCOLS, SHIFTS = (
+    program(FOLDER / f"{name}.py") for name in ("study", "protocols", "shifts")
+)
 
 
 def planted(gains, quarters=None):
@@ -96,7 +98,7 @@ def planted_shifts(settings):
     rows = []
     for setting, (trials, ten) in settings.items():
         for task in (f"{family}/v1/i{n:03d}" for family in STUDY.FAMILIES[:2] for n in range(12)):
-            shares = {n: 0.0 if n < trials else 0.5 for n in STUDY.SHIFT_AFTER}
+            shares = {n: 0.0 if n < trials else 0.5 for n in SHIFTS.SHIFT_AFTER}
             shares |= {10: ten + int(task[-2:]) / 1000, 10_000: 1.0}
             for square in (1.0, 3.0):  # two goals
                 dots = {f"dot_{n}": square * share for n, share in shares.items()}
@@ -104,7 +106,7 @@ def planted_shifts(settings):
                     {"task": task, "setting": setting, "goal": 0, "same": 0.1, "square": square}
                     | dots
                 )
-    return STUDY.measure_shifts(pd.DataFrame(rows))
+    return SHIFTS.measure_shifts(pd.DataFrame(rows))
 
 
 def test_verdicts_follow_the_shifts():
@@ -112,25 +114,26 @@ def test_verdicts_follow_the_shifts():
     of_paper, of_planner = (shifts[shifts.setting == s].iloc[0] for s in shifts.setting.unique())
     assert (of_paper.log_half, of_paper.unchanged) == (3, 0.05)
     assert of_planner.log_half == pytest.approx(np.log10(30))
-    assert STUDY.judge_shifts(shifts).verdict.eq("supported").all()
+    assert SHIFTS.judge_shifts(shifts).verdict.eq("supported").all()
     slow = planted_shifts({"0 0.05": (300, 0.0), "1 0.01 next-goal": (300, 0.0)})
-    judged = STUDY.judge_shifts(slow).verdict
+    judged = SHIFTS.judge_shifts(slow).verdict
     assert judged["drift-makes-the-shift-quick"] == "not supported"
     assert judged["drift-shifts-within-ten-trials"] == "not supported"
 
 
 def test_other_methods_and_shifts_of_a_task(monkeypatch):
     """Planners make no trial; the first trial after a change repeats what was practised."""
-    for name, value in (("TRIALS", 40), ("AFTER", (5, 40)), ("RUNS", 1),
-                        ("SHIFT_AFTER", (1, 10, 40))):  # fmt: skip
-        monkeypatch.setattr(PROTOCOLS, name, value)
+    monkeypatch.setattr(PROTOCOLS, "TRIALS", 40)
+    monkeypatch.setattr(PROTOCOLS, "AFTER", (5, 40))
+    monkeypatch.setattr(SHIFTS, "TRIALS", 40)
+    monkeypatch.setattr(SHIFTS, "SHIFT_AFTER", (1, 10, 40))
     monkeypatch.setattr(PROTOCOLS, "OTHERS", {"posture planning": (PROTOCOLS.TwoGoals, 1)})
     ((*_, start, best_known, first, last, _, _, _, hands),) = PROTOCOLS.run_others("ascending")
     assert (first, hands) == (last, "RRR")
     assert start < first <= best_known
     task = "one-armed/v1/d000"
-    monkeypatch.setattr(PROTOCOLS, "SHIFT_TASKS", [task])
-    rows = PROTOCOLS.run_shifts(task)
-    assert {row[1] for row in rows} == {*PROTOCOLS.SHIFTED}
+    monkeypatch.setattr(SHIFTS, "SHIFT_TASKS", [task])
+    rows = SHIFTS.run_shifts(task)
+    assert {row[1] for row in rows} == {*SHIFTS.SHIFTED}
     for *_, square, first, _, last in rows:
         assert (first, last) == (0, pytest.approx(square))

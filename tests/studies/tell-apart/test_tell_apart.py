@@ -1,6 +1,5 @@
 """Study tell-apart: its learner is the paper's, and other code finds the same shares."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +15,16 @@ from tests.support.reference import correct, execute
 FOLDER = Path(__file__).parents[3] / "studies" / "tell-apart"
 
 
-study = program(FOLDER / "study.py")
-protocols = sys.modules["protocols"]  # which the study imports
+study, changes, steps = (program(FOLDER / f"{name}.py") for name in ("study", "changes", "steps"))
 
 
-def test_tables_and_figure_of_some_of_the_tasks(monkeypatch):
+def test_tables_and_figure_of_some_of_the_tasks(monkeypatch, tmp_path):
     monkeypatch.setattr(study, "EXPERIMENTS", 200)
-    raw = [pd.read_csv(FOLDER / f"{name}.csv") for name in ("changes", "starts", "steps")]
-    few = raw[0].task.drop_duplicates()[:6]
-    tables = study.measure(*(table[table.task.isin(few)] for table in raw))
+    raw = {name: pd.read_csv(FOLDER / f"{name}.csv") for name in ("changes", "starts", "steps")}
+    few = raw["changes"].task.drop_duplicates()[:6]
+    for name, table in raw.items():
+        table[table.task.isin(few)].to_csv(tmp_path / f"{name}.csv", index=False)
+    tables = study.measure(tmp_path)
     shares = tables["results"].share_1
     assert shares["change 0.5 planner, all goals"] == 1
     assert shares["change 0.5 learner"] == 0
@@ -37,7 +37,7 @@ def test_tables_and_figure_of_some_of_the_tasks(monkeypatch):
 
 
 def test_learner_that_is_logged_is_the_papers():
-    postures, rewards = protocols.series(load_task("one-armed/v1/d000"), "learner", 7)
+    postures, rewards = steps.series(load_task("one-armed/v1/d000"), "learner", 7)
     run = learn("one-armed/v1/d000", "EC1", seed=7, trials=len(rewards))
     assert rewards.tolist() == run.rewards.tolist()
     best = postures[run.best_trial]
@@ -51,13 +51,13 @@ def corrected(task, q, hand, goal):
 @pytest.mark.parametrize("name", ["one-armed/v1/i002", "two-armed/v1/i001"])
 def test_share_at_once_by_other_code(monkeypatch, name):
     """By the step-by-step reference, one movement after the other."""
-    monkeypatch.setattr(protocols, "AFTER", [1, 300])
-    monkeypatch.setattr(protocols, "EVOLVED", 2)
-    monkeypatch.setattr(protocols, "PLANNERS", {})
-    task, practised = load_task(name), learn(name, protocols.condition(load_task(name)), seed=0)
-    cases = [case for case in protocols.moves(task, 0) if case[1] == 0.5]
+    monkeypatch.setattr(changes, "AFTER", [1, 300])
+    monkeypatch.setattr(changes, "EVOLVED", 2)
+    monkeypatch.setattr(changes, "PLANNERS", {})
+    task, practised = load_task(name), learn(name, changes.condition(load_task(name)), seed=0)
+    cases = [case for case in changes.moves(task, 0) if case[1] == 0.5]
     hands = hands_of(practised.hands)
-    rows = [row for row in protocols.change_goals(task, 0) if row["distance"] == 0.5]
+    rows = [row for row in changes.change_goals(task, 0) if row["distance"] == 0.5]
     for n, (g, _, after) in enumerate(cases):
         run = learn(after, practised.condition, seed=1, trials=300, start=practised.solution)
         before, first, end = (

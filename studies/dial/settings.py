@@ -1,0 +1,37 @@
+"""Settings of the learner along the dial, from trial and error to planning, and off it."""
+
+from coartic import CONDITIONS
+
+FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
+DRIFTS, NOISES = (0.03, 0.1, 0.3, 1.0), (0.01, 0.05)
+TRIALS, RUNS, AFTER = 10_000, 3, (30, 100, 1_000, 10_000)
+DIAL = ("0 0.05", *(f"{kappa:g} 0.05 next-goal" for kappa in DRIFTS))
+"""The dial itself: settings with the paper's noise and drift towards the next goal."""
+PAPER, INFORMED, PLANNER = "0 0.05", "0.3 0.05 next-goal", "1 0.01 next-goal"
+"""Settings that claims compare."""
+TIMES = 5.0
+"""Times fewer trials that count as much fewer, set before the runs."""
+SETTINGS = {
+    **{f"0 {sigma}": {"noise_sd": sigma} for sigma in NOISES},
+    **{
+        f"{kappa:g} {sigma} {direction}": {
+            "drift": kappa, "noise_sd": sigma, "direction": direction
+        }
+        for kappa in DRIFTS for sigma in NOISES for direction in ("next-goal", "stay", "start")
+    },
+    "1 0": {"drift": 1.0, "noise_sd": 0.0},
+    "correction": {"pull": 0.05},
+    "hands": {"hand_exploration": "nearest-posture"},
+    "all": {"drift": 0.3, "pull": 0.05, "hand_exploration": "nearest-posture"},
+    "drawn": {"drift": (0.0, *DRIFTS)},
+}  # fmt: skip
+"""Fields that differ from the paper's condition (:func:`base_of`)."""
+FEW = 1_000
+"""Trials of settings that are not among the next."""
+LONG = (*DIAL, PLANNER, "1 0", "1 0.05 start", "hands", "drawn", "all")
+"""Settings with all trials: the dial itself, and what claims ask of the end."""
+
+
+def base_of(task):
+    """Return the paper's condition that explores most of what the robot has: EC1 or EC4."""
+    return CONDITIONS["EC1" if len(task.hands) == 1 else "EC4"]

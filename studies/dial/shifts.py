@@ -1,0 +1,117 @@
+"""An announced change: how fast does the posture shift, along the dial?"""
+
+import runpy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from settings import DIAL, FAMILIES, PAPER, PLANNER, SETTINGS, TIMES, TRIALS, base_of
+
+from coartic import execute, learn, load_task
+from coartic.analysis import all_of, judge, mean_beyond, means
+
+ANNOUNCED = runpy.run_path(str(Path(__file__).parents[1] / "tell-apart" / "announced.py"))
+"""Functions of study tell-apart: which goal moves, and the trials to half of a shift."""
+SHIFTED = (PAPER, *DIAL[2:], PLANNER)
+"""Settings that practise, hear of a goal that has moved, and practise again."""
+SHIFT_TASKS = [f"{family}/v1/i{number:03d}" for number in range(30) for family in FAMILIES[:2]]
+SHIFT_AFTER = (1, 2, 3, 10, 30, 100, 300, 1_000, 10_000)
+"""Trials after the change at which the solution is looked at; the last is all of practice."""
+SHIFT_COLUMNS = ["task", "setting", "goal", "same", "square", *(f"dot_{n}" for n in SHIFT_AFTER)]
+
+
+def run_shifts(name):
+    """Let learners practise a task, move the goal after a goal by half a link, and follow the
+    posture at that goal while they practise on; rows of :data:`SHIFT_COLUMNS`.
+
+    As in study tell-apart: at the change the learner keeps its movements and drops the rewards.
+    ``dot_N`` is the shift of the posture after N trials times the shift after all of them,
+    ``square`` the latter squared, ``same`` such a product for practice without a change.
+    """
+    task, seed, rows = load_task(name), SHIFT_TASKS.index(name), []
+    moved = ANNOUNCED["moves"](task, seed)
+    cases = [(g, other) for g, distance, other in moved if distance == 0.5]
+    for setting in SHIFTED:
+        condition = replace(base_of(task), **SETTINGS[setting])
+
+        def postures(changed, seed, trials, start, condition=condition):
+            run = learn(changed, condition, seed=seed, trials=trials, start=start)
+            return execute(changed, run.solution).configurations
+
+        practised = learn(task, condition, seed=10 * seed, trials=TRIALS).solution
+        before = execute(task, practised).configurations
+        went_on = postures(task, 10 * seed + 1, TRIALS, practised)
+        for g, other in cases:
+            after = [postures(other, 10 * seed + 1, n, practised)[g] for n in SHIFT_AFTER]
+            shifts = np.array(after) - before[g]
+            same = (went_on[g] - before[g]) @ shifts[-1]
+            rows.append([name, setting, g, same, shifts[-1] @ shifts[-1], *(shifts @ shifts[-1])])
+    return rows
+
+
+def measure_shifts(raw):
+    """Measure shares of the shift after the change, a row for each task and setting.
+
+    ``share_N`` of the final shift that is there after N trials: sums over goals of products of
+    shifts, over sums of squares. ``log_half``: trials to half of it, interpolated, as a power of
+    ten. ``unchanged``: the share that as much practice without a change brings.
+    """
+    sums = raw.groupby(["setting", "task"], sort=False).sum(numeric_only=True).reset_index()
+    sums["family"] = sums.task.str.partition("/")[0]
+    shares = (sums[[f"dot_{n}" for n in SHIFT_AFTER]].div(sums.square, axis=0)).to_numpy()
+    half = [ANNOUNCED["trials_to_half"](curve, SHIFT_AFTER) for curve in shares]
+    named = {f"share_{n}": shares[:, k] for k, n in enumerate(SHIFT_AFTER)}
+    return sums.assign(**named, log_half=half, unchanged=sums.same / sums.square)
+
+
+def tabulate_shifts(shifts):
+    """Tabulate shares of the shift by family and setting, and quartiles of the trials to half."""
+    numbers = [*(f"share_{n}" for n in SHIFT_AFTER), "unchanged"]
+    table = means(shifts, ["family", "setting"], numbers).rename(columns={"rows": "tasks"})
+    trials = (10**shifts.log_half).groupby([shifts.family, shifts.setting], sort=False)
+    for share in (0.25, 0.5, 0.75):
+        column = trials.quantile(share).rename(f"half_{share:g}")
+        table = table.merge(column, left_on=["family", "setting"], right_index=True)
+    table.index = (table.family + " " + table.setting).rename("row")
+    return table
+
+
+def judge_shifts(shifts):
+    """The claims on an announced change, registered before any test instance was run."""
+
+    def of(column, setting, family):
+        rows = shifts[(shifts.setting == setting) & (shifts.family == family)]
+        return rows.set_index("task")[column]
+
+    how = "one-tailed bootstrap tests over 30 random tasks, one-armed and two-armed: "
+    families = FAMILIES[:2]
+    return judge({
+        "drift-makes-the-shift-quick": (
+            "With κ = 1 and little noise half of the shift takes less than a fifth of the paper's"
+            " learner's trials.",
+            f"{how}the logarithm of the trials to half of the shift is lower by more than that of "
+            f"{TIMES:g}"
+            "; refuted where it takes more",
+            all_of(*(mean_beyond(f"{family}: 10^{{}} times fewer trials",
+                                 of("log_half", PAPER, family) - of("log_half", PLANNER, family),
+                                 float(np.log10(TIMES))) for family in families)),
+        ),
+        "drift-shifts-within-ten-trials": (
+            "After ten trials with κ = 1 and little noise, between a tenth and nine tenths of the"
+            " shift is there: more than in the paper's learner, less than in a planner.",
+            f"{how}the share after ten trials above 0.1 and below 0.9"
+            "; refuted where it is not between",
+            all_of(*(mean_beyond(f"{family}: the share is {{}}",
+                                 of("share_10", PLANNER, family), bound, side)
+                     for family in families for bound, side in ((0.1, "greater"), (0.9, "less")))),
+        ),
+        "shift-is-of-the-change": (
+            "With κ = 1 and little noise less than half of the shift is there after as much "
+            "practice without a change.",
+            f"{how}the shift without a change, projected, below 0.5"
+            "; refuted where it is more",
+            all_of(*(mean_beyond(f"{family}: the share is {{}}",
+                                 of("unchanged", PLANNER, family), 0.5, "less")
+                     for family in families)),
+        ),
+    })  # fmt: skip

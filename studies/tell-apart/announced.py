@@ -1,0 +1,54 @@
+"""An announced change: which goal moves, and after how many trials half of the shift is there.
+
+Study dial uses it as well.
+"""
+
+import numpy as np
+
+from coartic import CoarticError, MethodError, objective, parse_task
+
+DISTANCES = [0.25, 0.5, 1.0]
+"""By which a goal moves, length units; a link of the arm is 1."""
+HALF = 0.5
+
+
+def changed(task, goals):
+    """The task with other goals. Raises CoarticError or MethodError where they cannot be hit."""
+    other = parse_task(task.model_dump() | {"goals": goals, "name": "changed"}, "a changed task")
+    objective(other)  # or it says that no hands hit them all
+    return other
+
+
+def moves(task, seed):
+    """Yield each goal that has one after it, a distance, and the task with that one moved.
+
+    The direction is random, the same for all distances; the moved goal stays apart from its
+    neighbours.
+    """
+    rng, goals = np.random.default_rng([68, seed]), task.goal_array
+    for g in range(len(goals) - 1):
+        neighbours = np.delete(goals, g + 1, axis=0)[max(g - 1, 0) : g + 2]
+        for _ in range(100):
+            angle = rng.uniform(0, 2 * np.pi)
+            places = goals[g + 1] + np.outer(DISTANCES, [np.cos(angle), np.sin(angle)])
+            if np.linalg.norm(places[:, None] - neighbours, axis=2).min() < 4 * task.radius:
+                continue
+            try:
+                tasks = [changed(task, [*goals[: g + 1], place, *goals[g + 2 :]])
+                         for place in places]  # fmt: skip
+            except (CoarticError, MethodError):
+                continue
+            yield from zip([g] * len(tasks), DISTANCES, tasks, strict=True)
+            break
+
+
+def trials_to_half(shares, after):
+    """Return the logarithm of the trials until a share of the final shift is a half, interpolated.
+
+    ``shares``: after each number of trials in ``after``. NaN without a shift.
+    """
+    if not shares[-1] >= HALF:
+        return np.nan
+    k = int((shares >= HALF).argmax())
+    part = slice(k - 1, k + 1)
+    return np.interp(HALF, shares[part], np.log10(after[part])) if k else 0.0
