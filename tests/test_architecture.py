@@ -1,4 +1,4 @@
-"""Imports point one way only, and kinematics has one home."""
+"""Imports point one way only, kinematics has one home, and studies use the public interface."""
 
 import ast
 import graphlib
@@ -117,6 +117,120 @@ def test_no_imports_go_round_in_circles():
         graphlib.TopologicalSorter(imports).prepare()
     except graphlib.CycleError as error:
         raise AssertionError(" <- ".join(error.args[1])) from None
+
+
+@cache
+def public_names():
+    """Names that a reference page names, by module: its members, or the page's choice of them."""
+    paths = {module_of(path): path for path in sources()}
+    names = {}
+    for page in sorted((ROOT / "docs" / "reference" / "python").glob("*.md")):
+        directives = re.findall(r"automodule:: (\S+)\n((?:   :.*\n)*)", page.read_text("utf-8"))
+        for module, text in directives:
+            options = dict(re.findall(r":([a-z-]+): \+?(.*)", text))
+            chosen, left_out = (
+                {*options.get(key, "").split(", ")} - {""} for key in ("members", "exclude-members")
+            )
+            members = chosen or members_of(tree_of(paths[module]))
+            names[module] = names.get(module, set()) | (members - left_out)
+    return names
+
+
+def members_of(tree):
+    """What Sphinx shows of a module: ``__all__``, or what it defines with a docstring."""
+    members = set()
+    for node, following in zip(tree.body, [*tree.body[1:], None], strict=True):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            members.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if ast.unparse(targets[0]) == "__all__":
+                return {*ast.literal_eval(node.value)}
+            if isinstance(following, ast.Expr):
+                members |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return {name for name in members if not name.startswith("_")}
+
+
+@cache
+def is_public(full):
+    """Whether a page names it in its module, or has this module, or a package exports what a page
+    names elsewhere."""
+    module, _, name = full.rpartition(".")
+    pages = public_names()
+    if leads_to_a_page(full) or name in pages.get(module, ()):
+        return True
+    package = importlib.import_module(module) if leads_to_a_page(module) else None
+    if name not in getattr(package, "__all__", ()):
+        return False
+    homes = [importlib.import_module(home) for home, names in pages.items() if name in names]
+    return any(getattr(home, name) is getattr(package, name) for home in homes)
+
+
+def leads_to_a_page(module):
+    """Whether a page has the module, or a module of this package."""
+    return any(f"{page}.".startswith(f"{module}.") for page in public_names())
+
+
+def used_names(tree):
+    """Yield the full names in coartic that code imports, or uses as attributes of modules."""
+    bound = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names if package_of(alias.name) in PACKAGES]
+            yield from names
+            bound |= {name.partition(".")[0]: name.partition(".")[0] for name in names}
+            bound |= {alias.asname: alias.name for alias in node.names if alias.asname}
+        elif isinstance(node, ast.ImportFrom) and package_of(node.module) in PACKAGES:
+            names = {alias.asname or alias.name: alias.name for alias in node.names}
+            bound |= {short: f"{node.module}.{name}" for short, name in names.items()}
+            yield from (f"{node.module}.{name}" for name in names.values())
+    for node in ast.walk(tree):
+        root, *rest = ast.unparse(node).split(".") if isinstance(node, ast.Attribute) else [""]
+        if root in bound and leads_to_a_page(".".join([bound[root], *rest[:-1]])):
+            yield ".".join([bound[root], *rest])
+
+
+def internal_names(tree):
+    return {name for name in used_names(tree) if not is_public(name)}
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "from coartic.robot import HANDS",
+        "from coartic.analysis.words import interval",
+        "from coartic.analysis.solutions import Solutions, _CACHE",
+        "from coartic.tasks.families import Parts",
+        "from coartic import *",
+        "from analysis.study import load",
+        "import coartic.internal.files",
+        "import coartic\ncoartic.robot.HANDS",
+        "import coartic.analysis.words as words",
+        "from coartic.analysis import figures\nfigures.save",
+        "def late():\n    from coartic.motion.trial import RoundsOfChecks",
+    ],
+)
+def test_internal_names_are_found(code):
+    assert len(internal_names(ast.parse(code))) == 1
+
+
+def test_studies_use_the_public_interface_alone():
+    """Names that a reference page names, imported from there or from the package above."""
+    public = """
+import coartic
+import coartic.analysis.study as reading
+from coartic.analysis import SIGNATURES, figures, load
+from coartic.motion.trial import reach_goals
+coartic.analysis.frames.ranking(reading.load(coartic.load_task.__doc__)).anything
+figures.means(figures.PALETTE)
+"""
+    assert not internal_names(ast.parse(public))
+    used = {
+        path.relative_to(ROOT).as_posix(): internal_names(tree_of(path))
+        for path in sorted((ROOT / "studies").rglob("*.py"))
+    }
+    assert len(used) > 10
+    assert {path: names for path, names in used.items() if names} == {}
 
 
 FRESH = """

@@ -7,16 +7,19 @@ one verdict of dose there is now undecided, as it hangs on one of five tasks.
 
 import hashlib
 import lzma
+import re
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from coartic.analysis import figures, fill_page, load, write_study
+from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families
 from coartic.tasks.task import address_of, task_text
 from tests.support.processes import program
+from tests.support.suites import InProcess
 
 ROOT = Path(__file__).parents[2]
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
@@ -118,3 +121,17 @@ def test_families_of_studies_are_what_they_were():
 @pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)
 def test_suite_has_the_name_of_its_folder(folder):
     assert load_suite(str(folder / "suite.toml")).name == folder.name
+
+
+def test_the_page_on_studies_has_a_whole_study(tmp_path):
+    page = (ROOT / "studies" / "README.md").read_text("utf-8")
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for text in re.findall(r"```(?:toml|python|jinja)\n(.*?)```", page, re.DOTALL):
+        (tmp_path / re.search(r"mine/\S+", text)[0]).write_text(text, "utf-8")
+    run_suite(folder / "suite.toml", tmp_path / "results", executor=InProcess())
+    study = program(folder / "study.py")
+    write_study(folder, study.measure(load(tmp_path / "results")), study.draw)
+    assert "gap is 0.0 %" in (folder / "README.md").read_text("utf-8")
+    assert read(folder / "claims.csv").evidence["goals-ahead-gain"].startswith("The gap falls by 9")
+    assert (folder / "figure.svg").exists()
