@@ -1,5 +1,5 @@
 # Two commands set everything up on a machine with Python >= 3.11 (with venv) and make:
-#   make benchmark   the paper's experiments, all methods beside them, and the report
+#   make benchmark   the paper's experiments, all methods, the report and the replication
 #   make test        the test suite
 # make benchmark FULL=1 adds the ablations and the search for the optima. make docs builds the
 # site; make findings and make studies make the numbers in it again.
@@ -21,7 +21,8 @@ benchmark: $(READY)
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
 	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
 	done
-	@echo "Look at $(OUT)/comparison/report/report.html."
+	$(BIN)/python studies/replication/study.py $(SUITES:%=$(OUT)/%) --out $(OUT)/replication
+	@echo "Look at $(OUT)/comparison/report/report.html and $(OUT)/replication/page.html."
 
 # Bytecode is kept, even where the environment says no: each worker, and each process that a
 # test starts, would compile all sources anew.
@@ -67,6 +68,7 @@ findings: $(READY)
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
 	  $(BIN)/coartic report $(OUT)/$$suite --for-paper || exit; \
 	done
+	$(BIN)/python studies/replication/study.py $(STORED:%=$(OUT)/%)
 	$(BIN)/python docs/make_findings.py --from $(OUT)
 
 # Every study, or those of make studies STUDIES="horizon dose": its suite, with its own families,

@@ -20,23 +20,21 @@ import pandas as pd
 from scipy import stats
 
 from coartic.analysis import fill_page, mean_beyond
-from coartic.analysis.claims.judgements import CLAIMS
-from coartic.analysis.claims.judging import Verdict
+from coartic.analysis.judging import Verdict
 from coartic.analysis.methods import title_of
 from coartic.tasks.optima import BEST_KNOWN
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
-ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
     "comparison": (
-        "beside-random-search claims contexts hands learning methods runtimes published ranking "
-        "scores separation signatures tasks",
-        "postures published ranking runtimes learning-curves solutions",
+        "beside-random-search contexts learning methods runtimes ranking scores separation "
+        "signatures tasks",
+        "postures ranking runtimes learning-curves",
     ),
-    "ablations": ("methods signatures claims", ""),
-    "families": ("family-gaps claims", "gaps-by-family"),
+    "ablations": ("methods signatures", ""),
+    "families": ("family-gaps", "gaps-by-family"),
 }
 """Tables and figures that are kept of each suite's report."""
 
@@ -65,32 +63,27 @@ def row(suite: str, name: str, which: str) -> Row:
     return Row(table(suite, name).loc[which])
 
 
-def claims(suite: str = "") -> pd.DataFrame:
-    """The judged claims of a suite.
-
-    Without one: the paper's claims by suite comparison, and by ablations where that has no runs.
-    """
-    if suite:
-        return table(suite, "claims")
-    judged, others = table("comparison", "claims"), table("ablations", "claims")
-    without_runs = judged.index[judged.evidence.str.startswith("Not judged")]
-    judged.loc[without_runs] = others.loc[without_runs]
-    return judged
+def claim(name: str, study: str = "replication") -> Row:
+    """A judged claim of a study by its id."""
+    return Row(table(study, "claims").loc[name])
 
 
-def claim(name: str, suite: str = "") -> Row:
-    """A judged claim by its id."""
-    return Row(claims(suite).loc[name])
+def cells_of_the_paper() -> pd.DataFrame:
+    """Rewards of the paper's cells, without the rows of single hand sequences."""
+    rewards = table("replication", "rewards")
+    return rewards[rewards.hands.isna()]
 
 
-def verdicts(suite: str = "", *, others: bool = False, published: bool = False) -> dict[str, int]:
-    """How many claims have each verdict; ``others``: without the three that carry the paper's
-    point; ``published``: that rest on published goals alone."""
-    judged = claims(suite)
+def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]:
+    """How many claims on the paper's tasks have each verdict; ``others``: without the three that
+    carry the paper's point; ``published``: that rest on published goals alone."""
+    judged = table("replication", "claims")
+    judged = judged[judged.suite != "families"]
     if published:
         judged = judged[~judged.statement.str.contains("†")]
     if others:
-        judged = judged[[not CLAIMS[name].short for name in judged.index]]
+        words = tomllib.loads((STUDIES / "replication" / "claims.toml").read_text("utf-8"))
+        judged = judged[["short" not in words[name] for name in judged.index]]
     counts = judged.verdict.value_counts()
     return {verdict: int(counts.get(verdict, 0)) for verdict in get_args(Verdict)}
 
@@ -119,7 +112,7 @@ def p_above(values: pd.Series, bound: float) -> float:
 def published_spreads() -> pd.DataFrame:
     """Return the published spreads (±) with the tests of both readings; a spread that is published
     of a hand sequence is compared with runs that have it."""
-    spreads = pd.concat([table("comparison", "hands"), table("comparison", "published")])
+    spreads = table("replication", "rewards").sort_values("hands", kind="stable")
     spreads = spreads.drop_duplicates(["task", "condition", "published_sd"]).dropna(subset="p_sd")
     return spreads.sort_index()
 
@@ -150,15 +143,18 @@ def filled_pages() -> dict[str, str]:
 
     A page that has the name of a suite waits until something of that suite is stored.
     """
-    published = ANALYSIS / "published.toml"
+    replication = STUDIES / "replication"
     values = {
-        "table": table, "row": row, "claim": claim, "verdicts": verdicts, "seen": seen,
+        "table": table, "row": row, "claim": claim, "cells_of_the_paper": cells_of_the_paper,
+        "verdicts": verdicts, "seen": seen,
         "title_of": title_of, "known_optima": known_optima,
         "published_spreads": published_spreads,
         "p_of_shares": p_of_shares, "p_above": p_above,
-        "published": tomllib.loads(published.read_text("utf-8"))["general"],
+        "published": tomllib.loads(
+            (replication / "published.toml").read_text("utf-8")
+        )["general"],
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
-        "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),
+        "goal_sets": pd.read_csv(replication / "sets.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),
     }  # fmt: skip
     waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import UnionType
@@ -10,13 +11,14 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from docutils import nodes
 from sphinx.application import Sphinx
-from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
 from coartic.play.page import part_of_page, play_page, player_figure, preset_of, up_or_down
 from coartic.tasks.optima import BEST_KNOWN, best_shipped
 from coartic.tasks.task import Task, shipped_tasks
+
+REPLICATION = Path(__file__).parents[1] / "studies" / "replication"
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
@@ -42,35 +44,28 @@ def bare(kind: Any) -> Any:
 
 def claims() -> Iterator[str]:
     """The paper's claims; each has its id for an anchor."""
-    from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
-    from coartic.analysis.claims.judgements import CLAIMS
 
-    def goals(claim: Any) -> str:
-        if claim in CLAIMS_ON_FAMILIES:
+    def goals(name: str, claim: dict[str, Any]) -> str:
+        if name.endswith("-in-general"):
             return "random tasks"
-        return "reconstructed †" if claim.fitted else "published"
+        return "reconstructed †" if "fitted" in claim else "published"
 
     rows = (
         (
-            f"[{c.text}]{{#{c.id}}} <br>`{c.id}`",
-            goals(c),
-            f"{c.place}: “{c.quote}”",
-            f"{c.test[0].upper()}{c.test[1:]}.",
+            f"[{c['text']}]{{#{name}}} <br>`{name}`",
+            goals(name, c),
+            f"{c['place']}: “{c['quote']}”",
+            f"{c['test'][0].upper()}{c['test'][1:]}.",
         )
-        for c in CLAIMS.values()
+        for name, c in tomllib.loads((REPLICATION / "claims.toml").read_text("utf-8")).items()
     )
     yield from table(("claim", "goals", "the paper says", "how it is judged"), rows)
 
 
 def margins() -> Iterator[str]:
     """The margins of the claims, with the reason for each and its history."""
-    from coartic.analysis.claims import margins
-
-    reasons = ModuleAnalyzer.for_module(margins.__name__).find_attr_docs()
-    rows = (
-        (f"`{name.lower()}`", f"{getattr(margins, name):g}", " ".join(reason))
-        for (_, name), reason in reasons.items()
-    )
+    entries = tomllib.loads((REPLICATION / "margins.toml").read_text("utf-8"))
+    rows = ((f"`{name}`", f"{each['value']:g}", each["reason"]) for name, each in entries.items())
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
 
 

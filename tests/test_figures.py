@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from coartic import corrective_trial, drawing, initial_hands, load_task
+from coartic import drawing, load_task
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.learning import learning_curves
 from coartic.analysis.sections.ranking import name_in_figure
-from tests.support.made_up import row, runs_of, study_of
+from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, ROOT
 
 
@@ -37,29 +37,11 @@ def test_every_figure_that_runs_allow(traced):
     drawn = {name: draw(traced) for name, draw in FIGURES.items()}
     figures = {name: plot for name, plot in drawn.items() if plot}
     assert {"tasks", "postures"} <= set(figures)
-    assert "published" not in figures  # published means are of 10,000 trials, these runs of 150
     for name, plot in figures.items():
         assert plot.id == name
         assert plot.alt
         assert plot.caption
         assert len(plot.data)
-
-
-def test_solutions_are_of_the_run_with_the_median_reward(traced):
-    data = FIGURES["solutions"](traced).data
-    ticks = -data.groupby(["task", "condition"], sort=False).reward.sum()
-    for (name, condition), of_run in ticks.items():
-        if condition == "initial":
-            assert of_run == corrective_trial(name, initial_hands(name)).ticks
-        else:
-            rewards = traced.cells[name, f"dual-process/{condition}"].rewards
-            assert -of_run in rewards
-            assert (rewards < -of_run).sum() <= len(rewards) / 2 >= (rewards > -of_run).sum()
-    for hit in data.to_dict("records"):
-        task = load_task(hit["task"])
-        q = [hit[joint] for joint in task.robot.joint_names]
-        hand = task.robot.forward_kinematics(q, {"L": "left", "R": "right"}[hit["hand"]])
-        assert np.hypot(*(hand - task.goals[hit["goal"] - 1])) <= task.radius
 
 
 def test_the_gallery_shows_every_figure():
@@ -82,20 +64,6 @@ def test_learning_curves_against_a_loop(traced):
             assert point.best_high == pytest.approx(best[3] - 0.75 * (best[3] - best[2]))
             spread += point.best_low < point.best_high
     assert spread > 100
-
-
-def test_published_differences():
-    hands = ["RRRR", "RRRR", "LRLR"]
-    planted = study_of(
-        runs_of("two-armed-1", "dual-process/EC2", [-610, -606, -500], hands=hands, trials=10_000)
-    )
-    data = FIGURES["published"](planted).data.set_index("hands")
-    assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
-    assert data.verdict[""] == "undecided"  # also of a mean over sequences
-    assert data.difference["RRRR"] == pytest.approx(1.0)
-    assert np.isnan(data.difference["RRLR"])
-    assert data.runs.to_dict() == {"": 3, "RRLR": 0, "RRRR": 2}
-    assert len(FIGURES["published"](planted).data) == 3
 
 
 def test_names_and_looks_tell_methods_apart():

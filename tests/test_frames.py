@@ -7,9 +7,8 @@ import pandas as pd
 import pytest
 
 import coartic
-from coartic.analysis import frames, load, pages
-from coartic.analysis.claims import judging
-from coartic.analysis.claims.judging import all_of, judge, mean_beyond
+from coartic.analysis import frames, judging, load, pages
+from coartic.analysis.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics import instances

@@ -33,25 +33,13 @@ IN_SIGHT = """rows => rows.filter(row => row.checkVisibility())
     .map(row => [row.textContent.toLowerCase(), row.children[1].innerText])"""
 
 
-def claims_in_sight(page):
-    """All text of each claim, and its verdict."""
-    return page.eval_on_selector_all("#table-claims tbody tr", IN_SIGHT)
+def rows_in_sight(page):
+    """All text of each row of the table of methods, and its second cell."""
+    return page.eval_on_selector_all("#table-methods tbody tr", IN_SIGHT)
 
 
-def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
+def test_tables_are_searched_sorted_and_unfolded(opened, address):
     page = opened()
-    before = claims_in_sight(page)
-    page.fill("#claims-search", "first movement")
-    after = claims_in_sight(page)
-    assert 0 < len(after) < len(before)
-    assert all(word in text for text, _ in after for word in ("first", "movement"))
-    page.fill("#claims-search", "")
-    page.select_option("#claims-verdict", "undecided")
-    chosen = claims_in_sight(page)
-    assert 0 < len(chosen) < len(before)
-    assert {verdict for _, verdict in chosen} == {"undecided"}
-    page.select_option("#claims-verdict", "")
-    assert claims_in_sight(page) == before
     # A table that is folded opens for a link to a row, and is sorted by its headers.
     assert not page.locator("#table-methods").is_visible()
     row = page.locator("#table-methods tbody tr").nth(2).get_attribute("id")
@@ -68,10 +56,13 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     for ordered in (sorted(values()), sorted(values(), reverse=True)):
         head.click()
         assert values() == ordered
-    # A link to a claim unfolds it.
-    claim = page.locator("#table-claims tbody tr").nth(3).get_attribute("id")
-    page.goto(f"{address}#{claim}")
-    assert page.locator(f"#{claim} dl").is_visible()
+    before = rows_in_sight(page)
+    page.fill("#methods-search", "learner ascending")
+    after = rows_in_sight(page)
+    assert 0 < len(after) < len(before)
+    assert all(word in text for text, _ in after for word in ("learner", "ascending"))
+    page.fill("#methods-search", "")
+    assert rows_in_sight(page) == before
 
 
 def test_a_table_is_copied_for_a_spreadsheet_and_two_methods_are_compared(opened, traced):
@@ -208,6 +199,6 @@ def test_without_scripts_all_is_there(browser, address):
     page = context.new_page()
     page.goto(address)
     assert page.locator(".still svg").is_visible()
-    assert page.locator("#table-claims tbody tr").count() > 10
-    assert not page.locator("#claims-search").is_visible()
+    assert page.locator("#table-methods tbody tr").count() > 10
+    assert not page.locator("#methods-search").is_visible()
     context.close()

@@ -15,7 +15,6 @@ from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about
 from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, TABLES, costs, own, ranking
-from coartic.analysis.sections.rewards import changed_hands
 from coartic.analysis.statistics import running_times
 from coartic.estimates import RESAMPLES, SEED
 from tests.support.golden import golden
@@ -371,12 +370,6 @@ def alike(**better):
     return study({("ascending", names[n]): [-300 + more] * 3 for n, more in better.items()})
 
 
-def hands_of_conditions():
-    learned = {"EC2": (-670, "RRRR"), "EC4": (-645, "LRLR"), "EC3": (-650, "RRLR")}
-    return study_of([row(f"dual-process/{name}", reward, hands=hands, initial_hands="RRRR")
-                     for name, (reward, hands) in learned.items()])  # fmt: skip
-
-
 def beside(*methods, runs=10, **more):
     return study(TEN | strangers(*methods, runs=runs) | more)
 
@@ -411,10 +404,9 @@ OWN = {
     "on one task, once": lambda: study(TEN | {("ascending", "mine"): [-309]}),
     "it has parameters": with_parameters,
 }
-HANDS = {"the highest mean says which hands are learned": hands_of_conditions}
 SENTENCES = {
     name: (words, made)
-    for words, of in ((ranking.nearest, NEAREST), (own.own_in_words, OWN), (changed_hands, HANDS))
+    for words, of in ((ranking.nearest, NEAREST), (own.own_in_words, OWN))
     for name, made in of.items()
 }
 

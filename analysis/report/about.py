@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from coartic.analysis.published import RUNS
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.words import NO_BREAK, listed, marked
@@ -17,6 +16,8 @@ from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
 
 Made = TypeVar("Made")
+RUNS = 20
+"""Number of runs of every experiment of the paper."""
 
 
 def shown(text: str) -> str:

@@ -8,20 +8,17 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from shlex import quote
-from typing import Any, get_args
+from typing import Any
 
-import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
-from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import (
     IN_LATEX,
     MOST_ROWS,
-    TONES,
     classes_of,
     html_table,
     latex_table,
@@ -37,7 +34,7 @@ from coartic.internal.files import check_inside, make_folder, publish
 from coartic.play.page import part_of_page
 
 HERE = Path(__file__).parent
-NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "claims": [], "finding": [], "figure": None}
+NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "finding": [], "figure": None}
 """Values of :func:`parts_of` for a section that failed."""
 
 
@@ -114,14 +111,9 @@ def sections(study: Study) -> list[dict[str, Any]]:
 
 
 def parts_of(section: Section, study: Study) -> dict[str, Any]:
-    """Return the values of a section for the template: table, figure, finding and claims."""
+    """Return the values of a section for the template: table, figure and finding."""
     table, frame, plot = section.table, section.table(study), plot_of(study, section)
-    claims = frame.reset_index(names="id") if section.id == "claims" else pd.DataFrame()
-    if len(claims):
-        by_verdict = claims.verdict.map(get_args(Verdict).index)
-        claims = claims.loc[by_verdict.sort_values(kind="stable").index]
     return {
-        "claims": claims.to_dict("records"),
         "table": table.id,
         "rows": len(frame),
         "settings": sum("setting" in names for names in classes_of(table, frame)),
@@ -163,8 +155,6 @@ def page(study: Study, home: str) -> str:
         cards=cards,
         differences=about.attempt(study, "Differences of gaps", differences) or {},
         sections=sections(study),
-        verdicts=get_args(Verdict),
-        tones=TONES,
         suite=study.suite,
         home=home,
         stamp=stamp(study.runs),

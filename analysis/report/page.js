@@ -41,16 +41,14 @@
     const table = document.getElementById(tools.dataset.table);
     const search = tools.querySelector("[type=search]");
     const unfold = tools.querySelector("[type=checkbox]");
-    const filter = tools.querySelector("select");
     const status = tools.querySelector("output");
     const show = () => {
       const words = (search ? search.value : "").toLowerCase().split(/\s+/).filter(Boolean);
       let shown = 0;
       [...table.tBodies[0].rows].forEach((row) => {
         const text = row.textContent.toLowerCase();
-        const wanted = !filter || !filter.value || row.dataset.verdict === filter.value;
         const folded = unfold && !unfold.checked && !words.length && row.classList.contains("setting");
-        row.hidden = folded || !(wanted && words.every((word) => text.includes(word)));
+        row.hidden = folded || !words.every((word) => text.includes(word));
         shown += !row.hidden;
       });
       status.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";

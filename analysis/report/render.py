@@ -28,24 +28,12 @@ from coartic.analysis.words import (
 )
 from coartic.internal.text import one_line
 
-TONES = {
-    "supported": "good",
-    "equivalent": "good",
-    "not supported": "bad",
-    "different": "bad",
-    "undecided": "open",
-    "depends on the goals": "open",
-}
-"""Class of a verdict on the page, by its words."""
 IN_LATEX = {
     "own": "task, method, runs, reward, gap, nearest, nearest_gap",
     "contexts": "place, method, runs, distance, standardised_difference, p_holm, p_random_search",
-    "published": "task, condition, published, ours, runs, difference, verdict",
-    "claims": "statement, verdict, p_holm",
     "ranking": "method, gap, on *",
     "settings": "method, setting, gap, tasks, comparison, p_holm",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
-    "hands": "task, condition, hands, published, ours, runs",
     "learning": "task, method, runs, after_*, trials_to_half_gain",
     "signatures": "task, method, runs, first, total, as_in_isolation, preshaping",
     "family-gaps": "method, gap, in *",
@@ -81,8 +69,6 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
     """
     headers, titles = {}, frame.attrs.get("titles", {})
     names = [n for n in frame.columns if not n.endswith(("_low", "_high", "_sd"))]
-    if "verdict" in names:  # it is what one looks for, also where a screen has room for two columns
-        names.insert(1, names.pop(names.index("verdict")))
     for name in names:
         column = table.column(name)
         if not column.header:
@@ -147,11 +133,7 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
             texts = [text + f"<small>{id_}</small>" * (text != id_) for text, id_ in pairs]
         if not is_number(frame[column]):
             head = f'<span class="text">{head}</span>'
-            tones = [TONES.get(text, "") if column == "verdict" else "" for text in texts]
-            pairs = zip(tones, texts, strict=True)
-            texts = [
-                f'<span class="{f"text {tone}".strip()}">{text}</span>' for tone, text in pairs
-            ]
+            texts = [f'<span class="text">{text}</span>' for text in texts]
         if not cells:
             texts = [
                 f'<span title="row {html.escape(row)}">{text}</span><a class="link" '

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 
 from coartic.analysis.figures.plot import Plot
 from coartic.analysis.sections import (
-    claims,
     coarticulation,
     costs,
     learning,
     methods,
     own,
-    postures,
     random_search,
     random_tasks,
     ranking,
-    rewards,
     scores,
     settings,
     tasks,
@@ -80,36 +77,6 @@ SECTIONS = (
         note="Postures are compared in length units and rad. Random search learns "
         "nothing; the best of many is selected. Its rows in the table are of all runs, figure and "
         "sentence of the runs that improved on the corrective process.",
-    ),
-    Section(
-        "paper",
-        "Paper",
-        "Are the paper's rewards reproduced?",
-        table=rewards.list_published,
-        caption="Learned rewards, published and ours (ticks)",
-        figure=rewards.draw_published,
-        sentence=rewards.rewards_reproduced,
-        note="EC1 to EC4 are the paper's exploration conditions. EC1 explores the right arm only, "
-        "EC2 both arms with the closest hand, EC3 the choice of hand as well but not the idle arm, "
-        "EC4 all of these. LRLR means left, right, left, right hand. † marks tasks whose goals the "
-        "paper does not publish: these rewards helped to choose ours, so their agreement is no "
-        "evidence. Only runs with as many trials as the paper's, 10 000, are judged.",
-    ),
-    Section(
-        "claims",
-        "Claims",
-        "Do the paper's claims hold?",
-        table=claims.list_claims,
-        caption="Claims",
-        sentence=claims.claims_hold,
-        answer="Paper",
-        note="p is corrected for the number of claims (Holm). Some claims of the paper rest on "
-        "goals that it does not publish: the third column says in how many of the sets of goals "
-        "that fit its text a claim holds. A claim that our goals support, but at most half of "
-        "these sets, depends on the goals. Version 1.1.0 judged the sets, without the comparison "
-        "with random search. Rewards are those of the best trial of a run; a replay makes "
-        "what was learned once more, without noise and exploration.",
-        single=False,
     ),
     Section(
         "nearest",
@@ -179,16 +146,6 @@ SECTIONS = (
         note="The figure shows methods that learn, random search and the best planner. The number "
         "of forward-kinematics evaluations is a cost that is the same on every machine. ∞: "
         "not reached within the budget of trials.",
-    ),
-    Section(
-        "hands",
-        "Hands",
-        "Which hands are chosen?",
-        table=rewards.list_hands,
-        caption="Learned rewards by hand sequence, published and ours (ticks)",
-        figure=postures.draw_solutions,
-        sentence=rewards.changed_hands,
-        folded=True,
     ),
     Section(
         "learning",

@@ -24,7 +24,6 @@ from coartic.estimates import (
     NEGLIGIBLE,
     RESAMPLES,
     SEED,
-    TAILS,
     Estimate,
     centred,
     slices,
@@ -33,9 +32,6 @@ from coartic.estimates import (
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
-MARGIN = 0.01
-"""Differences up to this share of the published reward count as equivalent."""
-Equivalence = Literal["equivalent", "different", "undecided"]
 
 
 def bootstrap_test(
@@ -129,22 +125,6 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
     return Estimate(count / total - share, p=p, n=(total,))
 
 
-def spread_test(values: ArrayLike, published: float, runs: int, *, of_mean: bool = False) -> float:
-    """Test whether ``runs`` runs like ours could have a published spread, two-tailed.
-
-    Samples of so many of our ``values``, shape ``(n,)``, are drawn with replacement, and p is twice
-    the share whose standard deviation, or standard error of the mean with ``of_mean``, is at least
-    as far on the side of the published spread. NaN with fewer than ten values.
-    """
-    sample = vector(values)
-    if len(sample) < 10:
-        return math.nan
-    drawn = np.random.default_rng(SEED).choice(sample, (RESAMPLES, runs))
-    spreads = drawn.std(axis=1, ddof=1) / (math.sqrt(runs) if of_mean else 1.0)
-    beyond = min((spreads <= published).sum(), (spreads >= published).sum())
-    return float(min(1.0, 2 * (1 + beyond) / (1 + RESAMPLES)))
-
-
 def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
@@ -159,42 +139,3 @@ def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     adjusted = np.empty_like(p)
     adjusted[order] = np.minimum(1.0, steps)
     return list(map(float, adjusted))
-
-
-def equivalence(estimate: Estimate, margin: float) -> Equivalence:
-    """Compare the interval of a difference with ±margin: two one-sided tests at level 2.5 %
-    (TOST; D. J. Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15).
-
-    Equivalent if the interval lies within the margin, different if it lies outside, or else
-    undecided.
-    """
-    if -margin <= estimate.low and estimate.high <= margin:
-        return "equivalent"
-    if estimate.low > margin or estimate.high < -margin:
-        return "different"
-    return "undecided"
-
-
-def difference_to_published(
-    ours: ArrayLike, published: float, sd: float | None, runs: int
-) -> Estimate:
-    """Return our mean less the published mean, with Welch's interval from the published SD and
-    number of runs.
-
-    Without a published SD (None) the published mean counts as exact, and the interval is Student's.
-    No interval for a single run; an interval of no length without spread in any sample.
-    """
-    values = vector(ours)
-    n, value = len(values), float(values.mean()) - published
-    if n < 2:
-        return Estimate(value, n=(n,))
-    parts = [(float(np.var(centred(values), ddof=1)) / n, n - 1)]
-    if sd is not None and runs > 1:
-        parts.append((sd**2 / runs, runs - 1))
-    total = sum(part for part, _ in parts)
-    sizes = tuple(free + 1 for _, free in parts)
-    if total == 0.0:
-        return Estimate(value, value, value, n=sizes)
-    freedom = total**2 / sum(part**2 / free for part, free in parts)
-    half = float(scipy.special.stdtrit(freedom, TAILS[1])) * math.sqrt(total)
-    return Estimate(value, value - half, value + half, n=sizes)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic.analysis.claims import judging
+from coartic.analysis import judging
 from tests.support.processes import program
 
 FOLDER = Path(__file__).parents[3] / "studies" / "dial"

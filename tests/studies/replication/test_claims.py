@@ -1,8 +1,8 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
+import importlib
 import re
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,33 +11,29 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, load_task
-from coartic.analysis.claims.claim import Claim, all_higher
-from coartic.analysis.claims.coarticulation import chosen_slower
-from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
-from coartic.analysis.claims.judging import Finding
-from coartic.analysis.claims.paper import (
-    CLAIMS_OF_THE_PAPER,
-    excess_over_shortest,
-    shortest_reach,
-    some_of,
-)
-from coartic.analysis.claims.reader import Higher, Measurement, MissingError, Reader
-from coartic.analysis.sections import TABLES
-from coartic.analysis.sections.claims import verdicts_in_words
+from coartic.analysis import judge
+from coartic.analysis.judging import Finding
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.estimates import Estimate
-from tests.support.golden import golden
 from tests.support.made_up import row, runs_of, study_of, study_of_solutions
+from tests.support.processes import program
 from tests.support.strategies import AS_RELEASED
-from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
+from tests.support.suites import KNOWN, ROOT, InProcess, cell_on, run_and_write
 
+FOLDER = ROOT / "studies" / "replication"
+STUDY = program(FOLDER / "study.py")
+claims, comparisons, hands, performance, reader = map(
+    importlib.import_module, ("claims", "comparisons", "hands", "performance", "reader")
+)
+Higher, Measurement, all_higher = (
+    comparisons.Higher, comparisons.Measurement, comparisons.all_higher
+)  # fmt: skip
 NAN = float("nan")
 ONE_ARMED = ("ascending", "descending")
 T1, T2 = "two-armed-1", "two-armed-2"
 RANDOM_SEARCH = "random-search"
-COUNTED = Path(__file__).parent.parent / "docs" / "stored" / "reconstruction" / "sets.csv"
 
 
 def nothing():
@@ -54,47 +50,19 @@ def found(holds, *p, against=None, n=20):
     return Finding(holds, "planted", tests, contrary)
 
 
-def judged(*planted):
-    """Planted findings judged together: each, or None, with fields of its claim."""
+def judged(monkeypatch, planted):
+    """Findings that stand in for the rules of claims, judged together; None: it was not run."""
 
-    def decide(finding):
-        if finding is None:
-            raise MissingError("not run")
-        return finding
+    def rule(finding):
+        def decide(read):
+            if finding is None:
+                raise reader.MissingError("not run")
+            return finding
 
-    claims = [
-        Claim(f"planted-{number}", "It is so.", "Results", "so", "exact",
-              lambda _, finding=finding: decide(finding), **fields)
-        for number, (finding, fields) in enumerate(planted)
-    ]  # fmt: skip
-    return judge_claims(nothing(), claims)
+        return decide
 
-
-@pytest.mark.parametrize(
-    ("finding", "verdict"),
-    [
-        (found(True, 0.001), "supported"),
-        (found(True), "supported"),
-        (found(True, NAN), "supported"),  # no spread, no doubt
-        (found(True, NAN, n=1), "undecided"),  # one value decides nothing
-        (found(True, 0.2), "undecided"),
-        (found(True, 0.001, 0.2), "undecided"),
-        (found(False, 0.7), "undecided"),
-        (found(False, 0.97), "not supported"),
-        (found(False, 0.94), "undecided"),
-        (found(False, 0.001, 0.99), "not supported"),
-        (found(False, 0.5, 0.97), "undecided"),  # the contrary of one of two
-        (found(False, 0.7, against=[0.01]), "not supported"),
-        (found(False, 0.7, against=[0.06]), "undecided"),
-        (found(False, 0.99, against=[]), "undecided"),  # a test without a contrary side
-        (found(True, 0.2, against=[0.01]), "undecided"),
-        (found(False), "not supported"),
-        (found(None), "undecided"),
-        (None, "undecided"),
-    ],
-)
-def test_verdicts(finding, verdict):
-    assert judged((finding, {})).verdict.tolist() == [verdict]
+    monkeypatch.setattr(claims, "RULES", {name: rule(each) for name, each in planted.items()})
+    return claims.judge_claims(nothing(), [*planted])
 
 
 @pytest.mark.parametrize(
@@ -103,59 +71,29 @@ def test_verdicts(finding, verdict):
         (found(True, 0.001), "depends on the goals"),
         (found(True, 0.2), "undecided"),
         (found(False, 0.999), "not supported"),
+        (None, "undecided"),
     ],
 )
-def test_what_our_runs_show_may_depend_on_the_goals(finding, verdict):
-    depends = judged((finding, {"fitted": True, "depends": True}), (finding, {"fitted": True}))
-    assert depends.verdict.iloc[0] == verdict
-    assert depends.verdict.iloc[1] != "depends on the goals"
+def test_what_our_runs_show_may_depend_on_the_goals(monkeypatch, finding, verdict):
+    """Few sets of goals support half-choose-rlrr, and most of both tasks arm-coarticulation."""
+    planted = {"half-choose-rlrr": finding, "arm-coarticulation": finding}
+    of_few, of_most = judged(monkeypatch, planted).verdict
+    assert of_few == verdict
+    assert of_most != "depends on the goals"
 
 
-def test_claims_are_counted_by_verdict():
-    entries = judged(
-        (found(True, 0.001), {}), (found(False, 0.999), {}), (found(True, 0.2), {}), (None, {})
-    ).set_axis(["context", "rail", "overall-reward", "ec4-mixed"])
-    assert entries.verdict.value_counts().to_dict() == {
-        "supported": 1,
-        "not supported": 1,
-        "undecided": 2,
-    }
-    both = entries.assign(verdict=["supported", "not supported", "supported", "undecided"])
-    none = both.iloc[[1, 3]].assign(verdict="not supported")
-    for name, of in (("half", entries), ("a third", entries[:-1]), ("both", both), ("none", none)):
-        assert verdicts_in_words(of) == golden(f"claims are counted, {name}")
-
-
-def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
-    """0.03 alone is significant, and is not beside two others (Holm 1979)."""
-    entries = judged(
-        (found(True, 0.03), {}),
-        (found(True, 0.001), {}),
-        (found(True, 0.02, 0.04), {}),
-        (found(True), {"group": "exact"}),  # no part of the group
-    )
-    assert entries.p_holm.tolist() == pytest.approx([0.06, 0.003, 0.06, NAN], nan_ok=True)
-    assert entries.verdict.tolist() == ["undecided", "supported", "undecided", "supported"]
-
-
-def test_opposites_are_corrected_over_the_claims_too():
-    findings = [found(False, p) for p in (0.96, 0.975, 0.999)]
-    opposite = [finding.opposite_p for finding in findings]
-    assert opposite == pytest.approx([0.0401, 0.0251, 0.0011])
-    entries = judged(*((finding, {}) for finding in findings))
-    assert entries.verdict.tolist() == ["undecided", "undecided", "not supported"]
-    assert entries.opposite_p_holm.tolist() == pytest.approx([0.0502, 0.0502, 0.0033])
-
-
-def test_groups_are_corrected_apart():
+def test_groups_are_corrected_apart(monkeypatch):
     """A claim that is not judged counts in its group as one with p = 1."""
-    findings = found(True, 0.02), found(True, 0.001), None
-    papers = [(finding, {"group": "paper"}) for finding in findings]
-    groups = ("comparison", "families") * 4
-    others = [(found(True, 0.0001), {"group": group}) for group in groups]
-    adjusted = judged(*papers, *others).p_holm.tolist()
+    by_group = claims.CLAIMS.groupby("group").groups
+    papers = [*by_group["paper"][:3]]
+    planted = dict(zip(papers, (found(True, 0.02), found(True, 0.001), None), strict=True))
+    for group in ("comparison", "families"):
+        planted |= dict.fromkeys(by_group[group][:4], found(True, 0.0001))
+    planted |= dict.fromkeys(by_group["exact"], found(True))
+    adjusted = judged(monkeypatch, planted).p_holm.tolist()
     assert adjusted[:2] == pytest.approx([0.04, 0.003])
-    assert adjusted[3:] == pytest.approx([0.0004] * 8)
+    assert adjusted[3:11] == pytest.approx([0.0004] * 8)
+    assert np.isnan(adjusted[11:]).all()
 
 
 def learner(task, condition, rewards, hands="LRLR", initial=-671, trials=10_000, **more):
@@ -179,12 +117,16 @@ def alone_with(sequences):
 
 
 def finding_of(claim, study):
-    return CLAIMS[claim].judge(Reader(study))
+    return claims.RULES[claim](reader.Reader(study))
 
 
 def verdict_of(claim, study):
     """The verdict of a claim's tests alone, uncorrected, and what was seen."""
-    return judge_claims(study, [replace(CLAIMS[claim], depends=False)]).iloc[0]
+    try:
+        finding = finding_of(claim, study)
+    except reader.MissingError as missing:
+        finding = Finding(None, str(missing))
+    return judge({claim: ("It is so.", "exact", finding)}).iloc[0]
 
 
 LOW = [-610, -612, -608, -611, -609, -613, -607, -610]
@@ -239,7 +181,7 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     assert finding.holds
     assert not all_higher([Higher(first, second, by=2)]).holds
     assert finding.evidence.count("t, who: 5.0 [") == 1
-    one_of = some_of(all_higher([Higher(second, first), Higher(first, second)]))
+    one_of = performance.some_of(all_higher([Higher(second, first), Higher(first, second)]))
     least = bootstrap_test(first.numbers, second.numbers)
     assert one_of.holds
     assert one_of.tests[0].p == pytest.approx(2 * least.p)
@@ -323,7 +265,7 @@ def test_the_shortest_reach():
     task = load_task("ascending")
     alone = corrective_trial(task, "RRR").configurations
     lengths = [
-        shortest_reach(task, q, "right", goal, alone[goal - 1])
+        performance.shortest_reach(task, q, "right", goal, alone[goal - 1])
         for goal, q in ((1, task.q0), (2, alone[0]))
     ]
     assert lengths[0] == pytest.approx(1.4)
@@ -345,13 +287,15 @@ def test_the_corrective_process_is_near_the_shortest_way():
 
     The sum over its subtasks would hide that.
     """
-    claims = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
+    names = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
     shipped = planted_study(seven([9, 10, 11]))
-    assert [verdict_of(claim, shipped).verdict for claim in claims] == ["supported"] * 2
+    assert [verdict_of(claim, shipped).verdict for claim in names] == ["supported"] * 2
     study = planted_study(seven([9, 10, 11]), tasks=[AS_RELEASED])
-    assert verdict_of(claims[0], study).verdict == "supported"
-    assert verdict_of(claims[1], study).verdict == "not supported"
-    excess = excess_over_shortest(study.tasks[T2], corrective_trial(study.tasks[T2], "RRRR"))
+    assert verdict_of(names[0], study).verdict == "supported"
+    assert verdict_of(names[1], study).verdict == "not supported"
+    excess = performance.excess_over_shortest(
+        study.tasks[T2], corrective_trial(study.tasks[T2], "RRRR")
+    )
     assert excess[:2] == pytest.approx([0.003, 0.132], abs=0.0005)
 
 
@@ -439,7 +383,7 @@ SLOWER = ["LLRR"] * 8 + ["LRLR"] * 31 + ["RRRR"]
 
 
 @pytest.mark.parametrize(
-    ("hands", "of_random_search", "verdict"),
+    ("learned", "of_random_search", "verdict"),
     [
         ({"EC2": "LLRR", "EC3": "LRLR"}, "LRLR", "supported"),  # left is slower for goal 2
         ({"EC2": "RRRR", "EC3": "LRLR"}, "LRLR", "not supported"),  # slower, but as initially
@@ -449,14 +393,14 @@ SLOWER = ["LLRR"] * 8 + ["LRLR"] * 31 + ["RRRR"]
         ({"EC2": "few LLRR", "EC3": "LRLR"}, "LRLR", "undecided"),  # more than it, but few
     ],
 )
-def test_hands_that_serve_other_goals(hands, of_random_search, verdict):
+def test_hands_that_serve_other_goals(learned, of_random_search, verdict):
     """Of two-armed task 1: left first and right second are the quicker hands, initially RRRR."""
     task = load_task(T1)
     quick = {h: corrective_trial(task, h).ticks_by_goal() for h in ("LLLL", "RRRR", "LRRR")}
     assert quick["LLLL"][0] < quick["RRRR"][0]
     assert quick["LRRR"][1] < corrective_trial(task, "LLRR").ticks_by_goal()[1]
     of = {
-        **{f"dual-process/{condition}": h for condition, h in hands.items()},
+        **{f"dual-process/{condition}": h for condition, h in learned.items()},
         RANDOM_SEARCH: of_random_search,
     }
     runs = {h: corrective_trial(task, h) for h in {"LRLL", *SLOWER}}
@@ -470,7 +414,7 @@ def test_hands_that_serve_other_goals(hands, of_random_search, verdict):
     assert judged.verdict == verdict, judged.evidence
     if verdict == "supported":
         ticks = corrective_trial(task, "LLRR").ticks_by_goal()[1] - quick["LRRR"][1]
-        slower = chosen_slower(study.executed(T1, "dual-process/EC2"), "RRRR")
+        slower = hands.chosen_slower(study.executed(T1, "dual-process/EC2"), "RRRR")
         assert slower.tolist() == [ticks] * 40
 
 
@@ -618,21 +562,40 @@ def study(tmp_path_factory):
 
 
 def test_the_register_on_runs(study):
-    entries = judgements(study)
-    assert list(entries.index) == [claim.id for claim in CLAIMS_OF_THE_PAPER]
+    entries = STUDY.judge_by_first([study])
+    assert list(entries.index) == [*claims.CLAIMS.index]
     by_subtask = entries.loc["overall-reward"]
     assert "(EC1-subtask)" in by_subtask.evidence
     assert len(by_subtask.run_ids.split()) >= 12
     for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):  # it was not run
         assert entries.verdict[name] == "undecided"
         assert "this folder has no runs of" in entries.evidence[name]
-    assert TABLES["claims"](study).verdict.tolist() == entries.verdict.tolist()
+        assert entries.suite[name] == ""
     # Claims on published tasks alone do not rest on goals that were chosen for results like theirs.
     task_of = dict(zip(study.runs.run_id, study.runs.task, strict=True))
     read = {name: {task_of[run] for run in runs.split()} for name, runs in entries.run_ids.items()}
     assert sum(map(bool, read.values())) > 8
     for name, tasks in read.items():
-        assert not tasks or bool(tasks & {T1, T2}) == CLAIMS[name].fitted, name
+        assert not tasks or bool(tasks & {T1, T2}) == claims.CLAIMS.fitted[name], name
+
+
+def test_a_claim_is_judged_by_the_first_folder_that_has_its_runs(monkeypatch):
+    def missing(read):
+        raise reader.MissingError("not run")
+
+    rules = dict.fromkeys(claims.RULES, missing)
+    for name in ("ec4-mixed", "half-choose-rlrr"):
+        rules[name] = claims.RULES[name]
+    monkeypatch.setattr(claims, "RULES", rules)
+    rows = (
+        on_2("EC4", WORSE, "RLRR"),
+        on_2("EC4", WORSE + BETTER, MIXED) + on_2("EC3", WORSE, "RLRR"),
+    )
+    entries = STUDY.judge_by_first([*map(planted_study, rows)])
+    assert entries.verdict["ec4-mixed"] == "not supported"  # by the first
+    assert entries.suite[["ec4-mixed", "half-choose-rlrr"]].tolist() == ["paper"] * 2
+    assert entries.evidence["half-choose-rlrr"].startswith("Two-armed 2 EC3")
+    assert entries.suite["rail"] == ""
 
 
 @pytest.mark.parametrize(
@@ -657,27 +620,28 @@ def test_the_rail_makes_the_sequence(free, verdict):
 
 
 def test_every_sentence_is_accounted_for():
-    path = Path(__file__).parent.parent / "docs" / "sentences.toml"
+    path = FOLDER / "sentences.toml"
     published = tomllib.loads(path.read_text(encoding="utf-8"))["sentence"]
     for each in published:
         assert len({"claims", "held", "open"} & set(each)) == 1, each["quote"]
-        assert set(each.get("claims", ())) <= set(CLAIMS), each["quote"]
+        assert set(each.get("claims", ())) <= {*claims.CLAIMS.index}, each["quote"]
     accounted = {name for each in published for name in each.get("claims", ())}
-    lacking = {claim.id for claim in CLAIMS.values() if claim.place} - accounted
+    lacking = {*claims.CLAIMS.index} - accounted
     assert not lacking, f"in no sentence of sentences.toml: {lacking}"
-    files = re.findall(r"(?:coartic|tests)/[\w/]+(?:\.py)?", str(published))
-    assert [file for file in files if not (Path(__file__).parent.parent / file).exists()] == []
+    files = re.findall(r"(?:coartic|studies|tests)/[\w/-]+(?:\.\w+)?", str(published))
+    assert [file for file in files if not (ROOT / file).exists()] == []
 
 
-def test_sets_of_goals_are_as_counted():
-    counted = pd.read_csv(COUNTED)
-    for name, claim in CLAIMS.items():
-        rows = counted[counted.claim == name]
-        words = [
-            f"{row.supported} of {row.members} ({load_task(row.task).label}"
-            f"{f', refuted in {row.refuted}' * (row.refuted > 0)})"
-            for row in rows.itertuples()
-        ]
-        assert claim.sets == "; ".join(words)
-        assert claim.depends == any(2 * rows.supported <= rows.members)
-        assert claim.fitted >= bool(claim.sets)
+def test_sets_of_goals_are_of_claims_that_rest_on_them():
+    assert claims.sets_in_words("arm-coarticulation") == (
+        "224 of 242 (Two-armed 1, refuted in 6); 131 of 240 (Two-armed 2, refuted in 44)"
+    )
+    assert claims.sets_in_words("context") == ""
+    assert claims.sets_in_words("rail") == "not counted"
+    judged = {*claims.SETS.claim} & {*claims.CLAIMS.index}
+    assert len(judged) > 8
+    assert claims.CLAIMS.fitted[[*judged]].all()
+
+
+def test_every_claim_has_a_rule():
+    assert {*claims.RULES} == {*claims.CLAIMS.index}

@@ -1,8 +1,8 @@
 """Measure the spread of EC4 on two-armed task 1 under other exploration and longer practice.
 
-    python docs/scripts/spreads.py
+    python studies/replication/spreads.py
 
-writes ``docs/stored/reconstruction/ec4.csv``, a row for each setting, in four minutes of a core.
+writes ec4.csv, a row for each setting, in four minutes of a core.
 """
 
 from dataclasses import replace
@@ -13,7 +13,6 @@ import pandas as pd
 
 from coartic import CONDITIONS, learn_many
 
-STORED = Path(__file__).parents[1] / "stored" / "reconstruction" / "ec4.csv"
 SETTINGS = {
     "published": (500, 10_000, {}),
     "epsilon 0.1": (200, 10_000, {"epsilon": 0.1}),
@@ -24,7 +23,7 @@ SETTINGS = {
 """Runs, trials, and fields that differ from EC4."""
 
 
-def main() -> None:
+def main():
     """Run the settings, with seeds that no other results have."""
     rows = []
     for setting, (runs, trials, fields) in SETTINGS.items():
@@ -34,7 +33,8 @@ def main() -> None:
         rewards = np.array([run.reward for run in done if run.execute().hands == "LRLR"], float)
         row = {"setting": setting, "runs": runs, "lrlr": len(rewards)}
         rows.append(row | {"reward": rewards.mean(), "reward_sd": rewards.std(ddof=1)})
-    pd.DataFrame(rows).to_csv(STORED, index=False, float_format="%.6g", lineterminator="\n")
+    stored = Path(__file__).with_name("ec4.csv")
+    pd.DataFrame(rows).to_csv(stored, index=False, float_format="%.6g", lineterminator="\n")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,11 @@
 """Rewards that Shah, Barto & Fagg (2013) publish, by task and condition (``published.toml``)."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from coartic.analysis.words import number
-
-ENTRIES: dict[str, dict[str, Any]] = {
+ENTRIES = {
     f"{task}.{name}": {"task": task, **entry}
     for task, entries in tomllib.loads(
         Path(__file__).with_name("published.toml").read_text("utf-8")
@@ -21,8 +17,10 @@ for _entry in ENTRIES.values():
     if "difference_of" in _entry:
         _first, _second = (ENTRIES[name]["value"] for name in _entry["difference_of"])
         _entry["value"] = _first - _second
-RUNS: int = ENTRIES["general.runs"]["value"]
+RUNS = ENTRIES["general.runs"]["value"]
 """Number of runs of every experiment of the paper."""
+TRIALS = ENTRIES["general.trials"]["value"]
+"""Number of trials of every run of the paper."""
 
 
 class Summary(NamedTuple):
@@ -39,12 +37,8 @@ class Summary(NamedTuple):
     derived_runs: bool = False
     """True if the number of runs is computed from another published number."""
 
-    def __str__(self) -> str:
-        """Write the mean, followed by "(derived)" if it is computed from other numbers."""
-        return f"{number(self.mean)}{' (derived)' * self.derived}"
 
-
-def published_alone(task: str, kind: str) -> Summary | None:
+def published_alone(task, kind):
     """Return the published reward of the corrective process alone on a task, None without it.
 
     ``kind``: ``initial hands`` or ``best of all sequences``.
@@ -57,19 +51,20 @@ def published_alone(task: str, kind: str) -> Summary | None:
     return None
 
 
-def published_cell(task: str, condition: str) -> dict[str, Summary] | None:
+def published_cell(task, condition):
     """Return the published rewards of a cell by hand sequence, and of all runs under ``""``.
 
-    The paper has rewards by hand sequence for some cells. None for a cell without an entry.
+    The paper has rewards by hand sequence for some cells, and hands alone for one. None for a cell
+    of which it says nothing.
     """
-    entries: dict[tuple[str, str], dict[str, Any]] = {
+    entries = {
         (entry["kind"], entry.get("hands", "")): entry
         for entry in ENTRIES.values()
         if (entry["task"], entry.get("condition")) == (task, condition)
     }
     if not entries:
         return None
-    summaries: dict[str, Summary] = {}
+    summaries = {}
     for (kind, hands), entry in entries.items():
         if kind == "reward":
             count = entries.get(("count", hands), {})
@@ -80,21 +75,19 @@ def published_cell(task: str, condition: str) -> dict[str, Summary] | None:
                 count.get("value") if hands else RUNS,
                 derived_runs="difference_of" in count,
             )
-    if "" not in summaries and (whole := pooled([*summaries.values()])):
-        summaries[""] = whole
+    if summaries and "" not in summaries:
+        summaries[""] = pooled([*summaries.values()])
     return summaries
 
 
-def pooled(parts: list[Summary]) -> Summary | None:
+def pooled(parts):
     """Return mean and SD over all runs of several groups, from mean and SD of each group."""
-    if len(parts) < 2:
-        return parts[0] if parts else None
+    if len(parts) == 1:
+        return parts[0]
     runs = sum(part.runs for part in parts)
     mean = sum(part.runs * part.mean for part in parts) / runs
     if any(part.sd is None for part in parts):
         return Summary(mean, None, runs, derived=True)
-    squares = sum(
-        (part.runs - 1) * (part.sd or 0.0) ** 2 + part.runs * (part.mean - mean) ** 2
-        for part in parts
-    )
+    squares = sum((part.runs - 1) * part.sd**2 + part.runs * (part.mean - mean) ** 2
+                  for part in parts)  # fmt: skip
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)

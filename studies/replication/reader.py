@@ -1,76 +1,46 @@
-"""Access of claims to a results folder, with a record of the runs that each claim reads."""
-
-from __future__ import annotations
+"""A results folder as one claim reads it."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+import tomllib
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
+from comparisons import Higher, Measurement
+from published import TRIALS, published_alone, published_cell
 
-from coartic import Execution, Task
-from coartic.analysis.methods import CONDITION_OF, RANDOM_SEARCH, title_of
-from coartic.analysis.published import Summary, published_alone, published_cell
+from coartic import NotApplicableError, corrective_trial, initial_hands
+from coartic.analysis import SIGNATURES, Study
 from coartic.analysis.random_search import (
     beside_random_search,
     excess_on_instance,
     random_search_on,
 )
-from coartic.analysis.signatures.measures import SIGNATURES
-from coartic.analysis.solutions import Solutions, initial_solution
-from coartic.analysis.study import CellKey, Study
-from coartic.analysis.words import estimate, number
-from coartic.estimates import FEWEST, mean
-from coartic.learner.learning import TRIALS
-from coartic.robot import Array
+from coartic.estimates import FEWEST
+
+LEARNER = "dual-process/"
+EC1, EC2, EC3, EC4 = CONDITIONS = tuple(f"{LEARNER}EC{n}" for n in (1, 2, 3, 4))
+EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
+"""The learner with a reward for each subtask by itself."""
+RANDOM_SEARCH = "random-search"
+ONE_ARMED = "ascending", "descending"
+TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
+CELLS_OF_ONE_ARM = [(task, EC1) for task in ONE_ARMED]
+CELLS_OF_TWO_ARMS = [*((TASK_1, label) for label in (EC2, EC3, EC4)),
+                     *((TASK_2, label) for label in (EC3, EC4))]  # fmt: skip
+MARGINS = SimpleNamespace(**{
+    name: entry["value"]
+    for name, entry in tomllib.loads(
+        Path(__file__).with_name("margins.toml").read_text("utf-8")
+    ).items()
+})  # fmt: skip
+"""Margins of the claims, as ``margins.toml`` explains."""
 
 
 class MissingError(Exception):
     """Error that a folder lacks runs, tasks or values that a claim needs."""
-
-
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """Values of runs, or a single number, with the words by which evidence names them."""
-
-    task: str
-    """Title of the task."""
-    who: str
-    """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random-search``."""
-    numbers: Array
-    """Values, shape ``(runs,)``; shape ``()`` of a single number, which is exact."""
-    quantity: str = ""
-    """Measured quantity in words; empty for rewards."""
-    published: Summary | None = None
-    """Reward that the paper publishes; None if the paper publishes no such reward."""
-
-    @property
-    def name(self) -> str:
-        """Title of the task, and method."""
-        return f"{self.task}, {self.who}"
-
-    @property
-    def in_ticks(self) -> bool:
-        """True for rewards and numbers of ticks."""
-        return not self.quantity or "ticks by which" in self.quantity
-
-    def __str__(self) -> str:
-        """Write the number, or the mean with its BCa interval."""
-        if not self.numbers.ndim:
-            return number(float(self.numbers))
-        return estimate(mean(self.numbers), 1 if self.in_ticks else 3)
-
-
-class Higher(NamedTuple):
-    """A claimed order of means: the first mean exceeds the second mean, or 0, by a margin."""
-
-    first: Measurement
-    second: Measurement | None = None
-    by: float = 0.0
-    """Margin, in the unit of the measurements."""
 
 
 @dataclass
@@ -84,26 +54,29 @@ class Reader:
     study: Study
     run_ids: list[str] = field(default_factory=list)
     """Ids of the runs read so far, some of them more than once."""
-    failed: list[CellKey] = field(default_factory=list)
-    """Cells that the claim asked for and could not use because some of their runs failed."""
 
-    def task(self, name: str) -> Task:
+    def task(self, name):
         """Return a task of the folder."""
         if name not in self.study.tasks:
             raise MissingError(f"this folder has no task {name}")
         return self.study.tasks[name]
 
-    def title(self, name: str) -> str:
+    def title(self, name):
         """Return the title of a task, or its name if the folder has no such task."""
         return self.study.tasks[name].label if name in self.study.tasks else name
 
-    def runs(self, task: str, label: str) -> pd.DataFrame:
+    def who(self, label):
+        """Return the name of a method in evidence, for the learner its condition."""
+        if label.startswith(LEARNER):
+            return label.removeprefix(LEARNER)
+        return self.study.methods.title.get(label, label.replace("-", " "))
+
+    def runs(self, task, label):
         """Return the runs of a method on a task, if all of them have a solution."""
         cell, title = self.study.cells.get((task, label)), self.title(task)
         if cell is None or not len(cell.runs):
             raise MissingError(f"this folder has no runs of {label} on {title}")
-        if len(cell.good) < len(cell.runs):
-            self.failed.append((task, label))
+        if not cell.all_good:
             failed = len(cell.runs) - len(cell.good)
             raise MissingError(
                 f"{failed} of {len(cell.runs)} runs of {label} on {title} failed, so "
@@ -111,7 +84,7 @@ class Reader:
             )
         runs = cell.good
         if self.study.methods.algorithm[label] in ("learner", "random search"):
-            trials = sorted(cell.runs.trials.unique())
+            trials = sorted(runs.trials.unique())
             if trials != [TRIALS]:
                 raise MissingError(
                     f"the paper's runs have {TRIALS} trials; those of {label} on {title} have "
@@ -122,44 +95,44 @@ class Reader:
         self.run_ids.extend(runs.run_id)
         return runs
 
-    def cell(self, task: str, label: str, *, replay: bool = False) -> Solutions:
+    def cell(self, task, label, *, replay=False):
         """Return the executed solutions of a method, or its noiseless replays after learning."""
         self.runs(task, label)
         return self.study.executed(task, label, replay=replay)
 
-    def hands(self, task: str, label: str) -> list[str]:
+    def hands(self, task, label):
         """Return the hand sequence of each run of the learner."""
         return list(map(str, self.runs(task, label).hands))
 
-    def reward(self, task: str, label: str) -> Measurement:
+    def reward(self, task, label):
         """Return the rewards of the best trials; a single reward for a deterministic method."""
         rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
         if not self.study.methods.stochastic[label]:
             rewards = np.array(rewards.mean())
-        published = published_reward(task, label)
-        return Measurement(self.title(task), who_is(label), rewards, published=published)
+        return self._reward(task, label, rewards)
 
-    def replay(self, task: str, label: str) -> Measurement:
+    def replay(self, task, label):
         """Return the rewards of noiseless replays after learning.
 
         A replay makes the movements that were learned. The reward of the best trial is a maximum,
         never below the reward of trial 0.
         """
-        runs = self.runs(task, label)
-        rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
+        rewards = self.runs(task, label).replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         if np.isnan(rewards).any():
-            raise MissingError(f"{who_is(label)} on {self.title(task)} has no replay")
-        published = published_reward(task, label)
-        who = f"replay of {who_is(label)}"
-        return Measurement(self.title(task), who, rewards, published=published)
+            raise MissingError(f"{self.who(label)} on {self.title(task)} has no replay")
+        return self._reward(task, label, rewards, "replay of ")
 
-    def initial(self, task: str) -> Measurement:
+    def _reward(self, task, label, rewards, which=""):
+        published = (published_cell(task, self.who(label)) or {}).get("")
+        return Measurement(self.title(task), which + self.who(label), rewards, published=published)
+
+    def initial(self, task):
         """Return the reward of a task's initial solution."""
         reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
         published = published_alone(task, "initial hands")
         return Measurement(self.title(task), "initial", reward, published=published)
 
-    def best(self, task: str) -> Measurement:
+    def best(self, task):
         """Return the highest reward of the corrective process alone over all hand sequences."""
         rewards = self.alone(task)
         if np.isnan(rewards).all():
@@ -170,13 +143,13 @@ class Reader:
         published, best = published_alone(task, "best of all sequences"), np.nanmax(rewards)
         return Measurement(self.title(task), "best", np.array(best), published=published)
 
-    def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
+    def signature(self, name, task, label, *, replay=False):
         """Return a signature of coarticulation of the runs that have this signature."""
         self.runs(task, label)
         values = self.study.signature_of(name, task, label, replay=replay)
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
-    def beside_random_search(self, name: str, task: str, label: str) -> list[Higher]:
+    def beside_random_search(self, name, task, label):
         """Return the order of a signature of a method and of random search, for each hand sequence.
 
         The rule is that of :mod:`coartic.analysis.random_search`: equal hands, runs that improved,
@@ -201,61 +174,50 @@ class Reader:
             )
         if not pairs:
             raise MissingError(
-                f"no run of {who_is(label)} on {task} improved on the corrective process alone"
+                f"no run of {self.who(label)} on {task} improved on the corrective process alone"
             )
         return pairs
 
-    def excess_over_random_search(self, name: str, task: str, label: str) -> Measurement:
+    def excess_over_random_search(self, name, task, label):
         """Return the excess of a method's signature over random search on an instance of a family,
         a single number, by the same rule."""
         self.runs(task, label)
         excess = excess_on_instance(self.study, name, task, label)
         if math.isnan(excess):
-            raise MissingError(f"no random search on {task} has the hands of {who_is(label)}")
+            raise MissingError(f"no random search on {task} has the hands of {self.who(label)}")
         return self.shown(name, task, label, np.array([excess]))
 
-    def shown(
-        self, name: str, task: str, label: str, values: Array, words: str = ""
-    ) -> Measurement:
+    def shown(self, name, task, label, values, words=""):
         """Return a signature with its words. Raises MissingError if no run has this signature."""
         if not len(values):
-            raise MissingError(f"{who_is(label)} on {self.title(task)} has no {name}")
-        return Measurement(self.title(task), who_is(label), values, words + SIGNATURES[name].words)
+            raise MissingError(f"{self.who(label)} on {self.title(task)} has no {name}")
+        quantity = words + SIGNATURES[name].words
+        return Measurement(self.title(task), self.who(label), values, quantity)
 
-    def random_search(self, task: str) -> list[str]:
+    def random_search(self, task):
         """Return the labels of the settings of random search that solved a task in 10,000
         trials."""
         return random_search_on(self.study, task, TRIALS) or [RANDOM_SEARCH]
 
-    def initial_execution(self, task: str) -> Execution:
-        """Return the initial solution of a task."""
-        execution = initial_solution(self.task(task))
-        if execution is None:
-            raise MissingError(f"the corrective process alone does not complete {self.title(task)}")
-        return execution
+    def initial_execution(self, task):
+        """Return the initial solution of a task: the corrective process with its initial hands."""
+        with suppress(NotApplicableError):
+            execution = corrective_trial(self.task(task), initial_hands(self.task(task)))
+            if execution.completed:
+                return execution
+        raise MissingError(f"the corrective process alone does not complete {self.title(task)}")
 
-    def alone(self, task: str) -> Array:
+    def alone(self, task):
         """Return the rewards of the corrective process alone by hand sequence, NaN for failures."""
         rewards = self.study.sequences(self.task(task).name).reward
         if not len(rewards):
-            title = self.title(task)
             raise MissingError(
-                f"this folder has no rewards of the corrective process alone on {title}"
+                f"this folder has no rewards of the corrective process alone on {self.title(task)}"
             )
         return rewards.to_numpy(dtype=np.float64, na_value=np.nan)
 
 
-def who_is(label: str) -> str:
-    """Return the name of a method in evidence, for the learner its condition."""
-    return CONDITION_OF.get(label) or title_of(label)
-
-
-def published_reward(task: str, label: str) -> Summary | None:
-    """Return the mean reward of runs in the paper; None if the paper does not publish it."""
-    return (published_cell(task, CONDITION_OF.get(label, "")) or {}).get("")
-
-
-def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:
+def there(reads):
     """Yield the measurements for which the folder has runs."""
     for read in reads:
         with suppress(MissingError):

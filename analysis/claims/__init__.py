@@ -1,1 +1,0 @@
-"""Claims of the paper: their words, their tests, and the verdicts on them."""

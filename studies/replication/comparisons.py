@@ -1,0 +1,109 @@
+"""Comparisons of means, on which most claims rest, and their words."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from published import Summary
+
+from coartic.analysis import interval, mean, number
+from coartic.analysis.judging import Finding
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.estimates import Estimate, difference_of_means
+
+
+def written(value, digits):
+    """Write an estimate with its interval, ``2.1 [1.3, 2.9]``."""
+    return interval(value.columns("of"), "of", digits)
+
+
+def listed(words):
+    """Write a list: ``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Values of runs, or a single number, with the words by which evidence names them."""
+
+    task: str
+    """Title of the task."""
+    who: str
+    """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random search``."""
+    numbers: np.ndarray
+    """Values, shape ``(runs,)``; shape ``()`` of a single number, which is exact."""
+    quantity: str = ""
+    """Measured quantity in words; empty for rewards."""
+    published: Summary | None = None
+    """Reward that the paper publishes; None if the paper publishes no such reward."""
+
+    @property
+    def name(self):
+        """Title of the task, and method."""
+        return f"{self.task}, {self.who}"
+
+    @property
+    def in_ticks(self):
+        """True for rewards and numbers of ticks."""
+        return not self.quantity or "ticks by which" in self.quantity
+
+    def __str__(self):
+        """Write the number, or the mean with its BCa interval."""
+        if not self.numbers.ndim:
+            return number(float(self.numbers))
+        return written(mean(self.numbers), 1 if self.in_ticks else 3)
+
+
+class Higher(NamedTuple):
+    """A claimed order of means: the first mean exceeds the second mean, or 0, by a margin."""
+
+    first: Measurement
+    second: Measurement | None = None
+    by: float = 0.0
+    """Margin, in the unit of the measurements."""
+
+
+def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ()) -> Finding:
+    """Test that all claimed orders of means hold, by one-tailed bootstrap tests.
+
+    The evidence also has the values of ``shown``, and the rewards that the paper publishes.
+    """
+    tests, parts, before = [], [], None
+    for first, second, by in comparisons:
+        other = 0.0 if second is None else second.numbers
+        tests.append(bootstrap_test(first.numbers - by, other))
+        words = first.name if first is before else f"{first.name}: {first}"  # said once
+        if second is not None:
+            words += f" against {second} ({second.who})"
+            if second.numbers.ndim:
+                difference = difference_of_means(first.numbers, second.numbers)
+                words += f", a difference of {written(difference, 1 if first.in_ticks else 3)}"
+                words += " ticks" * first.in_ticks
+            if first.published and second.published:
+                words += f"; published {said(first.published)} and {said(second.published)}"
+        parts.append((first.quantity, words))
+        before = first
+    parts += [(values.quantity, f"{values.name}: {values}") for values in shown]
+    return all_positive(tests, parts)
+
+
+def said(published: Summary) -> str:
+    """Write a published mean, followed by "(derived)" if it is computed from other numbers."""
+    return f"{number(published.mean)}{' (derived)' * published.derived}"
+
+
+def all_positive(tests: Iterable[Estimate], parts: Iterable[tuple[str, str]]) -> Finding:
+    """Return the finding that all tests point as claimed.
+
+    ``parts`` of the evidence are pairs of a measured quantity and words, grouped by quantity.
+    """
+    tests = tuple(tests)
+    seen = pd.DataFrame(parts, columns=["quantity", "words"]).groupby("quantity", sort=False)
+    evidence = ". ".join(
+        (f"{quantity[:1].upper()}{quantity[1:]}: " if quantity else "") + "; ".join(words)
+        for quantity, words in seen.words
+    )
+    return Finding(all(test.value > 0 for test in tests), evidence, tests)

@@ -1,0 +1,166 @@
+"""Claims on families of random tasks, each in the mean over the instances of every family."""
+
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from statistics import median
+
+from comparisons import Higher, all_positive, listed, written
+from performance import no_trial_fails
+from reader import (
+    CONDITIONS,
+    EC1,
+    EC2,
+    EC3,
+    EC4,
+    LEARNER,
+    MARGINS,
+    MissingError,
+)
+
+from coartic.analysis import all_of, mean, mean_beyond, number
+from coartic.analysis.judging import Finding
+from coartic.estimates import FEWEST
+
+OF_ONE_ARM = ("one-armed/v1",)
+OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
+EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
+JERK = "trajectory-optimisation/jerk"
+
+
+def in_every_family(read, families, comparisons):
+    """Test comparisons in the mean over the instances of each family.
+
+    Differences of rewards are in per cent of the best known reward. Where a comparison has too few
+    instances in a family, the claim is not judged, and the evidence has the other comparisons.
+    ``comparisons``: words that follow the name of a family, and a function that compares on a task.
+    """
+    findings, parts, few = [], [], []
+    for name, compare in comparisons:
+        for family in families:
+            values = []
+            for task, best in reported_instances(read, family).items():
+                with suppress(MissingError):
+                    first, second, margin = compare(read, task)
+                    other = 0.0 if second is None else second.numbers.mean()
+                    unit = 1.0 if first.quantity else 100 / abs(best.reward)
+                    values.append(unit * float(first.numbers.mean() - other))
+            if len(values) < FEWEST:
+                few.append(f"{family}{name}")
+                continue
+            findings.append(mean_beyond("", values, margin))
+            digits, unit_of = (2, "") if first.quantity else (1, " %")
+            seen = written(mean(values), digits) + unit_of
+            quantity = first.quantity or "gain as a share of the best known reward"
+            many = f"{number(median(values), digits)}{unit_of} on the median one"
+            parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances, {many}"))
+    if not findings:
+        raise MissingError(f"fewer than {FEWEST} instances of {listed(few)} can be judged")
+    finding = all_of(*findings)
+    evidence = all_positive(finding.tests, parts).evidence
+    if few:
+        seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
+        return Finding(None, seen)
+    return replace(finding, evidence=evidence)
+
+
+def reported_instances(read, family):
+    """Return the best known rewards of a family's instances, without development instances."""
+    tasks = read.study.tasks
+    reported = {
+        name: best
+        for name, best in read.study.optima.items()
+        if tasks[name].family == family and tasks[name].split != "development"
+    }
+    if not reported:
+        raise MissingError(f"this folder has no instances of {family} that can be judged")
+    return reported
+
+
+def most_exploring(read, task):
+    """Return the learner's condition that explores most on a task."""
+    return EC4 if len(read.task(task).hands) > 1 else EC1
+
+
+def earns(first, second):
+    """Compare the rewards of two methods."""
+    words = " > ".join(label.removeprefix(LEARNER) for label in (first, second))
+    return f" {words}", lambda read, task: Higher(
+        read.reward(task, first), read.reward(task, second)
+    )
+
+
+def shows(signature, *, by=0.0):
+    """Compare a signature of the learner with 0."""
+    return "", lambda read, task: Higher(
+        read.signature(signature, task, most_exploring(read, task)), None, by
+    )
+
+
+def shows_beyond_random_search(signature):
+    """Compare a signature of the learner with the same signature of random search."""
+
+    def compare(read, task):
+        label = most_exploring(read, task)
+        read.signature(signature, task, label)
+        return Higher(read.excess_over_random_search(signature, task, label))
+
+    return ", more than random search", compare
+
+
+def shows_beyond_closest_hands(read, task):
+    """Compare choices of hand under EC4 with choices under EC2, which tries the closest hand."""
+    return Higher(*(read.signature("hand", task, label) for label in (EC4, EC2)))
+
+
+def improvement(read, task):
+    """Compare the reward of the replay with the reward of the initial solution."""
+    return Higher(read.replay(task, most_exploring(read, task)), read.initial(task))
+
+
+def beyond_best_hands(read, task):
+    """Compare the reward of EC3 with the best of all hand sequences, corrected alone."""
+    return Higher(read.reward(task, EC3), read.best(task))
+
+
+def every_trial_completes(read):
+    """Count the failed trials of the learner in all families."""
+    names = [name for family in EVERY_FAMILY for name in reported_instances(read, family)]
+    cells = [(name, label) for name in names for label in CONDITIONS]
+    return no_trial_fails(read, [cell for cell in cells if cell in read.study.cells])
+
+
+def in_families(families, *comparisons):
+    """Return the rule that tests comparisons in every one of these families."""
+    return partial(in_every_family, families=families, comparisons=comparisons)
+
+
+RULES = {
+    "learning-improves-in-general": in_families(
+        EVERY_FAMILY, (" replay EC > initial", improvement)
+    ),
+    "proficiency-rises-in-general": in_families(OF_TWO_ARMS, earns(EC3, EC2), earns(EC4, EC3)),
+    "random-hands-pay-in-general": in_families(OF_TWO_ARMS, earns(EC4, EC2)),
+    "other-arm-pays-in-general": in_families(OF_TWO_ARMS, earns(EC4, EC3)),
+    "beats-exhaustive-in-general": in_families(OF_TWO_ARMS, (" EC3 > best", beyond_best_hands)),
+    "beats-inaccurate-in-general": in_families(OF_ONE_ARM, earns(EC1, JERK)),
+    "first-movement-sacrificed-in-general": in_families(
+        OF_ONE_ARM,
+        shows("first", by=MARGINS.rounding_ticks),
+        shows_beyond_random_search("first"),
+        shows("whole"),
+    ),
+    "hand-coarticulation-in-general": in_families(
+        OF_TWO_ARMS,
+        (", more than EC2", shows_beyond_closest_hands),
+        shows_beyond_random_search("hand"),
+    ),
+    "arm-coarticulation-in-general": in_families(
+        EVERY_FAMILY, shows("arm", by=MARGINS.rounding_ticks), shows_beyond_random_search("arm")
+    ),
+    "other-arm-coarticulation-in-general": in_families(
+        OF_TWO_ARMS, shows("other arm"), shows_beyond_random_search("other arm")
+    ),
+    "corrective-ensures-in-general": every_trial_completes,
+}
+"""Rules by the ids of their claims."""

@@ -1,0 +1,165 @@
+"""Claims on the choice of hand: which hand sequences runs learn, and how often."""
+
+from collections import Counter
+from dataclasses import replace
+from functools import partial
+from statistics import mode
+
+import numpy as np
+import scipy
+from comparisons import written
+from published import published_cell
+from reader import EC2, EC3, EC4, MARGINS, TASK_1, TASK_2, MissingError
+
+from coartic.analysis import all_of, number
+from coartic.analysis.judging import Finding
+from coartic.analysis.signatures.measures import ticks_slower
+from coartic.analysis.statistics.hypotheses import share_test
+from coartic.estimates import Estimate, difference_of_means
+
+FREE_BASE = "two-armed-1.free-base"
+
+
+def slower_hands_are_chosen(read):
+    """Test that more runs than in random search choose a hand that is slower for its goal alone."""
+    task, labels = TASK_1, (EC2, EC3)
+    initial = read.initial_execution(task).hands
+    chosen = {label: chosen_slower(read.cell(task, label), initial) for label in labels}
+    random_search = {
+        label: chosen_slower(read.cell(task, label), initial) > 0
+        for label in read.random_search(task)
+    }
+    label_of_random_search, of_random_search = max(
+        random_search.items(), key=lambda item: item[1].mean()
+    )
+    tests, against, parts = [], [], []
+    for label in labels:
+        does = chosen[label] > 0
+        count, total = int(does.sum()), len(does)
+        table = [
+            [count, total - count],
+            [int(of_random_search.sum()), int((~of_random_search).sum())],
+        ]
+        p = float(scipy.stats.fisher_exact(table, alternative="greater").pvalue)
+        more = min(does.mean() - of_random_search.mean(), does.mean() - MARGINS.few)
+        tests.append(Estimate(more, p=p, n=(total, len(of_random_search))))
+        against.append(share_test(count, total, MARGINS.few, "less"))
+        parts.append(f"{read.title(task)} {read.who(label)}: {count} of {total} runs")
+        if count:
+            ticks = number(chosen[label][does].mean(), 0)
+            parts[-1] += f", slower for these goals by {ticks} ticks"
+        if 0 < count < total:
+            rewards = np.array([run.reward for run in read.cell(task, label).runs], dtype=float)
+            better = written(difference_of_means(rewards[does], rewards[~does]), 1)
+            parts[-1] += f", which end with {better} ticks more reward than the others"
+    parts.append(
+        f"{read.study.methods.title[label_of_random_search]}: {of_random_search.sum()} of "
+        f"{len(of_random_search)} runs"
+    )
+    best = min(tests, key=lambda test: (test.value <= 0, test.p))
+    test = replace(best, p=min(1.0, best.p * len(tests)))
+    contrary = max(against, key=lambda test: test.p)
+    return Finding(test.value > 0, "; ".join(parts), (test,), (contrary,))
+
+
+def chosen_slower(cell, initial):
+    """Return the ticks by which chosen hands are slower for their goals alone, shape ``(runs,)``.
+
+    The sum over the goals, without the last, that are hit with another hand than in the initial
+    solution.
+    """
+    changed = [[one != other for one, other in zip(run.hands, initial, strict=True)]
+               for run in cell.runs]  # fmt: skip
+    return np.where(changed, ticks_slower(cell), 0.0)[:, :-1].sum(axis=1)
+
+
+def most_do(words, does, *, claimed=True):
+    """Test that more than three quarters of the runs do something; or fewer, if not ``claimed``."""
+    count, total = sum(does), len(does)
+    more = share_test(count, total, MARGINS.most, "greater")
+    fewer = share_test(count, total, MARGINS.most, "less")
+    side = "greater" if claimed else "less"
+    limits = scipy.stats.binomtest(count, total, alternative=side).proportion_ci()
+    limit = f"at least {limits.low:.0%}" if claimed else f"at most {limits.high:.0%}"
+    if limits.low > 0 or limits.high < 1:
+        words += f", {limit} of all (95 %)"
+    if claimed:
+        return Finding(more.value > 0, words, (more,), (fewer,))
+    return Finding(fewer.value < 0, words, (fewer,), (more,))
+
+
+def runs_that(read, task, label, what, does):
+    """Say how many runs do something, with the hand sequences of all runs."""
+    counts = sorted(Counter(read.hands(task, label)).items(), key=lambda item: (-item[1], item[0]))
+    each = ", ".join(f"{hands} {count}" for hands, count in counts)
+    who = f"{read.title(task)} {read.who(label)}"
+    return f"{who} {what}: {sum(does)} of {len(does)} runs ({each})"
+
+
+def half_find(read, task, label, hands):
+    """Test that neither few nor most runs learn these hands, against the published share."""
+    does = [each == hands for each in read.hands(task, label)]
+    count, total = sum(does), len(does)
+    share = count / total
+    low, high = scipy.stats.binomtest(count, total).proportion_ci()
+    cell = published_cell(task, read.who(label))
+    published, of_published = cell[hands], sum(s.runs for of, s in cell.items() if of)
+    more = share_test(count, total, MARGINS.few, "greater")
+    fewer = share_test(count, total, MARGINS.most, "less")
+    inside = min(share - MARGINS.few, MARGINS.most - share)
+    within = Estimate(inside, n=(total,), p=max(more.p, fewer.p))
+    table = [[count, total - count], [published.runs, of_published - published.runs]]
+    unlike = Estimate(
+        share - published.runs / of_published,
+        n=(total, of_published),
+        p=float(scipy.stats.fisher_exact(table).pvalue),
+    )
+    words = runs_that(read, task, label, hands, does)
+    return Finding(
+        MARGINS.few < share < MARGINS.most,
+        f"{words}, {low:.0%} to {high:.0%} of all (95 %); "
+        f"published {published.runs} of {of_published}{' (derived)' * published.derived_runs}",
+        (within,),
+        (unlike,),
+    )
+
+
+def no_reversal(read):
+    """Test that the base only moves right in most runs that learn RRLR."""
+    q0 = read.task(TASK_1).q0
+    runs = [run for run in read.cell(TASK_1, EC2).runs if run.hands == "RRLR"]
+    if not runs:
+        raise MissingError(f"no run of EC2 on {read.title(TASK_1)} learned RRLR")
+    along = [np.append(q0[0], run.configurations[:, 0]) for run in runs]  # the base, length unit
+    rightward = [bool((np.diff(x) > 0).all()) for x in along]
+    return most_do(runs_that(read, TASK_1, EC2, "RRLR rightward", rightward), rightward)
+
+
+def ec4_mixed(read):
+    """Count the runs on two-armed task 2 without the commonest hand sequence; the claim, that
+    there are some, is not tested. Raises MissingError without runs."""
+    learned = read.hands(TASK_2, EC4)
+    others = [hands != mode(learned) for hands in learned]
+    return Finding(any(others), runs_that(read, TASK_2, EC4, "not commonest", others))
+
+
+def rail(read):
+    """Test that most runs have the commonest hands if the base is on its rail, and only then."""
+    findings = []
+    for task, consistent in ((TASK_1, True), (FREE_BASE, False)):
+        learned = read.hands(task, EC3)
+        does = [hands == mode(learned) for hands in learned]
+        words = runs_that(read, task, EC3, "commonest", does)
+        findings.append(most_do(words, does, claimed=consistent))
+    return all_of(*findings)
+
+
+RULES = {
+    "hand-coarticulation-task-1": slower_hands_are_chosen,
+    "ec2-sequences": partial(half_find, task=TASK_1, label=EC2, hands="RRLR"),
+    "no-reversal": no_reversal,
+    "half-choose-rlrr": partial(half_find, task=TASK_2, label=EC3, hands="RLRR"),
+    "ec4-mixed": ec4_mixed,
+    "rail": rail,
+}
+"""Rules by the ids of their claims."""

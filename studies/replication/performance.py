@@ -1,0 +1,232 @@
+"""Claims on the corrective process, and on what learning gains."""
+
+import itertools
+import math
+from dataclasses import replace
+from functools import partial
+from operator import itemgetter
+
+import numpy as np
+import scipy
+from comparisons import Higher, Measurement, all_higher, all_positive
+from reader import (
+    CELLS_OF_ONE_ARM,
+    CELLS_OF_TWO_ARMS,
+    EC1,
+    EC3,
+    EC4,
+    MARGINS,
+    ONE_ARMED,
+    TWO_ARMED,
+)
+
+from coartic.analysis import number
+from coartic.analysis.judging import Finding
+from coartic.analysis.signatures.two_contexts import movable
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.estimates import SEED
+
+LEAST_DISPLACEMENT = "trajectory-optimisation/squared-displacement"
+"""The plan with the least squared joint displacement, a smoothness cost of Jordan's."""
+SMOOTH_PLANS = (
+    LEAST_DISPLACEMENT,
+    "trajectory-optimisation/acceleration",
+    "trajectory-optimisation/jerk",
+)
+TENTHS = 10
+"""Corrections are counted in the first and in the last tenth of the trials."""
+
+
+def no_trial_fails(read, cells):
+    """Count the trials of the learner that miss a goal; the claim is that there are none."""
+    trials = failed = 0
+    for task, label in cells:
+        runs = read.runs(task, label)
+        trials += int(runs.trials.sum())
+        failed += int(runs.failed_trials.sum())
+    words = f"{failed} of {number(trials)} trials of the learner fail to hit every goal"
+    return Finding(not failed, words)
+
+
+def corrective_ensures(read, cells):
+    """Count trials that fail, and hand sequences that the corrective process cannot complete."""
+    trials = no_trial_fails(read, cells)
+    rewards = np.concatenate([read.alone(task) for task in dict(cells)])
+    missed = int(np.isnan(rewards).sum())
+    return Finding(
+        trials.holds and not missed,
+        f"{trials.evidence}. Without any experience, the corrective process completes "
+        f"{len(rewards) - missed} of {len(rewards)} hand sequences",
+    )
+
+
+def corrective_near_shortest(read, tasks):
+    """Compare each subtask of the initial solutions with its shortest path in joint space."""
+    parts, most = [], 0.0
+    for name in tasks:
+        *excess, in_all = excess_over_shortest(read.task(name), read.initial_execution(name))
+        most = max(most, *excess)
+        each = ", ".join(f"{share:.1%}" for share in excess)
+        parts.append(f"{read.title(name)} {each} (in all {in_all:.1%})")
+    return Finding(
+        most <= MARGINS.close, f"Excess of each subtask over the shortest path: {'; '.join(parts)}"
+    )
+
+
+def excess_over_shortest(task, initial):
+    """Return the shares by which subtasks, and last all together, exceed the shortest paths."""
+    after = initial.configurations
+    before = np.array([task.q0, *after[:-1]])
+    shortest = np.array([
+        shortest_reach(task, q, {"L": "left", "R": "right"}[letter], goal, near)
+        for goal, (q, letter, near) in enumerate(zip(before, initial.hands, after, strict=True), 1)
+    ])  # fmt: skip
+    ways = np.linalg.norm(after - before, axis=1)
+    return [*(ways / shortest - 1).tolist(), float(ways.sum() / shortest.sum() - 1)]
+
+
+def shortest_reach(task, q, hand, goal, near):
+    """Return the least joint-space distance from ``q`` to a configuration that hits a goal.
+
+    ``goal`` counts from 1; ``near``, shape ``(dof,)``, is a configuration close to a hit.
+    Sequential quadratic programming (Kraft 1988, scipy's SLSQP) on the joints that can move the
+    hand, from ``near`` and eight random starts about it. The distance, length unit and rad mixed,
+    is the best local minimum, at least as long as the global minimum; infinite without a minimum.
+    """
+    joints, centre = movable(task, hand), np.array(task.goals[goal - 1])
+
+    def moved(change):
+        result = q.copy()
+        result[joints] += change
+        return result
+
+    def miss(change):
+        return np.asarray(task.robot.forward_kinematics(moved(change), hand) - centre)
+
+    def inside(change):
+        off = miss(change)
+        return float(task.radius**2 - off @ off)
+
+    def inside_gradient(change):
+        jacobian = task.robot.jacobian(moved(change), hand)[:, joints]
+        return np.asarray(-2 * miss(change) @ jacobian)
+
+    first = (near - q)[joints]
+    rng = np.random.default_rng(SEED)
+    best = math.inf
+    for start in (first, *(first + rng.normal(0, 0.3, (8, len(joints))))):
+        reach = scipy.optimize.minimize(
+            lambda change: (change @ change, 2 * change),
+            start,
+            jac=True,
+            method="SLSQP",
+            constraints=[{"type": "ineq", "fun": inside, "jac": inside_gradient}],
+            options={"ftol": 1e-12, "maxiter": 300},
+        )
+        if inside(reach.x) >= -1e-8:
+            best = min(best, float(np.linalg.norm(reach.x)))
+    return best
+
+
+def corrected_less_later(read, cells):
+    """Test that runs make fewer corrective movements in the last trials than in the first.
+
+    Trial 0 does not count: all its movements are corrective by construction.
+    """
+    words = "share of movements that are corrected, in the"
+    tests, parts, learned = [], [], []
+    for task, label in cells:
+        runs, goals = read.runs(task, label), len(read.task(task).goals)
+        movements = (runs.trials - 1) * goals / TENTHS
+        early, late, last = (
+            Measurement(
+                read.title(task), read.who(label), shares.to_numpy(np.float64), f"{words} {when}"
+            )
+            for shares, when in (
+                (runs.early_corrections / movements, "first tenth of the trials"),
+                (runs.late_corrections / movements, "last tenth of the trials"),
+                (runs.solution_corrections / goals, "learned solution"),
+            )
+        )
+        tests.append(bootstrap_test(early.numbers - late.numbers, 0.0))
+        parts.append((early.quantity, f"{early.name}: {early}, late {late}"))
+        learned.append((last.quantity, f"{last.name}: {last}"))
+    return all_positive(tests, parts + learned)
+
+
+def resemblance(read, task):
+    """Return the share of the initial solution's distance to the plan that each run covers."""
+    learned = read.cell(task, EC1).runs
+    (plan,) = read.cell(task, LEAST_DISPLACEMENT).runs
+    planned = plan.configurations
+
+    def distance(execution):
+        """Return the mean distance of postures at the goals, length unit and rad mixed."""
+        return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
+
+    before = distance(read.initial_execution(task))
+    shares = np.array([1 - distance(run) / before for run in learned])
+    return Measurement(
+        read.title(task), read.who(EC1), shares,
+        "share of the distance of the initial solution to the plan of minimum squared joint "
+        "displacement that learning has covered (postures at the goals)",
+    )  # fmt: skip
+
+
+def beats_smooth_plans(read, tasks, label):
+    """Test that the learner earns more than some plan for smoothness on some task."""
+    comparisons = []
+    for task in tasks:
+        learned = read.reward(task, label)
+        comparisons += [Higher(learned, read.reward(task, plan)) for plan in SMOOTH_PLANS]
+    return some_of(all_higher(comparisons))
+
+
+def some_of(every):
+    """Return the finding that some test is as claimed, with the smallest p times their number."""
+    best = min(every.tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)
+    holds = any(test.value > 0 for test in every.tests)
+    if holds:
+        best = replace(best, p=min(1.0, best.p * len(every.tests)))
+    return Finding(holds, every.evidence, (best,))
+
+
+def proficiency_rises(read):
+    """Test that each condition beats the one before, and the first beats the initial solution."""
+    comparisons = []
+    for task, cells in itertools.groupby(CELLS_OF_TWO_ARMS, itemgetter(0)):
+        rewards = [read.initial(task), *(read.reward(*cell) for cell in cells)]
+        comparisons += [Higher(higher, lower) for lower, higher in itertools.pairwise(rewards)]
+    return all_higher(comparisons)
+
+
+def resembles_the_plan(read):
+    """Test that learned postures lie less than half as far from the plan's as the initial ones."""
+    return all_higher(Higher(resemblance(read, task), by=MARGINS.halfway) for task in ONE_ARMED)
+
+
+def multilevel_search(read):
+    """Test that exploring hands as well beats exploring postures of the right hand alone."""
+    return all_higher(Higher(read.reward(task, EC3), read.reward(task, EC1)) for task in TWO_ARMED)
+
+
+def rules_of(which, cells, best):
+    """Return the rules that are the same for tasks with one arm and with two; ``best`` is the
+    condition that explores most."""
+    tasks = [*dict(cells)]
+    return {
+        f"corrective-ensures-{which}-armed": partial(corrective_ensures, cells=cells),
+        f"corrective-near-shortest-{which}-armed": partial(corrective_near_shortest, tasks=tasks),
+        f"corrections-{which}-armed": partial(corrected_less_later, cells=cells),
+        f"beats-inaccurate-{which}-armed": partial(beats_smooth_plans, tasks=tasks, label=best),
+    }
+
+
+RULES = {
+    **rules_of("one", CELLS_OF_ONE_ARM, EC1),
+    **rules_of("two", CELLS_OF_TWO_ARMS, EC4),
+    "resembles-squared-displacement": resembles_the_plan,
+    "proficiency-rises": proficiency_rises,
+    "multilevel-search": multilevel_search,
+}
+"""Rules by the ids of their claims."""

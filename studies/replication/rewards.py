@@ -1,0 +1,171 @@
+"""Learned rewards and hands, compared with the published ones."""
+
+import math
+
+import numpy as np
+import pandas as pd
+from published import RUNS, TRIALS, published_alone, published_cell
+from reader import LEARNER
+from scipy.special import stdtrit
+
+from coartic.analysis import figures
+from coartic.estimates import RESAMPLES, SEED, TAILS, Estimate, standard_deviation
+
+MARGIN = 0.01
+"""Differences up to this share of the published reward count as equivalent."""
+COLOURS = {"equivalent": figures.PALETTE[0], "different": figures.PALETTE[3]}
+COLUMNS = [
+    *("task", "condition", "hands", "published", "published_sd", "published_runs", "pooled"),
+    *("several", "ours", "ours_sd", "runs", "of_runs", "difference", "difference_low"),
+    *("difference_high", "margin", "verdict", "p_sd", "p_se", "published_initial", "ours_initial"),
+    "run_ids",
+]
+MARKS = {"equivalent": "o", "different": "D", "undecided": "s"}
+
+
+def compare_rewards(study):
+    """Compare the cells that the paper has too, and their hand sequences, in the order of the plan.
+
+    Sequences follow their cell where the paper or our runs distinguish several: those that the
+    paper publishes come first, then ours by their number of runs. Columns: ``hands`` (empty for the
+    whole cell), ``published`` mean and its ``published_sd``, ``published_runs`` (of hands 0 only
+    where all others are published), ``pooled`` (True if the published mean is one over several hand
+    sequences), ``several`` (True if the paper has rewards of several), ``ours``, ``ours_sd`` and
+    ``runs`` of our runs with a solution, ``of_runs`` of the cell, the ``difference``, ours less
+    published, with its interval, the ``margin`` of equivalence and the ``verdict``, if our runs
+    have as many trials as the paper's, and p-values of the published spread as a standard
+    deviation (``p_sd``) and as a standard error (``p_se``).
+    """
+    rows = {}
+    for (task, label), cell in study.cells.items():
+        condition, hands = label.removeprefix(LEARNER), cell.good.hands
+        published = published_cell(task, condition)
+        if published is None:
+            continue
+        complete = sum(each.published_runs or 0 for of, each in published.items() if of) == RUNS
+        several = len(published) > 1 or len(set(hands)) > 1
+        initial = published_alone(task, "initial hands")
+        ours = map(str, hands.value_counts().index) if several else ()
+        for name in dict.fromkeys(["", *published, *ours]):
+            with_hands = cell.good[hands == name] if name else cell.good
+            rewards, summary = with_hands.reward.to_numpy(np.float64), published.get(name)
+            row = {
+                "task": study.tasks[task].label + " †" * bool(study.tasks[task].reconstructed),
+                "condition": condition,
+                "hands": name,
+                "published_runs": 0 if complete else None,
+                "pooled": False,
+                "runs": len(rewards),
+                "of_runs": len(cell.good),
+                "ours": rewards.mean() if len(rewards) else math.nan,
+                "ours_sd": standard_deviation(rewards),
+                "published_initial": initial and initial.mean,
+                "ours_initial": cell.good.initial_reward.dropna().mean(),
+                "several": len(published) > 2,  # with that of the whole cell
+                "run_ids": " ".join(with_hands.run_id),
+            }
+            if summary:
+                row |= {
+                    "published": summary.mean,
+                    "published_sd": summary.sd,
+                    "published_runs": summary.published_runs,
+                    "pooled": summary.derived,
+                    "margin": MARGIN * abs(summary.mean),
+                }
+            if summary and len(rewards):
+                difference = difference_to_published(rewards, *summary[:3])
+                row |= difference.columns("difference")
+                if summary.sd is not None and not summary.derived:
+                    row["p_sd"] = spread_p(rewards, summary.sd, summary.runs)
+                    row["p_se"] = spread_p(rewards, summary.sd, summary.runs, of_mean=True)
+                if (cell.good.trials == TRIALS).all():
+                    row["verdict"] = equivalence(difference, row["margin"])
+            rows[" ".join(filter(None, (task, condition, name)))] = row
+    return pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS).rename_axis("row")
+
+
+def difference_to_published(ours, published, sd, runs):
+    """Return our mean less the published mean, with Welch's interval from the published SD and
+    number of runs.
+
+    Without a published SD (None) the published mean counts as exact, and the interval is Student's.
+    No interval for a single run; an interval of no length without spread in any sample.
+    """
+    n, value = len(ours), float(np.mean(ours)) - published
+    if n < 2:
+        return Estimate(value, n=(n,))
+    parts = [(standard_deviation(ours) ** 2 / n, n - 1)]
+    if sd is not None and runs > 1:
+        parts.append((sd**2 / runs, runs - 1))
+    total = sum(part for part, _ in parts)
+    sizes = tuple(free + 1 for _, free in parts)
+    if total == 0.0:
+        return Estimate(value, value, value, n=sizes)
+    freedom = total**2 / sum(part**2 / free for part, free in parts)
+    half = float(stdtrit(freedom, TAILS[1])) * math.sqrt(total)
+    return Estimate(value, value - half, value + half, n=sizes)
+
+
+def equivalence(difference, margin):
+    """Compare the interval of a difference with ±margin: two one-sided tests at level 2.5 %
+    (TOST; D. J. Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15).
+
+    Equivalent if the interval lies within the margin, different if it lies outside, or else
+    undecided.
+    """
+    if -margin <= difference.low and difference.high <= margin:
+        return "equivalent"
+    if difference.low > margin or difference.high < -margin:
+        return "different"
+    return "undecided"
+
+
+def spread_p(values, published, runs, *, of_mean=False):
+    """Test whether ``runs`` runs like ours could have a published spread, two-tailed.
+
+    Samples of so many of our ``values``, shape ``(n,)``, are drawn with replacement, and p is twice
+    the share whose standard deviation, or standard error of the mean with ``of_mean``, is at least
+    as far on the side of the published spread. NaN with fewer than ten values.
+    """
+    if len(values) < 10:
+        return math.nan
+    drawn = np.random.default_rng(SEED).choice(values, (RESAMPLES, runs))
+    spreads = drawn.std(axis=1, ddof=1) / (math.sqrt(runs) if of_mean else 1.0)
+    beyond = min((spreads <= published).sum(), (spreads >= published).sum())
+    return float(min(1.0, 2 * (1 + beyond) / (1 + RESAMPLES)))
+
+
+@figures.styled
+def draw_rewards(rewards):
+    """Draw the differences of mean rewards to published rewards, with intervals and margins.
+
+    ``rewards``: as :func:`compare_rewards` returns it.
+    """
+    shown = rewards[rewards.published.notna() & (rewards.several | rewards.hands.isna())]
+    figure, (axes,) = figures.panels((1, 1), (figures.ONE, 0.85 + 0.185 * len(shown)))
+    names = []
+    for y, row in zip(range(0, -len(shown), -1), shown.itertuples(), strict=True):
+        name = f"{row.task}, {row.condition}{'*' * bool(row.pooled)}"
+        if isinstance(row.hands, str):
+            published = "" if math.isnan(row.published_runs) else f"; {row.published_runs:.0f}"
+            name = f"↳ {row.hands} ({row.runs}/{row.of_runs}{published})"
+        names.append(name)
+        axes.barh(y, 2 * row.margin, 0.8, left=-row.margin, color=figures.GREY, alpha=0.2)
+        if not row.runs:
+            axes.text(1.3 * row.margin, y, "never found here", va="center", color=figures.GREY)
+            continue
+        colour, mark = COLOURS.get(row.verdict, "black"), MARKS.get(row.verdict, "x")
+        axes.plot([row.difference_low, row.difference_high], [y, y], color=colour, lw=1.0)
+        face = "white" if row.verdict == "undecided" else colour
+        axes.plot(row.difference, y, mark, color=colour, markersize=4, markerfacecolor=face)
+    axes.axvline(0, color="black", linewidth=0.6)
+    axes.set_yticks(range(0, -len(shown), -1), names)
+    axes.set_ylim(0.4 - len(shown), 0.6)
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    # Symmetric about zero: wide enough for every interval and margin.
+    ends = shown[["difference", "difference_low", "difference_high", "margin"]]
+    reach = np.nanmax(np.abs(ends.to_numpy(float)))
+    axes.set_xlim(-1.05 * reach, 1.05 * reach)
+    axes.set_xlabel("reward, ours − published")
+    return figure

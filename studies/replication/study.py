@@ -1,0 +1,95 @@
+"""What of Shah, Barto & Fagg (2013) comes out again?
+
+    coartic run comparison --out results/comparison
+    python studies/replication/study.py results/comparison [FOLDER ...] [--out FOLDER]
+
+judges the paper's claims and compares its rewards and hands with ours. The folder of suite
+``comparison`` comes first; claims for which it has no runs are judged by the folders that follow,
+of suites ``ablations`` and ``families``. Writes claims.csv, rewards.csv, solutions.csv,
+rewards.svg, solutions.svg and page.html into the folder ``--out``; without it, the tables without
+ids of runs, the figures and README.md into this folder. Without folders: figures and page, of the
+stored tables.
+"""
+
+import argparse
+from pathlib import Path
+
+import pandas as pd
+from claims import CLAIMS, judge_claims
+from markdown_it import MarkdownIt
+from rewards import compare_rewards, draw_rewards
+from solutions import draw_solutions, measure_solutions
+
+from coartic.analysis import figures, fill_page, load
+
+HERE = Path(__file__).parent
+
+
+def measure(folders):
+    """Measure results folders: tables ``claims``, ``rewards`` and ``solutions``.
+
+    Column ``suite`` of the claims is the suite whose runs judge the claim; empty without runs.
+    """
+    studies = [load(folder) for folder in folders]
+    return {
+        "claims": judge_by_first(studies),
+        "rewards": compare_rewards(studies[0]),
+        "solutions": measure_solutions(studies[0]),
+    }
+
+
+def judge_by_first(studies):
+    """Judge each claim by the first study that has runs for it."""
+    first, *others = (
+        judged.assign(suite=judged.run_ids.where(judged.run_ids == "", study.suite))
+        for study in studies
+        for judged in [judge_claims(study, CLAIMS.index)]
+    )
+    for judged in others:
+        lacking = first.index[first.suite == ""]
+        first.loc[lacking] = judged.loc[lacking]
+    return first
+
+
+def with_stored(claims):
+    """Return claims with the stored ones in place of claims for which there were no runs."""
+    lacking = claims.index[claims.suite == ""]
+    stored = pd.read_csv(HERE / "claims.csv", index_col=0).reindex(lacking)
+    return pd.concat([claims.drop(lacking), stored]).reindex(CLAIMS.index)
+
+
+def write(out):
+    """Draw the figures and fill in the page, from the tables in a folder; as HTML, with the
+    evidence of each claim, in another folder than this."""
+    stored = {path.stem: pd.read_csv(path, index_col=0) for path in out.glob("*.csv")}
+    for name, draw in (("rewards", draw_rewards), ("solutions", draw_solutions)):
+        (out / f"{name}.svg").write_bytes(figures.picture(draw(stored[name]), ".svg"))
+    if out == HERE:
+        text = fill_page(HERE / "README.md.jinja", **stored)
+        (out / "README.md").write_text(text, encoding="utf-8")
+    else:
+        text = fill_page(HERE / "page.md.jinja", **stored)
+        body = MarkdownIt("commonmark", {"html": True}).enable("table").render(text)
+        page = (HERE / "page.html").read_text("utf-8").replace("{{ body }}", body)
+        (out / "page.html").write_text(page, encoding="utf-8")
+
+
+def main():
+    """Measure the folders, if there are any, and write tables, figures and page."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folders", nargs="*", type=Path, help="results folders, comparison first")
+    parser.add_argument("--out", type=Path, default=HERE, help="folder of tables and page")
+    asked = parser.parse_args()
+    asked.out.mkdir(parents=True, exist_ok=True)
+    tables = measure(asked.folders) if asked.folders else {}
+    if tables and asked.out == HERE:
+        tables["claims"] = with_stored(tables["claims"])
+        tables = {name: table.drop(columns="run_ids", errors="ignore")
+                  for name, table in tables.items()}  # fmt: skip
+    for name, table in tables.items():
+        table.to_csv(asked.out / f"{name}.csv", float_format="%.6g", lineterminator="\n")
+    write(asked.out)
+
+
+if __name__ == "__main__":
+    main()

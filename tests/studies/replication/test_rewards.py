@@ -1,0 +1,145 @@
+"""Rewards, spreads and solutions against planted runs and known tests."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from coartic import corrective_trial, initial_hands, load_task
+from coartic.estimates import Estimate
+from tests.support.made_up import runs_of, study_of
+from tests.support.processes import program
+from tests.support.suites import ROOT
+
+FOLDER = ROOT / "studies" / "replication"
+REWARDS, SOLUTIONS, STUDY = (
+    program(FOLDER / f"{name}.py") for name in ("rewards", "solutions", "study")
+)
+
+
+def test_solutions_are_of_the_run_with_the_median_reward(traced):
+    data = SOLUTIONS.measure_solutions(traced)
+    ticks = -data.groupby(["task", "condition"], sort=False).reward.sum()
+    for (name, condition), of_run in ticks.items():
+        if condition == "initial":
+            assert of_run == corrective_trial(name, initial_hands(name)).ticks
+        else:
+            rewards = traced.cells[name, f"dual-process/{condition}"].rewards
+            assert -of_run in rewards
+            assert (rewards < -of_run).sum() <= len(rewards) / 2 >= (rewards > -of_run).sum()
+    for hit in data.to_dict("records"):
+        task = load_task(hit["task"])
+        q = [hit[joint] for joint in task.robot.joint_names]
+        hand = task.robot.forward_kinematics(q, {"L": "left", "R": "right"}[hit["hand"]])
+        assert np.hypot(*(hand - task.goals[hit["goal"] - 1])) <= task.radius
+
+
+def test_published_differences():
+    hands = ["RRRR", "RRRR", "LRLR"]
+    planted = study_of(
+        runs_of(
+            "two-armed-1",
+            "dual-process/EC2",
+            [-610, -606, -500],
+            hands=hands,
+            trials=10_000,
+            initial_reward=-671,
+        )
+    )
+    rewards = REWARDS.compare_rewards(planted)
+    assert rewards.index[0] == "two-armed-1 EC2"
+    data = rewards.set_index("hands")
+    assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
+    assert data.verdict[""] == "undecided"  # also of a mean over sequences
+    assert data.difference["RRRR"] == pytest.approx(1.0)
+    assert np.isnan(data.difference["RRLR"])
+    assert data.runs.to_dict() == {"": 3, "RRLR": 0, "RRRR": 2, "LRLR": 1}
+    assert not rewards.hands.isna().any()
+
+
+def test_numbers_are_made_again_from_the_runs(traced):
+    rewards = REWARDS.compare_rewards(traced)
+    assert len(rewards) > 5
+    by_id = traced.runs.set_index("run_id").reward.astype(float)
+    for row in rewards[rewards.runs > 0].itertuples():
+        ours = by_id[row.run_ids.split()]
+        assert len(ours) == row.runs
+        assert row.ours == pytest.approx(ours.mean())
+        assert row.ours_sd == pytest.approx(ours.std(), nan_ok=True)
+        assert row.difference == pytest.approx(ours.mean() - row.published, nan_ok=True)
+
+
+def test_the_page_of_a_folder_has_verdicts_evidence_and_what_is_missing(traced, tmp_path):
+    tables = STUDY.measure([traced.folder])
+    for name, table in tables.items():
+        table.to_csv(tmp_path / f"{name}.csv")
+    STUDY.write(tmp_path)
+    page = (tmp_path / "page.html").read_text("utf-8")
+    assert "Not judged, for lack of runs: " in page
+    assert "learning improves in general" in page
+    assert (
+        page.count("<details>") == page.count("<p>Test: ") == (tables["claims"].suite != "").sum()
+    )
+    assert "<table>" in page
+    assert (tmp_path / "solutions.svg").read_bytes().count(b"<path") > 20
+
+
+def test_stored_claims_on_families_are_of_suite_families():
+    claims = pd.read_csv(FOLDER / "claims.csv", index_col=0)
+    assert (claims.suite == "families").sum() == claims.index.str.endswith("-in-general").sum()
+
+
+def test_spreads_against_normal_samples():
+    """Of normal values the SD of n runs has a chi-square distribution."""
+    values = np.random.default_rng(1).normal(0, 3, 4000)
+    for runs, published in ((20, 3.0), (20, 2.0), (9, 4.2), (20, 4.6)):
+        below = stats.chi2.cdf((runs - 1) * (published / values.std(ddof=1)) ** 2, runs - 1)
+        due = 2 * min(below, 1 - below)
+        assert REWARDS.spread_p(values, published, runs) == pytest.approx(due, abs=0.03)
+        of_mean = REWARDS.spread_p(values, published / np.sqrt(runs), runs, of_mean=True)
+        assert of_mean == pytest.approx(due, abs=0.03)
+    assert REWARDS.spread_p(values, 0.5, 20) < 0.001
+    assert np.isnan(REWARDS.spread_p(values[:9], 3.0, 20))
+
+
+def test_interval_against_an_exact_value_is_students():
+    ours = np.random.default_rng(14).normal(-484, 4, 12)
+    interval = REWARDS.difference_to_published(ours, -484, None, 20)
+    one_run = REWARDS.difference_to_published(ours, -484, 3.0, 1)  # has no spread
+    assert repr(one_run) == repr(interval)  # NaN, too
+    expected = stats.ttest_1samp(ours, -484).confidence_interval(0.95)
+    assert (interval.low, interval.high) == pytest.approx((expected.low + 484, expected.high + 484))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (-5.0, 5.0, "equivalent"),
+        (-5.1, 5.0, "undecided"),
+        (-5.0, 5.1, "undecided"),
+        (5.0, 9.0, "undecided"),  # it may be at the margin
+        (5.1, 9.0, "different"),
+        (-9.0, -5.0, "undecided"),
+        (-9.0, -5.1, "different"),
+        (math.nan, math.nan, "undecided"),
+    ],
+)
+def test_verdicts(low, high, expected):
+    assert REWARDS.equivalence(Estimate(0.0, low, high), 5.0) == expected
+
+
+def test_interval_of_two_samples_is_welchs():
+    rng = np.random.default_rng(15)
+    ours, theirs = rng.normal(-503, 5, 20), rng.normal(-502, 3, 15)
+    expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
+    published = REWARDS.difference_to_published(ours, theirs.mean(), theirs.std(ddof=1), 15)
+    assert published.n == (20, 15)
+    assert (published.low, published.high) == pytest.approx((expected.low, expected.high))
+
+
+def test_degenerate_samples_against_published_ones():
+    assert math.isnan(REWARDS.difference_to_published([1.0], 2.0, 1.0, 3).low)
+    point = REWARDS.difference_to_published(np.ones(4), 3.0, 0.0, 4)
+    assert (point.low, point.high) == (-2.0, -2.0)

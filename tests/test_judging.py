@@ -1,0 +1,64 @@
+"""Verdicts on planted findings, and tests of planted means over tasks."""
+
+import pytest
+
+from coartic.analysis.judging import Finding, judge
+from coartic.estimates import Estimate
+
+NAN = float("nan")
+
+
+def found(holds, *p, against=None, n=20):
+    """A finding with tests of these p-values."""
+    tests, contrary = (
+        None if each is None else tuple(Estimate(1.0, p=p, n=(n,), resamples=9_999) for p in each)
+        for each in (p, against)
+    )
+    return Finding(holds, "planted", tests, contrary)
+
+
+def judged(*findings):
+    """Planted findings judged together."""
+    return judge({f"planted-{n}": ("It is so.", "exact", each) for n, each in enumerate(findings)})
+
+
+@pytest.mark.parametrize(
+    ("finding", "verdict"),
+    [
+        (found(True, 0.001), "supported"),
+        (found(True), "supported"),
+        (found(True, NAN), "supported"),  # no spread, no doubt
+        (found(True, NAN, n=1), "undecided"),  # one value decides nothing
+        (found(True, 0.2), "undecided"),
+        (found(True, 0.001, 0.2), "undecided"),
+        (found(False, 0.7), "undecided"),
+        (found(False, 0.97), "not supported"),
+        (found(False, 0.94), "undecided"),
+        (found(False, 0.001, 0.99), "not supported"),
+        (found(False, 0.5, 0.97), "undecided"),  # the contrary of one of two
+        (found(False, 0.7, against=[0.01]), "not supported"),
+        (found(False, 0.7, against=[0.06]), "undecided"),
+        (found(False, 0.99, against=[]), "undecided"),  # a test without a contrary side
+        (found(True, 0.2, against=[0.01]), "undecided"),
+        (found(False), "not supported"),
+        (found(None), "undecided"),
+    ],
+)
+def test_verdicts(finding, verdict):
+    assert judged(finding).verdict.tolist() == [verdict]
+
+
+def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
+    """0.03 alone is significant, and is not with two other claims (Holm 1979)."""
+    entries = judged(found(True, 0.03), found(True, 0.001), found(True, 0.02, 0.04))
+    assert entries.p_holm.tolist() == pytest.approx([0.06, 0.003, 0.06])
+    assert entries.verdict.tolist() == ["undecided", "supported", "undecided"]
+
+
+def test_opposites_are_corrected_over_the_claims_too():
+    findings = [found(False, p) for p in (0.96, 0.975, 0.999)]
+    opposite = [finding.opposite_p for finding in findings]
+    assert opposite == pytest.approx([0.0401, 0.0251, 0.0011])
+    entries = judged(*findings)
+    assert entries.verdict.tolist() == ["undecided", "undecided", "not supported"]
+    assert entries.opposite_p_holm.tolist() == pytest.approx([0.0502, 0.0502, 0.0033])
