@@ -41,17 +41,17 @@ def judge_claims(study, names):
 
     Returns a row for each claim, as :func:`coartic.analysis.judge` does, with ``run_ids`` of the
     runs that the claim read; ``sets``, the number of sets of goals that support and refute it;
-    ``place`` and ``quote`` of the paper. The evidence of a claim for which the folder lacks runs
-    begins with "Not judged".
+    ``place`` and ``quote`` of the paper; ``suite``, empty for a claim for which the folder lacks
+    runs or tasks.
     """
-    findings, run_ids = {}, {}
+    findings, run_ids, suites = {}, {}, {}
     for name in names:
         read = Reader(study)
         try:
             findings[name] = RULES[name](read)
-            run_ids[name] = " ".join(dict.fromkeys(read.run_ids))
+            run_ids[name], suites[name] = " ".join(dict.fromkeys(read.run_ids)), study.suite
         except MissingError as missing:
-            findings[name], run_ids[name] = Finding(None, str(missing)), ""
+            findings[name] = Finding(None, str(missing))
     claims = CLAIMS.loc[names]
     judged = pd.concat(
         judge({name: (claim.text, claim.test, findings[name]) for name, claim in group.iterrows()})
@@ -68,7 +68,8 @@ def judge_claims(study, names):
             sets=[*map(sets_in_words, names)],
             place=claims.place,
             quote=claims.quote,
-            run_ids=pd.Series(run_ids),
+            suite=[suites.get(name, "") for name in names],
+            run_ids=[run_ids.get(name, "") for name in names],
         )
         .drop(columns="p_without")
         .rename_axis("row")

@@ -94,5 +94,7 @@ def draw_posture(axes, task, q, colour, marked=""):
                   markersize=2, markeredgewidth=0.5, **marks)  # fmt: skip
     for number, (x, y) in enumerate(task.goals, 1):
         axes.add_patch(Circle((x, y), task.radius, fill=False, linewidth=0.4))
-        axes.annotate(str(number), (x, y + task.radius), (0, 1), textcoords="offset points",
-                      ha="center", va="bottom", fontsize=5)  # fmt: skip
+        below = any(0 < up - y < 0.6 and abs(right - x) < 0.3 for right, up in task.goals)
+        side, va = (-1, "top") if below else (1, "bottom")
+        axes.annotate(str(number), (x, y + side * task.radius), (0, side), ha="center", va=va,
+                      textcoords="offset points", fontsize=5)  # fmt: skip

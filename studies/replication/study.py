@@ -40,11 +40,7 @@ def measure(folders):
 
 def judge_by_first(studies):
     """Judge each claim by the first study that has runs for it."""
-    first, *others = (
-        judged.assign(suite=judged.run_ids.where(judged.run_ids == "", study.suite))
-        for study in studies
-        for judged in [judge_claims(study, CLAIMS.index)]
-    )
+    first, *others = (judge_claims(study, CLAIMS.index) for study in studies)
     for judged in others:
         lacking = first.index[first.suite == ""]
         first.loc[lacking] = judged.loc[lacking]
