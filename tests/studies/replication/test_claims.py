@@ -3,7 +3,6 @@
 import importlib
 import re
 import tomllib
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +14,6 @@ from coartic.analysis import judge
 from coartic.analysis.judging import Finding
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
-from coartic.analysis.study import Study
 from coartic.estimates import Estimate
 from tests.support.made_up import row, runs_of, study_of, study_of_solutions
 from tests.support.processes import program
@@ -34,11 +32,6 @@ NAN = float("nan")
 ONE_ARMED = ("ascending", "descending")
 T1, T2 = "two-armed-1", "two-armed-2"
 RANDOM_SEARCH = "random-search"
-
-
-def nothing():
-    """A study of a folder without runs."""
-    return Study(Path("none"), [], {}, pd.DataFrame())
 
 
 def found(holds, *p, against=None, n=20):
@@ -62,7 +55,7 @@ def judged(monkeypatch, planted):
         return decide
 
     monkeypatch.setattr(claims, "RULES", {name: rule(each) for name, each in planted.items()})
-    return claims.judge_claims(nothing(), [*planted])
+    return claims.judge_claims(SimpleNamespace(suite="planted"), [*planted])
 
 
 @pytest.mark.parametrize(
