@@ -23,7 +23,6 @@ _MODULES = {
     "means": "analysis.frames",
     "other_tasks": "analysis.statistics.instances",
     "ranking": "analysis.frames",
-    "separation": "analysis.frames",
     "shares": "analysis.frames",
     "solutions_of": "analysis.frames",
     "runtimes": "analysis.sections.costs",

@@ -32,7 +32,7 @@ ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
     "comparison": (
         "beside-random-search claims contexts hands learning methods runtimes published ranking "
-        "scores separation signatures tasks",
+        "scores signatures tasks",
         "postures published ranking runtimes learning-curves solutions",
     ),
     "ablations": ("methods signatures claims", ""),

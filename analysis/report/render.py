@@ -43,7 +43,6 @@ IN_LATEX = {
     "published": "task, condition, published, ours, runs, difference, verdict",
     "claims": "statement, verdict, p_holm",
     "ranking": "method, gap, on *",
-    "settings": "method, setting, gap, tasks, comparison, p_holm",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "hands": "task, condition, hands, published, ours, runs",
     "learning": "task, method, runs, after_*, trials_to_half_gain",
