@@ -27,7 +27,6 @@ from coartic.analysis.report.render import (
     latex_table,
     table_csv,
 )
-from coartic.analysis.report.trace import stamp
 from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.sections.ranking import differences
 from coartic.analysis.study import Study, cached
@@ -35,6 +34,7 @@ from coartic.analysis.table import Table
 from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, make_folder, publish
 from coartic.play.page import part_of_page
+from coartic.runs.plan import hash_of
 
 HERE = Path(__file__).parent
 NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "claims": [], "finding": [], "figure": None}
@@ -126,11 +126,15 @@ def parts_of(section: Section, study: Study) -> dict[str, Any]:
         "rows": len(frame),
         "settings": sum("setting" in names for names in classes_of(table, frame)),
         "html": html_table(table, frame, section.caption) if len(frame) else "",
-        "example": f"'{frame.index[0]}'" if len(frame) else "",
         "finding": about.finding(study, section),
         "figure": plot,
         "svg": for_page(plot) if plot else "",
     }
+
+
+def stamp(runs: pd.DataFrame) -> str:
+    """Return the hash of the results of runs, by which a report identifies its runs."""
+    return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
 def page(study: Study, home: str) -> str:

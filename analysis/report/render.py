@@ -64,7 +64,7 @@ MOST_ROWS = 50
 
 def table_csv(frame: pd.DataFrame) -> str:
     """Return a table as CSV, with an apostrophe before text that a spreadsheet would take for a
-    formula; :func:`.trace.rows_of` reads it."""
+    formula."""
     return frame.map(guarded).rename(index=guarded).to_csv(lineterminator="\n")
 
 
