@@ -20,7 +20,6 @@ from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import (
     IN_LATEX,
-    MOST_ROWS,
     TONES,
     classes_of,
     html_table,
@@ -79,7 +78,7 @@ def files_of_table(table: Table, caption: str, for_paper: bool, study: Study) ->
     if not len(frame):
         return {}
     files = {f"tables/{table.id}.csv": table_csv(frame).encode()}
-    if for_paper and table.id in IN_LATEX and len(frame) <= MOST_ROWS:
+    if for_paper and table.id in IN_LATEX:
         text = latex_table(table, frame, caption, about.notes_of(study, frame.columns))
         files[f"tables/{table.id}.tex"] = text.encode()
     return files
