@@ -32,11 +32,11 @@ ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
     "comparison": (
         "beside-random-search claims contexts hands learning methods runtimes published ranking "
-        "scores signatures tasks",
+        "scores",
         "postures published ranking runtimes learning-curves solutions",
     ),
-    "ablations": ("methods signatures claims", ""),
-    "families": ("family-gaps claims", "gaps-by-family"),
+    "ablations": ("claims", ""),
+    "families": ("family-gaps claims", ""),
 }
 """Tables and figures that are kept of each suite's report."""
 
