@@ -24,7 +24,6 @@ _MODULES = {
     "number": "analysis.words",
     "other_tasks": "analysis.statistics.instances",
     "ranking": "analysis.frames",
-    "separation": "analysis.frames",
     "shares": "analysis.frames",
     "solutions_of": "analysis.frames",
     "runtimes": "analysis.sections.costs",

@@ -9,13 +9,11 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
 import pandas as pd
-import scipy
 from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
@@ -27,14 +25,11 @@ from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
-from coartic.robot import Array
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
-CEILING, FLOOR = 0.95, 0.05
-"""Shares of the possible gain from which, and up to which, a task separates little."""
 
 
 def checked(
@@ -291,74 +286,6 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         })  # fmt: skip
     methods = pd.Index(frame.method.unique(), name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
-
-
-def separation(frame: pd.DataFrame) -> pd.DataFrame:
-    """Count, by task, the pairs of methods that it separates.
-
-    Two methods are separated where their rewards differ by a two-tailed Mann-Whitney test,
-    corrected for the pairs of the task (Bonferroni); a single run, such as that of a planner, where
-    at most 2.5 % of the other method's runs are on its wrong side or level with it.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        With columns ``method``, ``task``, ``reward``, ``best_known`` and ``corrective_best``, as in
-        :func:`ranking`.
-
-    Returns
-    -------
-    DataFrame
-        A row for each task, by its name: ``methods`` that solved all of their runs, ``pairs`` of
-        them, ``separated`` pairs, and the number of methods ``at_ceiling`` and ``at_floor``: with
-        more than 95 % and with less than 5 % of the possible gain in the mean; -1 where nothing can
-        be gained.
-
-    Raises
-    ------
-    CoarticError
-        As :func:`ranking` does.
-
-    Examples
-    --------
-    >>> frame = pd.DataFrame(
-    ...     {"method": ["a", "b", "c"], "task": "ascending", "reward": [-292, -300, -300],
-    ...      "best_known": -292, "corrective_best": -319}
-    ... )
-    >>> separation(frame)
-               methods  pairs  separated  at_ceiling  at_floor
-    task
-    ascending        3      3          2           1         0
-    """
-    checked(frame, numbers=[ZERO])
-    columns, rows = scored(frame).assign(name=frame.task), {}
-    for _, of_task in columns.groupby("task"):
-        runs = {
-            method: cell.reward.to_numpy(np.float64)
-            for method, cell in of_task.groupby("method", sort=False)
-            if cell.reward.notna().all()
-        }
-        share = of_task[of_task.method.isin(runs)].groupby("method").share.mean()
-        pairs = [*itertools.combinations(runs.values(), 2)]
-        gain = bool(share.notna().any())
-        rows[of_task["name"].iloc[0]] = {
-            "methods": len(runs),
-            "pairs": len(pairs),
-            "separated": sum(are_separated(*pair, 0.05 / len(pairs)) for pair in pairs),
-            "at_ceiling": int((share > CEILING).sum()) if gain else -1,
-            "at_floor": int((share < FLOOR).sum()) if gain else -1,
-        }
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("task")
-
-
-def are_separated(first: Array, second: Array, level: float) -> bool:
-    """Return whether rewards of two methods differ, ``(n,)`` and ``(m,)``; see
-    :func:`separation`."""
-    few, many = sorted((first, second), key=len)
-    if len(few) > 1:
-        return bool(scipy.stats.mannwhitneyu(few, many, alternative="two-sided").pvalue < level)
-    most = 0.025 * len(many)
-    return bool(min((many >= few[0]).sum(), (many <= few[0]).sum()) <= most)
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:

@@ -60,30 +60,22 @@ def cells_on(study: Study, method: str, tasks: Iterable[str]) -> list[CellRuns]:
     return cells if on_all and {c.label for c in cells} == {*study.methods.parts[method]} else []
 
 
-def widest_tasks(
-    study: Study, ran_on: Iterable[tuple[str, Iterable[str]]], least: int = 1
-) -> tuple[str, ...]:
-    """Return the tasks for means: all tasks, unless too few methods ran on all of them.
+@cached
+def common_tasks(study: Study) -> tuple[str, ...]:
+    """Return the tasks over which algorithms are compared: all tasks, unless too few algorithms ran
+    on all of them.
 
-    ``ran_on`` has names and the tasks on which each ran. Of these sets of tasks, the set with the
-    most pairs of a task and a name that ran on all tasks of the set, preferably with ``least``
-    names or more.
+    Of the sets of tasks on which one method ran, the set with the most pairs of a task and an
+    algorithm that ran on all tasks of the set.
     """
-    sets = [(name, {*tasks}) for name, tasks in ran_on]
+    sets = [(study.methods.algorithm[m], {*cells}) for m, cells in compared(study).items()]
 
-    def pairs(tasks: set[str]) -> tuple[bool, int, int]:
-        names = len({name for name, on in sets if on >= tasks})
-        return names >= least, len(tasks) * names, len(tasks)
+    def pairs(tasks: set[str]) -> tuple[int, int]:
+        algorithms = len({algorithm for algorithm, on in sets if on >= tasks})
+        return len(tasks) * algorithms, len(tasks)
 
     widest = max((tasks for _, tasks in sets), key=pairs, default=set())
     return tuple(task for task in study.tasks if task in widest)
-
-
-@cached
-def common_tasks(study: Study) -> tuple[str, ...]:
-    """Return the tasks over which algorithms are compared (:func:`widest_tasks`)."""
-    algorithms = study.methods.algorithm
-    return widest_tasks(study, ((algorithms[m], cells) for m, cells in compared(study).items()))
 
 
 @cached

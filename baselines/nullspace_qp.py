@@ -13,7 +13,6 @@ step longer than a control step may be; then all of it is shortened, and the han
 slower. Level 2 takes the x nearest to
 
 - ``least-motion``: 0, so that x = v J⁺ u;
-- ``smooth``: the joint changes of the control step before;
 - ``next-goal-posture``: an even step towards a posture of the next goal, which would be there when
   the hand is at its goal, and no longer than a control step. The corrective process finds the
   posture from where the robot stands when the goal becomes current.
@@ -34,14 +33,12 @@ from coartic.robot import Array
 
 
 class HandController(Controller):
-    """Move the hand straight to its goal; base of the controllers with an objective.
-
-    The memory is the joint changes of the control step before, shape ``(joints,)``.
-    """
+    """Move the hand straight to its goal with the least joint changes; base of the controllers that
+    prefer other changes. The memory is a posture, shape ``(dof,)``."""
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return the changes of the last control step, zeros at the start."""
-        return np.zeros(len(self.moving)) if memory is None else memory
+        """Return the posture at the beginning of a leg."""
+        return q
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
@@ -56,27 +53,11 @@ class HandController(Controller):
         preferred = self.preferred(q, memory, steps)
         rows = np.vstack([jacobian, -jacobian])
         solution = self.solve(rows, rows @ np.linalg.pinv(jacobian) @ direction * pace, preferred)
-        return solution, preferred, self.remembered(solution, memory)
+        return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
         """Return the changes that the joints prefer, with so many control steps to come."""
         return np.zeros(len(self.moving))
-
-    def remembered(self, solution: Solution, memory: Array) -> Array:
-        """Return the memory after a step."""
-        return memory
-
-
-class SmoothController(HandController):
-    """Change the joint rates as little as the hand allows."""
-
-    def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the changes of the control step before."""
-        return memory
-
-    def remembered(self, solution: Solution, memory: Array) -> Array:
-        """Return the changes as they are made: no longer than a control step."""
-        return solution.changes / max(1.0, float(np.linalg.norm(solution.changes)))
 
 
 class NextGoalController(HandController):
@@ -119,16 +100,6 @@ class LeastMotion(Control):
     controller = HandController
 
 
-class Smooth(LeastMotion):
-    """Null-space control with joint changes near those of the control step before."""
-
-    name = "nullspace-qp/smooth"
-    title = "Prioritised null-space QP, smooth"
-    information = LeastMotion.information | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("joint changes near those of the control step before",)
-    controller = SmoothController
-
-
 class NextGoalPosture(LeastMotion):
     """Null-space control towards a posture of the next goal."""
 
@@ -149,4 +120,4 @@ class NextGoalPosture(LeastMotion):
     goals_ahead = 1
 
 
-METHODS: tuple[type[Control], ...] = (LeastMotion, Smooth, NextGoalPosture)
+METHODS: tuple[type[Control], ...] = (LeastMotion, NextGoalPosture)

@@ -29,7 +29,7 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
     if not prefix or not set(prefix) <= set("0123456789abcdef-"):
         raise CoarticError(
             f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c: "
-            "`coartic trace` names the runs of a table."
+            "column run_ids of a report's tables names the runs of each row."
         )
     folder_of: dict[str, Path] = {}
     for path in sorted(folder.rglob(RUNS_FILE)):

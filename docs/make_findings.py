@@ -29,12 +29,10 @@ STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
 KEPT = {
     "comparison": (
-        "beside-random-search contexts learning methods runtimes ranking scores separation "
-        "signatures tasks",
+        "beside-random-search contexts learning methods runtimes ranking scores",
         "postures ranking runtimes learning-curves",
     ),
-    "ablations": ("methods signatures", ""),
-    "families": ("family-gaps", "gaps-by-family"),
+    "families": ("family-gaps", ""),
 }
 """Tables and figures that are kept of each suite's report."""
 

@@ -294,7 +294,7 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
 
 
 def test_help_has_a_short_name(coartic):
-    for command in ((), ("run",), ("trace",)):
+    for command in ((), ("run",), ("report",)):
         assert coartic(*command, "-h") == coartic(*command, "--help") == coartic("help", *command)
 
 

@@ -292,21 +292,3 @@ def test_the_share_of_the_possible_gain_by_hand():
     assert frames.shares(planted)[planted.task == "nothing"].isna().all()
     with pytest.raises(coartic.CoarticError, match="corrective_best has -290.* above best_known"):
         frames.shares(planted.assign(corrective_best=-290))
-
-
-def test_which_tasks_separate_methods():
-    separated = frames.separation(planted_scores())
-    assert separated.pairs.tolist() == [3, 3, 3]
-    assert separated.separated.to_dict() == {"near": 3, "far": 3, "nothing": 2}
-    assert separated.at_ceiling.to_dict() == {"near": 1, "far": 1, "nothing": -1}
-    assert separated.at_floor.to_dict() == {"near": 1, "far": 1, "nothing": -1}
-    few = planted_scores().groupby(["method", "task"]).head(3)  # no test of 3 + 3 runs is so sure
-    assert frames.separation(few).separated.to_dict() == {"near": 2, "far": 2, "nothing": 1}
-
-
-@pytest.mark.parametrize(("single", "separated"), [(-310, 0), (-312, 0), (-314, 1)])
-def test_a_single_run_is_separated_where_it_is_beyond_nearly_all_others(single, separated):
-    """Of -313 to -308, one for each tick; -312 has one beyond it."""
-    both = planted_scores().query("task == 'near' and method != 'best'")
-    both.loc[both.method == "planner", "reward"] = single
-    assert frames.separation(both).separated.tolist() == [separated]

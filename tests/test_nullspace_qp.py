@@ -5,7 +5,7 @@ import pytest
 
 from coartic import Robot, load_task
 from coartic.baselines.controllers import Aim
-from coartic.baselines.nullspace_qp import METHODS, HandController, LeastMotion, Smooth
+from coartic.baselines.nullspace_qp import METHODS, HandController, LeastMotion
 from coartic.method import Session
 from tests.support.strategies import changed, solve
 
@@ -66,30 +66,15 @@ def test_the_hand_goes_straight_as_fast_as_a_step_in_joint_space_allows(method):
         q = at_hit
 
 
-def test_smooth_steps_are_near_the_step_before():
-    """Each as it is stated for the changes of the step before, as they were made."""
-    task, length = load_task("two-armed-1"), 0.05
-    free = np.delete(np.arange(ROBOT.dof), 1)
-    movement = solve(Smooth, task)[0].solution[2]
-    made = np.diff(movement.waypoints, axis=0)[:, free] / length
-    for k in range(1, len(made)):
-        q = movement.waypoints[k]
-        jacobian = ROBOT.jacobian(q, movement.hand)[:, free]
-        error = task.goal_array[2] - ROBOT.forward_kinematics(q, movement.hand)
-        velocity = error / np.linalg.norm(np.linalg.pinv(jacobian) @ error)
-        x = stated(jacobian, velocity, made[k - 1])
-        np.testing.assert_allclose(made[k], x / max(1, np.linalg.norm(x)), rtol=0, atol=5e-3)
-
-
 def test_the_next_goal_changes_the_posture_as_its_objective_asks():
     tasks = [load_task(name) for name in ("ascending", "descending")]
-    assert [solve(method, tasks[0])[1].reward for method in METHODS] == [-326, -343, -304]
+    assert [solve(method, tasks[0])[1].reward for method in METHODS] == [-326, -304]
     shifts = [
         np.linalg.norm(np.subtract(*(solve(method, t)[1].configurations[0] for t in tasks)))
         for method in METHODS
     ]
-    assert shifts[0] == shifts[1] == 0
-    assert shifts[2] > 0.3
+    assert shifts[0] == 0
+    assert shifts[1] > 0.3
 
 
 def test_how_often_the_levels_bind_is_counted():

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from coartic import MotionModel, Movement, execute, learn, load_task, trajectory
-from coartic.baselines.random_search import RandomSearch
 from coartic.learner.conditions import load_condition
 from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play.page import FOLDER
@@ -20,7 +19,6 @@ from tests.support.strategies import (
     make_trials,
     sample,
     shipped_optima,
-    solve,
     uneven_task,
 )
 
@@ -214,33 +212,6 @@ def test_initial_hands_follow_the_policy(name):
         script = "(task) => coartic.letters_of(coartic.initial_hands(coartic.problem_of(task)))"
         assert node(script, content(task)) == initial_hands(task)
     assert len(hand_sequences(task)) > 2
-
-
-RANDOM_SEARCH = """(task, seeds, trials) => {
-  const problem = coartic.problem_of(task);
-  return seeds.map((seed) => {
-    const search = new coartic.RandomSearch(problem, seed);
-    const { trials: first } = search;
-    const rewards = [];
-    while (search.trials < trials) {
-      search.step();
-      rewards.push(search.learned().reward);
-    }
-    return { first, reached: search.learned().reached, rewards };
-  });
-}"""
-
-
-@pytest.mark.parametrize("name", ["descending", "two-armed-1"])
-def test_random_search_draws_and_keeps_what_the_packages_does(name):
-    task, seeds, trials = load_task(name), [0, 5], 2000
-    for seed, run in zip(seeds, node(RANDOM_SEARCH, content(task), seeds, trials), strict=True):
-        result, _, session = solve(RandomSearch, task, seed, trials=trials)
-        solution = execute(task, result.solution)
-        best_so_far = np.maximum.accumulate(session.rewards)
-        assert run["rewards"] == best_so_far[run["first"] :].tolist()
-        assert run["rewards"][0] < run["rewards"][-1]
-        np.testing.assert_allclose(run["reached"], solution.configurations, rtol=0, atol=1e-9)
 
 
 PLAN = """(task, horizons) => {

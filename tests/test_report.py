@@ -14,15 +14,12 @@ from coartic import CoarticError, Task, load_task
 from coartic.analysis.methods import title_of
 from coartic.analysis.report import about, render
 from coartic.analysis.report.about import answers, attempt, limits
-from coartic.analysis.report.build import write_report
+from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.player import methods_played, player
-from coartic.analysis.report.trace import read_table, runs_behind, tables_of
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.study import Study
-from coartic.analysis.table import SHORT_ID
-from coartic.runs.store import RUNS_FILE
 from tests.support import made_up
-from tests.support.suites import KNOWN, cell_on, cells_of, edit, run_and_write, suite_of
+from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write, suite_of
 
 
 @pytest.fixture(scope="module")
@@ -49,44 +46,27 @@ def test_numbers_are_made_again_from_the_runs(traced, tables_by_name):
         assert values.reward_sd == pytest.approx(of_row.std(), abs=1e-9, nan_ok=True), row
 
 
-def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, coartic, tmp_path):
-    results = tmp_path / "results"
-    shutil.copytree(report, results / "report")
-    shutil.copy(traced.folder / RUNS_FILE, results)
-    tables = tables_of(results)
-    assert set(tables) == {name for name, table in tables_by_name.items() if len(table)}
-    frame = read_table(tables["methods"])
-    names, runs = list(frame.index), frame.run_ids.iloc[0].split()
-    method = tables_by_name["methods"].method[names[0]]
-    assert set(traced.runs.set_index("run_id").method[runs]) == {method}
-    code, text, _ = coartic("trace", "methods", names[0], "--in", results)
-    assert code == 0
-    stored = traced.runs.set_index("run_id").loc[runs]
-    for run, seed, reward in zip(runs, stored.seed, stored.reward, strict=True):
-        line = [line for line in text.splitlines() if run[:SHORT_ID] in line][-1]
-        assert {str(seed), f"−{-reward}"} <= set(line.split())
-    by_id, by_name = (
-        coartic("trace", "ranking", name, "--in", results)[1]
-        for name in ("hill-climbing", "Hill climbing")
-    )
-    assert by_id == by_name
-    listed = coartic("trace", "methods", "--in", results)[1].splitlines()
-    assert [line.partition("  ")[0] for line in listed if not line.startswith(" ")] == names
-    of_another_row = frame.run_ids.iloc[1].split()[0]
-    edit(results, "UPDATE results SET result = 'other' WHERE run_id = ?", of_another_row)
-    for command, said in (
-        (("trace", "methods", "nothing", "--in", results), "unknown row 'nothing'"),
-        (("trace", "methods", names[0], "--in", results), "the report is older than the runs of"),
-        (("report", tmp_path), f"did you mean {results}?"),
-    ):
-        code, _, error = coartic(*command)
-        assert (code, said in error) == (2, True), error
+def test_a_csv_file_has_the_rows_and_runs_of_its_table(tables_by_name, report):
+    with_rows = {name: table for name, table in tables_by_name.items() if len(table)}
+    assert {path.stem for path in (report / "tables").iterdir()} == {*with_rows}
+    for name, table in with_rows.items():
+        path = report / "tables" / f"{name}.csv"
+        written = pd.read_csv(path, index_col="row", dtype=str, keep_default_na=False)
+        assert [*written.index] == [*table.index]
+        assert written.run_ids.tolist() == table.run_ids.tolist()
 
 
-def test_the_lowest_reward_of_a_task_is_first(traced):
-    shown = runs_behind(traced, list(traced.runs.run_id))
-    first = shown.drop_duplicates("task")["reward (ticks)"].tolist()
-    assert first == [f"−{-reward}" for reward in traced.runs.groupby("task").reward.min()]
+def test_a_report_is_stamped_with_the_results_of_its_runs(traced, report):
+    other = traced.runs.reset_index(drop=True)
+    other.loc[0, "result"] = "other"
+    stamps = [stamp(runs) for runs in (traced.runs, traced.runs[::-1], other)]
+    page = (report / "report.html").read_text("utf-8")
+    assert [f'name="coartic-runs" content="{each}"' in page for each in stamps] == [1, 1, 0]
+
+
+def test_the_folder_below_is_named_where_there_are_no_results(traced, coartic):
+    code, _, error = coartic("report", traced.folder.parent)
+    assert (code, f"did you mean {traced.folder}?" in error) == (2, True), error
 
 
 def test_the_commonest_reasons_are_said(traced):
@@ -130,26 +110,15 @@ def test_text_from_files_is_escaped():
     assert r"\textbackslash{}input\textbraceleft{}x\textbraceright{}" in latex
 
 
-@pytest.mark.parametrize("rows", [render.MOST_LINES, render.MOST_LINES + 1])
-def test_a_table_higher_than_a_page_is_continued(rows):
-    names = [f"method {number}" for number in range(rows)]
-    frame = pd.DataFrame({"method": names, "reward": -1.5, "run_ids": ""}, index=names)
-    latex = render.latex_table(TABLES["methods"], frame.rename_axis("row"), "Methods")
-    assert latex.count("Methods, continued") == rows - render.MOST_LINES
-
-
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
-def test_no_text_is_a_formula_of_a_spreadsheet(text, tmp_path):
-    """And it is read as it was; numbers stay numbers."""
+def test_no_text_is_a_formula_of_a_spreadsheet(text):
+    """Numbers stay numbers."""
     frame = pd.DataFrame(
         {"method": [text, "a=b"], "reward": [-1.5, -2], "run_ids": ["", "x"]},
         index=pd.Index([f"{text} row", "other"], name="row"),
     )
-    path = tmp_path / "methods.csv"
-    path.write_text(render.table_csv(frame), "utf-8")
-    cells = [line.split(",") for line in path.read_text("utf-8").splitlines()]
+    cells = [line.split(",") for line in render.table_csv(frame).splitlines()]
     assert cells[1:] == [[f"'{text} row", f"'{text}", "-1.5", ""], ["other", "a=b", "-2.0", "x"]]
-    pd.testing.assert_frame_equal(read_table(path).fillna(""), frame, check_dtype=False)
 
 
 def test_a_report_is_not_written_through_a_link(traced, tmp_path):
@@ -226,22 +195,18 @@ def test_few_runs_say_so(tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
-def test_tables_compile_and_fit_the_text(tables_by_name, tmp_path):
-    """The text of an article at 10 pt; the tables have 8 pt."""
+def test_tables_compile(tables_by_name, tmp_path):
     notes = ["The optimum of Two-armed 1 † is not proven."]
-    tables = [name for name in render.IN_LATEX if 0 < len(tables_by_name[name]) <= render.MOST_ROWS]
+    tables = [name for name in render.IN_LATEX if len(tables_by_name[name])]
     assert {"ranking", "signatures", "runtimes", "tasks"} <= {*tables}
     texts = [render.latex_table(TABLES[n], tables_by_name[n], n, notes) for n in tables]
     (tmp_path / "all.tex").write_text(
-        "\\documentclass[10pt]{article}\\usepackage[T1]{fontenc}\\usepackage{booktabs,tabularx}\n"
-        "\\begin{document}\n"
-        + "\n".join(f"{text}\\clearpage" for text in texts)
-        + "\n\\end{document}\n"
+        "\\documentclass{article}\\usepackage[T1]{fontenc}\\usepackage{booktabs,longtable}\n"
+        "\\begin{document}\n" + "\n\n".join(texts) + "\n\\end{document}\n"
     )
     command = ["pdflatex", "-draftmode", "-interaction=nonstopmode", "-halt-on-error", "all"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:]
-    assert not re.search(r"Overfull|too large", done.stdout)
 
 
 def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):

@@ -18,7 +18,7 @@ from coartic.analysis.sections import FIGURES, TABLES, costs, own, ranking
 from coartic.analysis.statistics import running_times
 from coartic.estimates import RESAMPLES, SEED
 from tests.support.golden import golden
-from tests.support.made_up import MadeUp, made_up_optima, row, study_of
+from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
 
 
@@ -45,7 +45,8 @@ def test_which_tasks_are_ranked_does_not_depend_on_the_corrective_process():
     assert FIGURES["runtimes"](seen) is None
 
 
-LEARNER = {("ascending", "dual-process/EC1"): [-300, -301, -302, -303],
+EC1 = "dual-process/EC1"
+LEARNER = {("ascending", EC1): [-300, -301, -302, -303],
            ("two-armed-1", "dual-process/EC4"): [-480, -481, -482, -483]}  # fmt: skip
 CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
        ("two-armed-1", "cma-es/bandit"): [-466, -467, -468, -466]}  # fmt: skip
@@ -341,6 +342,46 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert "hill-climbing width=0.2" in ranked.index
     assert ranked.better["mine width=0.2"] == 2
+
+
+def with_settings(*settings, tasks=("ascending",), more=()):
+    """The learner with settings of its noise, each 4 ticks nearer than the setting before."""
+    rows = [
+        run for task in tasks for nearer, setting in enumerate(settings)
+        for run in runs_of(task, EC1, [-500 + 4 * nearer, -501 + 4 * nearer, -503 + 4 * nearer],
+                           setting=setting)
+    ]  # fmt: skip
+    return study_of([*rows, *more], optima=made_up_optima(*tasks))
+
+
+def test_settings_stand_behind_their_method_in_the_ranking():
+    """Behind its defaults, though their gaps are smaller, and each with its interval."""
+    between = runs_of("ascending", "hill-climbing", [-499] * 3)
+    seen = with_settings("", "noise_sd=0.1", "noise_sd=0.2", more=between)
+    ranked = TABLES["ranking"](seen)
+    settings = [f"{EC1} noise_sd=0.2", f"{EC1} noise_sd=0.1"]
+    assert ranked.index.tolist() == ["hill-climbing", EC1, *settings]
+    assert seen.methods.under.to_dict() == {
+        EC1: "", **dict.fromkeys(settings, EC1), "hill-climbing": ""
+    }  # fmt: skip
+    of_settings = ranked.loc[settings]
+    means = [1480 / 3, 1492 / 3]
+    assert of_settings.gap.tolist() == pytest.approx([(mean - 292) / 292 for mean in means])
+    assert (of_settings.gap_low < of_settings.gap).all()
+    assert (of_settings.gap < of_settings.gap_high).all()
+
+
+def test_settings_without_the_defaults_have_rows_of_their_own():
+    mine = runs_of("ascending", "mine", [-499] * 3)
+    seen = with_settings("noise_sd=0.1", "noise_sd=0.2", more=mine)
+    settings = [f"{EC1} noise_sd=0.2", f"{EC1} noise_sd=0.1"]
+    assert TABLES["ranking"](seen).index.tolist() == ["mine", *settings]
+
+
+def test_common_tasks_have_the_order_of_the_study():
+    """Tests draw signs by position: the order of a set would change p from run to run."""
+    tasks = "two-armed-2", "ascending", "two-armed-1"
+    assert standings.common_tasks(with_settings("", "noise_sd=0.1", tasks=tasks)) == tasks
 
 
 def test_learners_over_all_tasks_stand_for_their_conditions():

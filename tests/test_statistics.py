@@ -3,7 +3,6 @@
 import itertools
 import math
 
-import calibrate
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +10,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from coartic import estimates as statistics
+from coartic.analysis.signatures.context_tests import permutation_p
 from coartic.analysis.statistics import hypotheses
+from coartic.analysis.statistics.instances import other_tasks
+from coartic.estimates import LEVEL
 
 
 @pytest.mark.parametrize(
@@ -172,12 +174,61 @@ def test_share_test():
     assert hypotheses.share_test(15, 20, 0.75, "greater").p > 0.5
 
 
-def test_procedures_are_calibrated_on_samples_with_a_known_truth():
-    """One sample of each kind; of an interval around 5 instead of -300 nothing holds."""
-    rng, draw = np.random.default_rng(0), calibrate.POPULATIONS["ticks"]
-    seen = calibrate.of_rewards(rng, draw, 20, -300.0)
-    assert seen["interval of a mean (BCa)"]
-    assert not calibrate.of_rewards(rng, draw, 20, 5.0)["interval of a mean (BCa)"]
-    seen |= calibrate.of_counts(rng, 20) | calibrate.of_postures(rng, 20)
-    seen |= calibrate.of_instances(rng, 20)
-    assert len(seen) == 9
+POPULATIONS = {
+    "ticks": lambda rng, n: -300 + rng.normal(0, 3, n).round(),
+    "skewed": lambda rng, n: -300 - rng.exponential(8, n).round(),
+    "two levels": lambda rng, n: np.where(
+        rng.random(n) < 0.7, -331 + rng.normal(0, 5, n), -355 + rng.normal(0, 1, n)
+    ).round(),
+}
+"""Rewards as they occur: with ties, skewed, and on two levels, by the hands that are learned."""
+RUNS, RESAMPLES = 20, 999
+
+
+def holds(interval, truth):
+    return interval.low - 1e-9 <= truth <= interval.high + 1e-9
+
+
+def right_of_rewards(rng, draw, mean):
+    """Whether each interval holds the truth, and each test does not reject it, of two samples."""
+    a, b = draw(rng, RUNS), draw(rng, RUNS)
+    few = {"resamples": RESAMPLES}
+    return [
+        holds(statistics.mean(a, **few), mean),
+        holds(statistics.difference_of_means(a, b, **few), 0),
+        holds(statistics.mean(a - b, **few), 0),
+        hypotheses.bootstrap_test(a, mean, **few).p > LEVEL,
+        hypotheses.bootstrap_test(a, b, **few).p > LEVEL,
+        hypotheses.sign_flip_test(a - b).p > LEVEL,
+    ]
+
+
+def right_of_others(rng):
+    """The same of a share of runs, of postures with two joints that vary together, and of random
+    tasks with five runs each and skewed gaps."""
+    counts = rng.multinomial(RUNS, [0.75, 0.15, 0.10])
+    first, second = rng.exponential(0.1, (2, RUNS, 2)) @ np.array([[1.0, 0.5], [0.0, 1.0]])
+    gaps = [centre + rng.exponential(0.02, 5) for centre in rng.exponential(0.1, RUNS)]
+    return [
+        hypotheses.share_test(int(counts[0]), RUNS, 0.75, "greater").p > LEVEL,
+        permutation_p(first, second, rng, resamples=RESAMPLES) > LEVEL,
+        holds(other_tasks({"a": gaps}), 0.12),
+    ]
+
+
+@pytest.mark.parametrize("population", POPULATIONS)
+def test_procedures_are_calibrated_on_rewards_with_a_known_truth(population):
+    """About 95 of 100 samples are right; intervals of half their width would be in 67. No interval
+    of a mean holds 5 ticks in place of -300."""
+    draw = POPULATIONS[population]
+    mean = float(draw(np.random.default_rng(1), 1_000_000).mean())
+    rng = np.random.default_rng(0)
+    rates = np.mean([right_of_rewards(rng, draw, mean) for _ in range(100)], axis=0)
+    assert (rates >= 0.8).all(), rates
+    assert not right_of_rewards(rng, draw, 5.0)[0]
+
+
+def test_procedures_are_calibrated_on_counts_postures_and_random_tasks():
+    rng = np.random.default_rng(0)
+    rates = np.mean([right_of_others(rng) for _ in range(100)], axis=0)
+    assert (rates >= 0.8).all(), rates

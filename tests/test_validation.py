@@ -300,7 +300,7 @@ def test_a_method_of_version_2_is_known_by_its_present_id():
         (["list", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
         (["list", "mine.py"], "coartic check METHOD --method-file mine.py"),
         (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
-        (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "`coartic trace` names"),
+        (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "column run_ids of a report's"),
         (["report", "nowhere"], "there is no folder nowhere"),
         (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
         (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),

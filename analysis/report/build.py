@@ -10,6 +10,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
+import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
@@ -18,13 +19,11 @@ from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import (
     IN_LATEX,
-    MOST_ROWS,
     classes_of,
     html_table,
     latex_table,
     table_csv,
 )
-from coartic.analysis.report.trace import stamp
 from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.sections.ranking import differences
 from coartic.analysis.study import Study, cached
@@ -32,6 +31,7 @@ from coartic.analysis.table import Table
 from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, make_folder, publish
 from coartic.play.page import part_of_page
+from coartic.runs.plan import hash_of
 
 HERE = Path(__file__).parent
 NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "finding": [], "figure": None}
@@ -76,7 +76,7 @@ def files_of_table(table: Table, caption: str, for_paper: bool, study: Study) ->
     if not len(frame):
         return {}
     files = {f"tables/{table.id}.csv": table_csv(frame).encode()}
-    if for_paper and table.id in IN_LATEX and len(frame) <= MOST_ROWS:
+    if for_paper and table.id in IN_LATEX:
         text = latex_table(table, frame, caption, about.notes_of(study, frame.columns))
         files[f"tables/{table.id}.tex"] = text.encode()
     return files
@@ -118,11 +118,15 @@ def parts_of(section: Section, study: Study) -> dict[str, Any]:
         "rows": len(frame),
         "settings": sum("setting" in names for names in classes_of(table, frame)),
         "html": html_table(table, frame, section.caption) if len(frame) else "",
-        "example": f"'{frame.index[0]}'" if len(frame) else "",
         "finding": about.finding(study, section),
         "figure": plot,
         "svg": for_page(plot) if plot else "",
     }
+
+
+def stamp(runs: pd.DataFrame) -> str:
+    """Return the hash of the results of runs, by which a report identifies its runs."""
+    return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
 def page(study: Study, home: str) -> str:

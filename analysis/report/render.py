@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import html
 import math
-import textwrap
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from coartic.analysis.table import Table
@@ -32,7 +30,6 @@ IN_LATEX = {
     "own": "task, method, runs, reward, gap, nearest, nearest_gap",
     "contexts": "place, method, runs, distance, standardised_difference, p_holm, p_random_search",
     "ranking": "method, gap, on *",
-    "settings": "method, setting, gap, tasks, comparison, p_holm",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "learning": "task, method, runs, after_*, trials_to_half_gain",
     "signatures": "task, method, runs, first, total, as_in_isolation, preshaping",
@@ -40,20 +37,14 @@ IN_LATEX = {
     "tasks": "task, arms, base, initial, optimum, bound",
     "methods": "task, method, runs, reward, gap, hands, trials",
 }
-"""Tables in LaTeX, by id, and their columns, which fit the width of a text."""
-LONGEST = 20
-"""Letters of the longest text in a column of LaTeX that does not break."""
-LINE, MOST_LINES = 80, 44
-"""Letters of a line and lines of a table in LaTeX."""
+"""Tables in LaTeX, by id, and their columns."""
 FORMULA = ("=", "+", "-", "@")
 """Beginnings of text that spreadsheets take for formulas."""
-MOST_ROWS = 50
-"""Most rows of a table in LaTeX, which fit a page."""
 
 
 def table_csv(frame: pd.DataFrame) -> str:
     """Return a table as CSV, with an apostrophe before text that a spreadsheet would take for a
-    formula; :func:`.trace.rows_of` reads it."""
+    formula."""
     return frame.map(guarded).rename(index=guarded).to_csv(lineterminator="\n")
 
 
@@ -168,62 +159,26 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 
 
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return the columns of :data:`IN_LATEX` in LaTeX, with booktabs, as one table or several.
+    """Return the columns of :data:`IN_LATEX` as a table in LaTeX, with booktabs and longtable.
 
-    Tables are as wide as the text and as high as a page at most, in letters of 8 pt: the first
-    column and other long text break. A text that is the same in all rows moves to the caption.
-    ``notes`` are below each table, with the meaning of a dagger in it.
+    ``notes`` are below the table, with the meaning of a dagger in it.
     """
     frame = frame[["setting" not in names for names in classes_of(table, frame)]]
     columns = columns_of(table, frame)
     chosen = [c for want in IN_LATEX[table.id].split(", ") for c in columns if fnmatch(c, want)]
-    cells, heads, sides, kept, breaking = list[list[str]](), [], "", 0, list[list[str]]()
-    for column in chosen:
-        texts, numbers = texts_of(table, frame, column), is_number(frame[column])
-        if len({*texts}) == 1 < len(texts) and not numbers:
-            caption += f" ({columns[column]}: {texts[0]})"
-            continue
-        side, longest = "r" if numbers else "l", max(map(len, texts))
-        breaks = not cells or (not numbers and longest > LONGEST)
-        width = max(0 if breaks else longest, 9)
-        head = textwrap.wrap(columns[column], width, break_long_words=False)
-        heads.append(f"\\shortstack[{side}]{{" + "\\\\{}".join(map(latex, head)) + "}")
-        if breaks:
-            breaking.append(texts)
-            side = ">{\\raggedright\\arraybackslash}X"
-        else:
-            kept += 2 + max(map(len, [*head, *texts]))
-        sides += side
-        cells.append(list(map(latex, texts)))
+    cells = [[latex(text) for text in texts_of(table, frame, column)] for column in chosen]
     # Two columns may have one header.
-    shown = pd.DataFrame(dict(enumerate(cells))).set_axis(heads, axis="columns")
-    wide = max((LINE - kept) // len(breaking), 8)
-    lines = np.cumsum([max(len(textwrap.wrap(text, wide)) for text in row)
-                       for row in zip(*breaking, strict=True)])  # fmt: skip
-    parts = [
-        latex_part(rows, sides, caption, f"tab:coartic-{table.id}", notes, part)
-        for part, (_, rows) in enumerate(shown.groupby((lines - 1) // MOST_LINES))
-    ]
-    needs = "% needs \\usepackage{booktabs,tabularx} and \\usepackage[T1]{fontenc}"
-    return "\n".join([needs, *parts])
-
-
-def latex_part(
-    rows: pd.DataFrame, sides: str, caption: str, label: str, notes: Sequence[str], part: int
-) -> str:
-    """Return rows of LaTeX as a table; ``part`` 0 is the first of a caption."""
-    body = rows.style.hide(axis="index").to_latex(
+    shown = pd.DataFrame(dict(enumerate(cells))).set_axis(
+        [latex(columns[column]) for column in chosen], axis="columns"
+    )
+    body = shown.style.hide(axis="index").to_latex(
+        environment="longtable",
         hrules=True,
-        column_format=f"@{{}}{sides}@{{}}",
-        caption=latex(caption + ", continued" * (part > 0)),
-        label=label + f"-{part + 1}" * (part > 0),
-        position="tp",
-        position_float="centering",
+        column_format="".join("r" if is_number(frame[column]) else "l" for column in chosen),
+        caption=latex(caption),
+        label=f"tab:coartic-{table.id}",
     )
     if "$\\dagger$" in body or any("†" in note for note in notes):
         notes = [*notes, RECONSTRUCTED]
-    begin, end, below = "\\begin{tabular}", "\\end{tabular}", " ".join(map(latex, notes))
-    if below:
-        below = f"\n\n\\smallskip\\parbox{{\\linewidth}}{{\\footnotesize {below}}}"
-    body = body.replace(begin, "\\footnotesize\\tabcolsep2.5pt\n\\begin{tabularx}{\\linewidth}", 1)
-    return body.replace(end, f"\\end{{tabularx}}{below}", 1)
+    needs = "% needs \\usepackage{booktabs,longtable} and \\usepackage[T1]{fontenc}"
+    return "\n".join([needs, body, *map(latex, notes), ""])

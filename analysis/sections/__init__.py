@@ -16,7 +16,6 @@ from coartic.analysis.sections import (
     random_tasks,
     ranking,
     scores,
-    settings,
     tasks,
 )
 from coartic.analysis.study import Study
@@ -106,31 +105,6 @@ SECTIONS = (
         "which both are equal has no share and is counted. The gap alone weighs tasks by how bad "
         "the corrective process is on them. Methods that make no trials have their result after "
         "any number of trials.",
-        single=False,
-        folded=True,
-    ),
-    Section(
-        "separation",
-        "What separates",
-        "Which tasks separate methods?",
-        table=scores.list_separation,
-        caption="Pairs of methods whose rewards differ; methods at the ceiling and at the floor",
-        note="Two-tailed Mann-Whitney tests, corrected for the pairs of a task (Bonferroni); a "
-        "single run is separated where at most 2.5 % of the other method's runs are on its wrong "
-        "side or level with it. Settings and ablations are not among the methods.",
-        single=False,
-        folded=True,
-    ),
-    Section(
-        "settings",
-        "Settings",
-        "Which setting of a method is best?",
-        table=settings.list_settings,
-        caption="Mean gap of each setting of a method, the smallest first",
-        sentence=settings.best_settings,
-        answer="Settings",
-        note="Gaps are means over the tasks of a method's settings. Comparisons with the smallest "
-        "are tests of runs paired by seed; p is corrected for the settings of the method (Holm).",
         single=False,
         folded=True,
     ),

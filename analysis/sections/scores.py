@@ -1,4 +1,4 @@
-"""Scores that separate methods: share of the possible gain, by arms and by trials, and its cost."""
+"""Section on the share of the possible gain, by arms and by trials, and its cost."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis import standings
-from coartic.analysis.frames import ranking, separation
+from coartic.analysis.frames import ranking
 from coartic.analysis.sections.costs import improvements
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import marked
 
 EARLY = 1_000
 """Trials after which methods are scored as well."""
@@ -85,29 +84,4 @@ def list_scores(study: Study) -> Rows:
         yield (
             str(method),
             row | runs_of(*standings.cells_on(study, str(method), standings.common_tasks(study))),
-        )
-
-
-@table(
-    "task; methods; pairs: pairs of methods; separated: pairs separated; share: separated (%) .0; "
-    "at_ceiling: methods above 95 % of the possible gain; at_floor: methods below 5 %"
-)
-def list_separation(study: Study) -> Rows:
-    """Count, by task, the pairs of compared methods that it separates."""
-    runs = compared_runs(study)
-    main = study.methods.index[(study.methods.under == "")]
-    runs = runs[runs.method.isin(main)]
-    if not len(runs):
-        return
-    for task, row in separation(runs).iterrows():
-        share = row.separated / row.pairs if row.pairs else np.nan
-        here = runs[runs.task == task]
-        yield (
-            str(task),
-            {
-                "task": marked(study.tasks[str(task)]),
-                **{str(name): value for name, value in row.items()},
-                "share": share,
-                "run_ids": " ".join(map(str, here.run_id)),
-            },
         )

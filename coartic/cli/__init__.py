@@ -62,7 +62,6 @@ COMMANDS = (
     (run.list_, "comparison"),
     (run.run, "comparison --methods EC1,CMA-ES --tasks ascending --runs 5 --out results/mine"),
     (read.report, "results/quick --for-paper"),
-    (read.trace, "ranking cma-es/bandit --in results/comparison"),
     (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
     (run.reproduce, "1a2b3c --in results/quick"),
     (read.verify, "results/quick --again 3"),

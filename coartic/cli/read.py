@@ -5,18 +5,16 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from coartic.cli import arguments as given
 from coartic.cli.terminal import complain, say, say_pairs
-from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
 from coartic.internal.limits import MOST_RUNS
-from coartic.internal.text import counted, one_line, unknown
+from coartic.internal.text import counted, one_line
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
@@ -77,66 +75,6 @@ def exit_if_parts_failed(study: Study) -> None:
         complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
     if failures(study):
         sys.exit(1)
-
-
-def trace(
-    table: Annotated[str | None, typer.Argument(metavar="TABLE", help="Id of a table.")] = None,
-    row: Annotated[str | None, typer.Argument(metavar="ROW", help="Name of a row.")] = None,
-    folder: Annotated[
-        Path, given.file_or_folder("FOLDER", "A report or its results.", "--in")
-    ] = Path("results"),
-) -> None:
-    """Name the runs behind a row of a report's table: run `coartic report` first."""
-    from coartic.analysis.report import trace as traced
-    from coartic.analysis.sections import TABLES
-    from coartic.analysis.study import load
-    from coartic.analysis.table import shown_names
-    from coartic.benchmarks.registry import registry
-    from coartic.runs.store import RUNS_FILE
-
-    tables = traced.tables_of(folder)
-    if table is None:
-        say_pairs([("Tables", ", ".join(tables))])
-        return
-    if table not in tables or table not in TABLES:
-        raise CoarticError(unknown("table", table, tables))
-    frame, results = traced.read_table(tables[table]), tables[table].parents[2]
-    # A report may lie elsewhere.
-    study = load(results) if (results / RUNS_FILE).is_file() else None
-    frame.attrs = shown_names(study) if study else {}
-    if row is None:
-        say_pairs(traced.beginnings(TABLES[table], frame))
-        return
-    titles = frame.attrs.get("titles", {})
-    row = given.id_named(row, {str(each): titles.get(each, "") for each in frame.index})
-    if row not in frame.index:
-        raise CoarticError(unknown("row", row, frame.index))
-    ids = str(frame.run_ids.fillna("")[row]).split()
-    values = [("Row", row), *traced.values_of(TABLES[table], frame, row)]
-    if study is None:
-        say_pairs([*values, ("Runs", " ".join(ids))])
-        return
-    behind = study.runs[study.runs.run_id.isin(ids)]
-    report = tables[table].parents[1] / "report.html"
-    if traced.stamp(study.runs) not in report.read_text("utf-8"):
-        again = f"coartic report {quote(str(results))}"
-        raise CoarticError(f"the report is older than the runs of {results}: {again}")
-    say_pairs(values)
-    if not len(behind):
-        say("No runs stand behind this row.")
-        return
-    method_names = {*registry(with_code=False), "dual-process"}
-    file = "" if method_names >= {*behind.method} else " --method-file FILE"
-    say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
-    table_of_runs = traced.runs_behind(study, ids).astype(str).map(one_line)
-    say(*table_of_runs.to_string(index=False).splitlines())
-    where = f"--in {quote(str(results))}"
-    say_pairs(
-        [
-            ("Repeat one", f"coartic reproduce RUN {where}{file}"),
-            ("Film of one", f"coartic animate RUN {where} --out film.gif"),
-        ]
-    )
 
 
 def verify(

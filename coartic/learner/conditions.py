@@ -45,12 +45,7 @@ METHOD_PREFIX = "dual-process/"
 MOST_NOISE = 100.0
 """Largest noise, length unit and rad: far beyond what any arm can use. Targets that
 lose themselves in the far would be approached step by step without an end."""
-Counted = Literal["later", "all"]
 Share = Annotated[float, Field(ge=0, le=1)]
-HandExploration = Literal["none", "closest", "random", "nearest-posture"]
-Learned = Literal["best", "replay"]
-Credit = Literal["overall", "subtask"]
-Direction = Literal["next-goal", "stay", "start"]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
 
@@ -90,33 +85,33 @@ class ExplorationCondition:
     """True if noise moves the targets of the base and of the arm that is to hit (AModChosen)."""
     modify_other: bool
     """True if noise moves the targets of the other arm (AModOther)."""
-    hand_exploration: HandExploration
+    hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
     """Exploration of the hand for a goal: none (``"none"``), the hand closest to the goal
     (``"closest"``), a random hand (``"random"``, DASel), or the hand whose corrective posture for
     the goal is nearest in joint space (``"nearest-posture"``)."""
     epsilon: Share = 0.2
     """ε: the probability with which the hand for a goal is explored (published)."""
-    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE)] = 0.05
+    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """Standard deviation of the noise η, length unit (base) and rad (joints) (published)."""
     corrects: bool = True
     """True if **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
-    learned: Learned = "best"
+    learned: Literal["best", "replay"] = "best"
     """Result of learning: the best trial, or the noiseless replay after the last trial."""
-    credit: Credit = "overall"
+    credit: Literal["overall", "subtask"] = "overall"
     """Meaning of Q(s, a) of a goal: the reward R of the whole trial, or the return of that
     goal, the reward of its own subtask first."""
     discount: Share = 0.0
     """γ: the return of goal g is Σ γ^|h − g| r_h, with r_h the reward of the movements to goal h. 0
     is the reward of the subtask alone. With credit "subtask" only."""
-    counted: Counted = "later"
+    counted: Literal["later", "all"] = "later"
     """Goals h of this sum: g and later ones, or all. Of all, γ = 1 is R, for every goal."""
     drift: Drifts = 0.0
     """κ of informed exploration: the share of the way to the preferred posture, in the null space
     of the hand, by which the mean of exploration moves. Of several each trial draws one."""
     pull: Share = 0.0
     """β of informed correction: the same share in each iteration of the corrective process."""
-    direction: Direction = "next-goal"
+    direction: Literal["next-goal", "stay", "start"] = "next-goal"
     """The preferred posture: halfway to the stored target of the next goal (``"next-goal"``), where
     the robot is when the goal becomes current (``"stay"``), or where the trial began (``"start"``,
     wrong information)."""

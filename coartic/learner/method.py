@@ -8,24 +8,16 @@ declares holds under all its parameters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
-from typing import Annotated, ClassVar, Literal, Self
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, Literal, Self, get_type_hints
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
 from coartic.learner.conditions import (
     CONDITIONS,
     EVERY_CONDITION,
     METHOD_PREFIX,
-    MOST_NOISE,
-    Counted,
-    Credit,
-    Direction,
-    Drifts,
     ExplorationCondition,
-    HandExploration,
-    Learned,
-    Share,
 )
 from coartic.learner.learning import TRIALS, learn_many
 from coartic.learner.learning_run import CORRECTIONS
@@ -42,80 +34,22 @@ from coartic.method import (
 from coartic.motion.batch import SLOTS
 
 _MOST_TRIALS = 4_000_000  # of runs that are performed together
+_FIELDS: dict[str, Any] = get_type_hints(ExplorationCondition, include_extras=True)
+del _FIELDS["id"], _FIELDS["hands"]  # which parameters do not change
 
 
 class DualProcessParameters(Parameters):
-    """Parameters of the learner; the defaults are the paper's."""
+    """Parameters of every learner."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Trials of a run."""
-    epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """ε: probability, for each goal, of exploring the hand: a random hand or the closest one, by
-    condition. EC1 has one hand."""
-    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
-    """SD of η, length unit (base) or rad (joints)."""
 
 
-class SubtaskParameters(DualProcessParameters):
-    """Parameters of the ablations that learn from the reward of each subtask."""
-
-    discount: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """γ of a goal's return; 0 is the reward of its own subtask alone."""
-    counted: Counted = "later"
-    """Subtasks whose rewards the return counts: from the goal on, or all, which with γ = 1 is the
-    total reward."""
-
-
-class InformedParameters(DualProcessParameters):
-    """Parameters of the informed learner; the defaults are those of its condition."""
-
-    epsilon: Share = 0.4
-    """ε: probability, for each goal, of exploring the hand. EC1 has one hand."""
-    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.01
-    """SD of η, length unit (base) or rad (joints)."""
-    drift: Drifts = 1.0
-    """κ: share of the way to the preferred posture by which the mean of exploration moves; of a
-    list each trial draws one."""
-    pull: Share = 0.0
-    """β: the same share in each iteration of the corrective process."""
-    direction: Direction = "next-goal"
-    """The preferred posture: halfway to the stored target of the next goal, where the robot is, or
-    where the trial began."""
-
-
-class CustomParameters(Parameters):
+class CustomParameters(DualProcessParameters):
     """Any exploration condition: one of the paper's, and the fields that are other than there."""
 
-    trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run."""
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
     """The paper's condition that is changed."""
-    modify_chosen: bool | None = None
-    """True if noise moves the targets of the base and of the arm that is to hit."""
-    modify_other: bool | None = None
-    """True if noise moves the targets of the other arm."""
-    hand_exploration: HandExploration | None = None
-    """Exploration of the hand for a goal."""
-    epsilon: Share | None = None
-    """ε: probability, for each goal, of exploring the hand."""
-    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] | None = None
-    """SD of η, length unit (base) or rad (joints)."""
-    corrects: bool | None = None
-    """True if the corrective process finishes what a stored target misses."""
-    learned: Learned | None = None
-    """Result of learning: the best trial, or the replay."""
-    credit: Credit | None = None
-    """Credit of a goal: the reward of the whole trial, or the return of its subtask."""
-    discount: Share | None = None
-    """γ of a goal's return."""
-    counted: Counted | None = None
-    """Subtasks whose rewards the return counts."""
-    drift: Drifts | None = None
-    """κ of informed exploration."""
-    pull: Share | None = None
-    """β of informed correction."""
-    direction: Direction | None = None
-    """The preferred posture."""
 
     @model_validator(mode="after")
     def check_condition(self) -> Self:
@@ -126,9 +60,7 @@ class CustomParameters(Parameters):
 
 def condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
     """Return a condition with the fields that parameters set."""
-    names = {field.name for field in fields(ExplorationCondition)}
-    given = parameters.model_dump(include=names, exclude_none=True)
-    return replace(base, **given)
+    return replace(base, **parameters.model_dump(include={*_FIELDS}, exclude_none=True))
 
 
 class DualProcess(Method):
@@ -139,7 +71,6 @@ class DualProcess(Method):
         "A. Shah, A. G. Barto, A. H. Fagg (2013). A dual process account of coarticulation "
         "in motor skill acquisition. Journal of Motor Behavior."
     )
-    Parameters: ClassVar[type[Parameters]] = DualProcessParameters
 
     def rules(self) -> ExplorationCondition:
         """Return the exploration condition with the parameters."""
@@ -191,23 +122,23 @@ class DualProcess(Method):
 
 
 def method_for(condition: ExplorationCondition) -> type[DualProcess]:
-    """The learner under a condition as a method."""
-    parameters: type[DualProcessParameters] = DualProcessParameters
-    citation = DualProcess.citation
+    """The learner under a condition as a method, with fields of the condition as parameters."""
+    names, citation = ["epsilon", "noise_sd"], DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.is_informed:  # to move in the null space of a hand
         information |= {Information.JACOBIAN}
-        parameters = InformedParameters
+        names += ["drift", "pull", "direction"]
     if condition.hand_exploration == "closest":  # to find the closest hand
         information |= {Information.GOALS, Information.FORWARD_KINEMATICS}
     if condition.credit == "subtask":
         information |= {Information.REWARD_BY_SUBTASK}
-        parameters = SubtaskParameters
+        names += ["discount", "counted"]
         citation += (
             " Reward of subtasks, after T. G. Dietterich (2000). Hierarchical reinforcement "
             "learning with the MAXQ value function decomposition. Journal of Artificial "
             "Intelligence Research."
         )
+    fields: Any = {name: (_FIELDS[name], getattr(condition, name)) for name in names}
     number, _, ablation = condition.id[2:].partition("-")
     return type(
         f"DualProcess{condition.id.replace('-', '')}",
@@ -220,10 +151,15 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
             + (f", {ablation}" if ablation else ""),
             "information": frozenset(information),
             "citation": citation,
-            "Parameters": parameters,
+            "Parameters": create_model(
+                "DualProcessParameters", __base__=DualProcessParameters, **fields
+            ),
             "condition": condition,
         },
     )
+
+
+_optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 
 
 class CustomDualProcess(DualProcess):
@@ -244,7 +180,9 @@ class CustomDualProcess(DualProcess):
             Information.JACOBIAN,
         }
     )
-    Parameters = CustomParameters
+    Parameters: ClassVar[type[Parameters]] = create_model(
+        "CustomParameters", __base__=CustomParameters, **_optional
+    )
 
     def rules(self) -> ExplorationCondition:
         """Return the base condition with the fields that the parameters change."""

@@ -602,30 +602,6 @@ class Learner {
   }
 }
 
-/* coartic/baselines/random_search.py, `RandomSearch`: uniform targets in a box around the postures in which the corrective
-   process alone hits the goals with its best hands. The best trial is kept; nothing is learned. */
-class RandomSearch {
-  constructor(problem, seed, half_width = 0.12) {
-    Object.assign(this, { problem, rng: new Generator(seed), hands: best_hands(problem) });
-    this.trials = hand_sequences(problem).length; // to find the hands
-    this.best = corrective_trial(problem, this.hands);
-    this.explored = movable(problem, problem.hands);
-    this.box = this.best.reached.map((posture) => posture.map((value) => [value - half_width, value + half_width]));
-  }
-
-  step() {
-    const value = ([low, high]) => low + (high - low) * this.rng.random();
-    const targets = this.box.map((box) => this.explored.map((moves, j) => (moves ? value(box[j]) : NaN)));
-    const trial = make_trial(this.problem, this.hands, targets);
-    this.trials += 1;
-    if (trial.reward > this.best.reward) this.best = trial;
-  }
-
-  learned() {
-    return this.best;
-  }
-}
-
 /* ---- A plan that looks ahead (as coartic/baselines/receding_horizon.py, by a local search) ---- */
 
 /* The way from a point of an arm, its hand or an elbow, to a place, and how that point moves with some joints. */
@@ -736,7 +712,7 @@ function receding_horizon(problem, horizon) {
 
 if (typeof module !== "undefined") {
   module.exports = {
-    CONDITIONS, PAPER, Generator, Learner, RandomSearch, best_hands, execute, initial_hands, letters_of, make_trial, problem_of,
+    CONDITIONS, PAPER, Generator, Learner, execute, initial_hands, letters_of, make_trial, problem_of,
     receding_horizon, trajectory,
   };
 }

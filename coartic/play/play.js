@@ -189,16 +189,13 @@ class Play {
     const { announced } = this;
     const jobs = [];
     const order = (key, task, job) => jobs.push({ key, task, trials: 1, turn: 1, ...job });
-    const practise = (key, task, rules, turn) => {
-      for (let seed = 0; seed < (announced ? 1 : SEEDS); seed += 1) {
-        order(`${key} ${seed}`, task, { rules, seed, trials: TRIALS, turn: turn || (seed && seed + 1) });
-      }
-    };
     this.tasks.forEach((task, k) => {
       const who = this.by(k);
       if (!this.alone[k].going || this.stored(who)) return; // or a goal is out of reach
-      if (who === "learner") practise(`${k} run`, announced ? announced.task : task, this.rules);
-      if (this.state.others && ["learner", "plan"].includes(this.state.who)) practise(`${k} random`, task, "random search", SEEDS + 1);
+      for (let seed = 0; who === "learner" && seed < (announced ? 1 : SEEDS); seed += 1) {
+        const job = { rules: this.rules, seed, trials: TRIALS, turn: seed && seed + 1 };
+        order(`${k} run ${seed}`, announced ? announced.task : task, job);
+      }
       if (who === "plan") order(`${k} plan`, task, { horizon: this.state.ahead, turn: 0 });
       else order(`${k} far`, task, { horizon: MOST_GOALS });
     });
@@ -240,10 +237,10 @@ class Play {
     return result ? result.snapshots.findLast((each) => each.trials <= trials) || null : null;
   }
 
-  /* What each run has learned after the trials shown, of runs that have made them; the first may be on its way. */
-  practised(key) {
-    const keys = Array.from({ length: SEEDS }, (_, seed) => `${key} ${seed}`);
-    const there = keys.filter((each, seed) => this.fresh.has(each) && (this.results.get(each).done || (!seed && key.endsWith("run"))));
+  /* What each run of a robot has learned after the trials shown, of runs that have made them; the first may be on its way. */
+  practised(k) {
+    const keys = Array.from({ length: SEEDS }, (_, seed) => `${k} run ${seed}`);
+    const there = keys.filter((each, seed) => this.fresh.has(each) && (this.results.get(each).done || !seed));
     return there.map((each) => this.snapshot(each)).filter(Boolean);
   }
 
@@ -261,7 +258,7 @@ class Play {
         ? { goal, hand, kind: "learned", target: q } : { goal, hand, kind: "corrective", target: null }));
     }
     if (who === "alone") return null;
-    const runs = this.practised(`${k} run`).sort((a, b) => a.reward - b.reward);
+    const runs = this.practised(k).sort((a, b) => a.reward - b.reward);
     const median = runs[Math.floor(runs.length / 2)] || this.snapshot(`${k} run 0`);
     const snapshot = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : median;
     return snapshot && snapshot.movements;
@@ -433,7 +430,7 @@ class Play {
         return before ? [before.reached[shared], trial.reached[shared]] : [];
       }
       if (this.stored(who)) return this.stored(who).films[k].reached;
-      return who === "learner" ? this.practised(`${k} run`).map(({ reached }) => reached[0]) : [trial.reached[0]];
+      return who === "learner" ? this.practised(k).map(({ reached }) => reached[0]) : [trial.reached[0]];
     }).map((runs) => runs.filter(Boolean));
   }
 
@@ -441,15 +438,10 @@ class Play {
   compare() {
     const both = this.main.length > 1 && !this.editing ? this.postures_met : [];
     this.find("inset").hidden = !both.length || !both.every((runs) => runs.length);
-    [this.difference, this.by_chance] = [null, null];
+    this.difference = null;
     if (this.find("inset").hidden) return;
     this.difference = posture_difference(this.announced ? both.map((runs) => runs.slice(1)) : both);
     if (this.announced) this.difference.shifts = both.map(([before, after]) => distance_of(before, after));
-    else {
-      const random = both.map((_, k) => this.practised(`${k} random`).map(({ reached }) => reached[0]));
-      if (random.every((runs) => runs.length)) this.by_chance = posture_difference(random).deviations || 0;
-      if (this.stored(this.state.who)) this.by_chance = this.preset.by_chance;
-    }
     const { inset, colours, problems: [problem] } = this;
     const { means } = this.difference;
     const points = both.flatMap((runs, k) => [...runs, means[k]].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
@@ -540,7 +532,7 @@ class Play {
       const [{ hands, goals }] = this.problems;
       const tried = hands.length ** goals.length <= MOST_SEQUENCES ? "best hands" : "hands";
       const used = hands.length > 1 ? ` (${tried} ${letters_of(this.alone[0].hands)})` : "";
-      const runs = this.practised("0 run").length;
+      const runs = this.practised(0).length;
       return [
         `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
         runs > 1 && state.who === "learner" ? `Shown is the median of the learner's ${runs} runs.` : "",
@@ -552,10 +544,11 @@ class Play {
     if (distance < 0.005) return ["At goal 1 the two robots stand alike."];
     const several = state.who === "learner" || (this.stored(state.who) && runs > 1);
     if (!several) return [`At goal 1 the posture difference is ${short(distance)}.`, far];
-    const random = Number.isFinite(this.by_chance) ? ` (random search: ${this.by_chance.toFixed(1)})` : "";
+    const by_chance = this.stored(state.who) && this.preset.by_chance;
+    const random = Number.isFinite(by_chance) ? ` (random search: ${by_chance.toFixed(1)})` : "";
     return [
       `At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
-      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${runs} runs each). Random search keeps the best of as many random trials.`,
+      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${runs} runs each).${random && " Random search keeps the best of as many random trials."}`,
     ];
   }
 

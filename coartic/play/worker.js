@@ -2,13 +2,12 @@
 
 const SLICE_MS = 50;
 
-/* A run of the learner, of random search or of a planner, as an order names it. */
+/* A run of the learner or of a planner, as an order names it. */
 class Job {
   constructor({ key, task, rules, seed, horizon, trials, turn = 0 }) {
     const problem = problem_of(task);
     Object.assign(this, { key, trials, turn, made: 0, due: 1, snapshots: [], done: false });
-    if (rules === "random search") this.method = new RandomSearch(problem, seed);
-    else if (rules) this.method = new Learner(problem, rules, seed);
+    if (rules) this.method = new Learner(problem, rules, seed);
     else this.method = { learned: () => receding_horizon(problem, horizon), step() {} };
   }
 

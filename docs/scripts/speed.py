@@ -254,7 +254,6 @@ def show_commands(*, is_long: bool) -> None:
             ("run quick", ["run", "quick", "--out", results], 1),
             ("report", ["report", results], 3),
             ("verify", ["verify", results], 3),
-            ("trace", ["trace", "claims", "--in", results], 5),
             ("check", ["check", "EC4"], 5),
             ("draw", ["draw", "--out", f"{folder}/tasks.svg", "--replace"], 5),
             ("list", ["list"], 5),
