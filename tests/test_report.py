@@ -170,7 +170,7 @@ def test_answers_name_failed_runs_behind_them(traced):
     # a planner makes no trials
     assert information["Cost"][0].endswith(f" 1 of {of} runs of learner EC4")
     for study in (traced, spoiled):
-        assert len(answers(study)) == 4
+        assert len(answers(study)) == 3
         for _, (card, *_) in answers(study):  # the first line stands on the first screen
             assert len(re.findall(r"[\w.]+", card)) <= 15, card
 
