@@ -5,7 +5,7 @@
 
 Tasks are the names of shipped tasks, ranges of instances, or files. The bound of a shipped task is
 written into the shipped data, in which the sharper bound is kept. For any other task a good reward
-is searched first (``optimum/search``), and the bound is printed alone. It takes hours for many
+is searched first (``optimum/search``), and the bound is only shown. It takes hours for many
 tasks; ``--open`` leaves out what is proven, and what was tried with as many nodes.
 """
 

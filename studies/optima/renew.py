@@ -38,7 +38,7 @@ def ships(task: Task, restriction: tuple[str, str]) -> bool:
 def take_over(study: Study, known: shipped.Entries) -> int:
     """Take over what the runs of a folder improve; return the number of new entries.
 
-    Of a method with parameters on a task the first 500 runs count. Raises CoarticError for a
+    The first 500 runs of a method with its parameters on a task count. Raises CoarticError for a
     solution that does not give its reward on the shipped task of this name.
     """
     solutions, changed = study.movements(), 0
