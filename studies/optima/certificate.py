@@ -23,12 +23,9 @@ search can end at any time. The proven bound is then the least bound of the open
 bound from the speed of the hands (:func:`ticks_for_distance`), whichever is more.
 """
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import math
-from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -36,7 +33,7 @@ import numpy as np
 from lagrangian import Array, Lagrangian
 from relaxation import PartialSequence, Relaxation, Relaxed, split
 
-from coartic import PAPER, Hand, Task
+from coartic import PAPER
 
 _TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
@@ -44,7 +41,7 @@ _MOST_SEQUENCES = 4096  # hand sequences that are bounded by distances
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
-def fastest_hand(task: Task, hand: Hand) -> float:
+def fastest_hand(task, hand):
     """Return the largest norm of the hand's Jacobian: its path per joint-space path, length unit.
 
     The column of a joint is at right angles to its lever, which is no longer than the links beyond
@@ -57,7 +54,7 @@ def fastest_hand(task: Task, hand: Hand) -> float:
     return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
 
 
-def ticks_for_distance(task: Task, hands: Iterable[Sequence[Hand]]) -> int:
+def ticks_for_distance(task, hands):
     """Return ticks that every solution takes with one of these hand sequences: by Cauchy and
     Schwarz.
 
@@ -70,7 +67,7 @@ def ticks_for_distance(task: Task, hands: Iterable[Sequence[Hand]]) -> int:
     speed = {hand: PAPER.step * fastest_hand(task, hand) for hand in task.hands}
     start = {hand: task.robot.forward_kinematics(task.q0, hand) for hand in task.hands}
 
-    def least(sequence: Sequence[Hand]) -> int:
+    def least(sequence):
         where, when = {hand: (start[hand], 0.0, 0) for hand in task.hands}, 0
         for hand, goal in zip(sequence, task.goals, strict=True):
             place, radius, ticks = where[hand]
@@ -83,7 +80,7 @@ def ticks_for_distance(task: Task, hands: Iterable[Sequence[Hand]]) -> int:
     return min(map(least, hands))
 
 
-def mergeable(task: Task, hands: PartialSequence) -> tuple[int, ...]:
+def mergeable(task, hands):
     """Return the goals (0-based) that may be hit without a movement.
 
     The hand of such a goal may be there already: at the start, or because another hand hits the
@@ -114,7 +111,7 @@ class Subproblem(NamedTuple):
     """Intervals of the absolute link angles, shape ``(links, 2)``, rad."""
 
     @property
-    def moves(self) -> int:
+    def moves(self):
         """Least number of movements."""
         return len(self.hands) - len(self.merged) - len(self.open)
 
@@ -133,7 +130,7 @@ class Node(NamedTuple):
     lagrangian: Lagrangian
 
 
-def certify(task: Task, ticks: int, most_nodes: int, *, still: bool = False) -> tuple[int, int]:
+def certify(task, ticks, most_nodes, *, still=False):
     """Prove that no solution takes fewer than ``ticks``, or as much as can be proven.
 
     Returns the proven ticks, and how many cone programmes this took. The search ends when all is
@@ -153,31 +150,31 @@ def certify(task: Task, ticks: int, most_nodes: int, *, still: bool = False) -> 
 class ProofSearch:
     """The open subproblems, and the number of cone programmes so far."""
 
-    def __init__(self, task: Task, ticks: int, still: bool) -> None:
-        self.heap: list[Node] = []
+    def __init__(self, task, ticks, still):
+        self.heap = []
         self.solved = 0
         self._task, self._ticks, self._hands = task, ticks, sorted(task.hands)
         self._numbers = itertools.count()
 
         @lru_cache(maxsize=1024)
-        def relaxation(hands: PartialSequence, merged: tuple[int, ...]) -> Relaxation:
+        def relaxation(hands, merged):
             return Relaxation(task, hands, merged, still)
 
         self.relaxation = relaxation
         # All solutions: by hand sequence, or in one subproblem if there are many sequences.
         goals = len(task.goals)
-        sequences: list[PartialSequence] = [(None,) * goals]
+        sequences = [(None,) * goals]
         if len(task.hands) ** goals <= _FEW_SEQUENCES:
             sequences = list(itertools.product(self._hands, repeat=goals))
         for hands in sequences if ticks else []:
             box = relaxation(hands, ()).first_box(self.longest(0))
             self.add(Subproblem(hands, (), mergeable(task, hands), box), 0.0)
 
-    def longest(self, moves: int) -> float:
+    def longest(self, moves):
         """Return the longest path of solutions that take fewer ticks with so many movements."""
         return max(0, self._ticks - 1 - moves) * PAPER.step
 
-    def branch(self, node: Node) -> None:
+    def branch(self, node):
         """Split a subproblem into others that together hold every solution in it."""
         problem, q = node.problem, node.relaxed.q
         moves = len(problem.hands) - len(problem.merged)
@@ -218,7 +215,7 @@ class ProofSearch:
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
 
-    def add(self, problem: Subproblem, parent: float) -> None:
+    def add(self, problem, parent):
         """Bound a subproblem; add it to the open ones if its bound is too low."""
         if problem.moves >= self._ticks:
             return
@@ -238,6 +235,6 @@ class ProofSearch:
         node = Node(ticks, next(self._numbers), length, problem, relaxed, lagrangian)
         heapq.heappush(self.heap, node)
 
-    def shortfall(self, lagrangian: Lagrangian, box: Array, moves: int) -> float:
+    def shortfall(self, lagrangian, box, moves):
         """Return by how much a bound is short of the longest path of interest."""
         return self.longest(moves) - (lagrangian.bound(box) - _TOLERANCE)

@@ -14,8 +14,6 @@ The same sum narrows intervals. If its least value is short of the longest path 
 ``slack``, an angle at which the term of a link exceeds its least value by more is on no such path.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -39,15 +37,15 @@ class Lagrangian(NamedTuple):
     sizes: Array
     towards: Array
 
-    def at(self, angles: Array) -> Array:
+    def at(self, angles):
         """Return the term of each link at its angle, shape ``(..., links)``."""
         return self.slopes * angles + self.sizes * np.cos(angles - self.towards)
 
-    def bound(self, box: Array) -> float:
+    def bound(self, box):
         """Return the bound on paths whose link angles are in a box, shape ``(links, 2)``, rad."""
         return self.constant + float(least(*self[1:], *box.T).sum())
 
-    def within(self, box: Array, slack: float) -> Array:
+    def within(self, box, slack):
         """Return the part of a box in which no term exceeds its least value by more than ``slack``.
 
         An end moves inwards while a parabola below the term is above that; a term bends by no more
@@ -65,7 +63,7 @@ class Lagrangian(NamedTuple):
         return ends.T
 
 
-def least(slopes: Array, sizes: Array, towards: Array, low: Array, high: Array) -> Array:
+def least(slopes, sizes, towards, low, high):
     """Return the least values of ``slope φ + size cos(φ - towards)`` from low to high, exactly.
 
     The term is least at an end or in a valley. Valleys are one turn apart: the first one is the

@@ -9,17 +9,13 @@ is searched first (``optimum/search``), and the bound is only shown. It takes ho
 tasks; ``--open`` leaves out what is proven, and what was tried with as many nodes.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
-from collections.abc import Iterator
-from typing import Any
 
 import shipped
 from certificate import certify
 
-from coartic import CoarticError, Task, execute, load_task
+from coartic import CoarticError, execute, load_task
 from coartic.baselines.optimum import OptimumSearch, with_locks
 from coartic.method import run_method
 from coartic.tasks.families import named_by
@@ -29,13 +25,13 @@ NODES = 20_000
 """Cone programmes for each task, some 300 a second with five goals."""
 
 
-def entries_of(task: Task, known: shipped.Entries) -> list[dict[str, Any]]:
+def entries_of(task, known):
     """Return the shipped entries of a task that have a reward: one for each restriction."""
     same = essence(task)
     return [each for each in known.values() if each["essence"] == same and "reward" in each]
 
 
-def searched(task: Task) -> dict[str, Any]:
+def searched(task):
     """Return an entry of the best solution that a search finds."""
     result, _ = run_method(OptimumSearch(), task)
     reward = execute(task, result.solution).reward
@@ -43,12 +39,12 @@ def searched(task: Task) -> dict[str, Any]:
     return {"task": task.name, "base": base, "other_arm": other_arm, "reward": reward}
 
 
-def is_open(entry: dict[str, Any], nodes: int) -> bool:
+def is_open(entry, nodes):
     """Return whether an entry has no proof, and a bound of fewer nodes."""
     return entry.get("bound") != entry["reward"] and (entry.get("nodes") or 0) < nodes
 
 
-def prove(task: Task, entry: dict[str, Any], nodes: int) -> None:
+def prove(task, entry, nodes):
     """Prove a bound with so many nodes; the entry keeps the sharper one."""
     still = entry["other_arm"] == "still"
     restricted = with_locks(task, entry["base"])
@@ -58,7 +54,7 @@ def prove(task: Task, entry: dict[str, Any], nodes: int) -> None:
     entry["nodes"] = nodes
 
 
-def in_words(entry: dict[str, Any]) -> str:
+def in_words(entry):
     """Return a sentence about an entry."""
     restriction = (entry["base"], entry["other_arm"])
     which = "" if restriction == shipped.FREE else " (base {}, other arm {})".format(*restriction)
@@ -68,7 +64,7 @@ def in_words(entry: dict[str, Any]) -> str:
     return f"{entry['task']}{which}: {reward}, {proof}"
 
 
-def proofs(names: list[str], nodes: int, open_alone: bool) -> Iterator[str]:
+def proofs(names, nodes, open_alone):
     """Prove bounds for tasks and write them; yield a sentence for each.
 
     Raises CoarticError for a task that cannot be used.
@@ -86,7 +82,7 @@ def proofs(names: list[str], nodes: int, open_alone: bool) -> Iterator[str]:
             yield in_words(entry)
 
 
-def main() -> None:
+def main():
     """Prove bounds for the tasks of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("tasks", nargs="+", metavar="TASK", help="name, range or file of a task")

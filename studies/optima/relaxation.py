@@ -17,19 +17,16 @@ The hand of a goal may be undecided. Either hand is then within a disc around th
 shoulders, whatever the arms do, and both arms may move: a relaxation of either choice.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import warnings
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cvxpy as cp
 import numpy as np
 from lagrangian import Array, Lagrangian, least
-from numpy.typing import NDArray
 
-from coartic import Hand, Task
+from coartic import Hand
 
 PartialSequence = tuple[Hand | None, ...]
 """A hand for each goal, None if it is undecided."""
@@ -66,9 +63,7 @@ class Relaxation:
     shape ``(links, 2)``, rad, of the chosen arms at the goals whose hand is decided, goal by goal.
     """
 
-    def __init__(
-        self, task: Task, hands: PartialSequence, merged: tuple[int, ...], still: bool
-    ) -> None:
+    def __init__(self, task, hands, merged, still):
         dof, goals, q0 = task.robot.dof, len(hands), np.array(task.q0)
         discs = [disc_of(task, hand) for hand in hands]
         self._radii = np.array([radius for _, radius in discs])
@@ -110,7 +105,7 @@ class Relaxation:
         ]
         self._problem = cp.Problem(cp.Minimize(cp.sum(lengths)), constraints)
 
-    def first_box(self, longest: float) -> Array:
+    def first_box(self, longest):
         """Return intervals that hold every link angle on a path no longer than ``longest``.
 
         An absolute angle is a sum of k relative ones, so it changes by at most √k times the
@@ -119,7 +114,7 @@ class Relaxation:
         reach = np.sqrt(self._sums.sum(axis=1)) * longest
         return np.stack([self._start_angles - reach, self._start_angles + reach], axis=1)
 
-    def solve(self, box: Array) -> Relaxed:
+    def solve(self, box):
         """Return the relaxation's shortest path in a box, and multipliers for the box."""
         self._half_spaces.value = half_spaces(box)
         # If the solver fails, what was found for the box before serves as well.
@@ -144,7 +139,7 @@ class Relaxation:
             forces=-value_of(self._hits.dual_variables[1]),
         )
 
-    def lagrangian(self, pulls: Array, forces: Array, longest: float) -> Lagrangian:
+    def lagrangian(self, pulls, forces, longest):
         """Return the Lagrangian of multipliers, for paths that are no longer than ``longest``."""
         weights = pulls.copy()  # of the joints' changes from the start
         weights[:-1] -= pulls[1:]
@@ -162,7 +157,7 @@ class Relaxation:
         return Lagrangian(constant, slopes, sizes, towards)
 
 
-def held_joints(task: Task, hands: PartialSequence, still: bool) -> NDArray[np.bool_]:
+def held_joints(task, hands, still):
     """Return whether joints cannot move on the way to each goal, shape ``(G, dof)``.
 
     ``still`` holds the arm that is not chosen; neither arm if the hand is undecided.
@@ -176,7 +171,7 @@ def held_joints(task: Task, hands: PartialSequence, still: bool) -> NDArray[np.b
     return held
 
 
-def disc_of(task: Task, hand: Hand | None) -> tuple[Array, float]:
+def disc_of(task, hand):
     """Return the position of the shoulder from the base, and the radius of a goal for a hand.
 
     For an undecided hand: the middle of the shoulders, and how far it may be from the goal while
@@ -192,7 +187,7 @@ def disc_of(task: Task, hand: Hand | None) -> tuple[Array, float]:
     return middle, task.radius + float(np.max(lengths + away))
 
 
-def split(box: Array, relaxed: Relaxed) -> tuple[Array, Array]:
+def split(box, relaxed):
     """Return two halves, across the angle whose direction the relaxation has most wrong.
 
     Weighting the errors by the forces, or by their cost in the Lagrangian, took up to fifty times
@@ -208,7 +203,7 @@ def split(box: Array, relaxed: Relaxed) -> tuple[Array, Array]:
     return below, above
 
 
-def half_spaces(box: Array) -> Array:
+def half_spaces(box):
     """Return coefficients of c, s and φ, and the most of their sum, ``(4, HALF_SPACES, links)``.
 
     They hold (c, s, φ) of every link in its interval: its ends; the chord; tangents to cosine and
@@ -231,17 +226,17 @@ def half_spaces(box: Array) -> Array:
     return np.array([along * cosine - across * sine, along * sine + across * cosine, turn, most])
 
 
-def offset_of(a: Array, b: Array, k: Array, half: Array) -> Array:
+def offset_of(a, b, k, half):
     """Return the maximum of ``a cos δ + b sin δ + k δ`` over |δ| <= half, exactly."""
     return -least(-k, np.hypot(a, b), np.arctan2(-b, -a), -half, half)
 
 
-def directions(angles: Array) -> Array:
+def directions(angles):
     """Return unit vectors of links at absolute angles (rad), shape ``(..., 2)``."""
     return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
-def value_of(variable: Any) -> Array:
+def value_of(variable):
     """Return the value of a variable or multiplier; zeros if the solver gives no value."""
     if variable.value is None:
         return np.zeros(variable.shape)

@@ -7,17 +7,14 @@ the solution of the best run of any method, if the reward is better than the shi
 the paper have an entry for each restriction of the search (``base``, ``other_arm``).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 
 import shipped
 
-from coartic import CoarticError, Task, builtin_tasks, load_task
+from coartic import CoarticError, builtin_tasks, load_task
 from coartic.analysis import load
 from coartic.analysis.optima import restrictions
-from coartic.analysis.study import Study
 from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import essence
 
@@ -27,7 +24,7 @@ MADE_BY = "coartic", "commit", "model_code", "python", "date"
 """Facts of a folder that entries have."""
 
 
-def ships(task: Task, restriction: tuple[str, str]) -> bool:
+def ships(task, restriction):
     """Return whether rewards of a task under a restriction ship."""
     if task.family not in shipped_families():
         return task.name in builtin_tasks()
@@ -35,7 +32,7 @@ def ships(task: Task, restriction: tuple[str, str]) -> bool:
     return is_early and restriction == shipped.FREE
 
 
-def take_over(study: Study, known: shipped.Entries) -> int:
+def take_over(study, known):
     """Take over what the runs of a folder improve; return the number of new entries.
 
     The first 500 runs of a method with its parameters on a task count. Raises CoarticError for a
@@ -70,7 +67,7 @@ def take_over(study: Study, known: shipped.Entries) -> int:
     return changed
 
 
-def main() -> None:
+def main():
     """Take over what the folders of the command line improve."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folders", nargs="+", metavar="FOLDER", help="results folder")

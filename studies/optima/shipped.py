@@ -4,32 +4,26 @@
 of families, whose solutions are in ``solutions.json.xz`` here.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
 import lzma
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from coartic import CoarticError, Movement, Task, execute
+from coartic import CoarticError, Movement, execute
 from coartic.tasks.optima import BASE, BEST_KNOWN, DATA, entries
 
 SOLUTIONS = Path(__file__).with_name("solutions.json.xz")
 FREE = (BASE, "free")
 """Restriction of entries without restriction: base and other arm."""
-Entries = dict[tuple[str, str, str], dict[str, Any]]
-"""Entries by task, lock of the base and other arm."""
 _COLUMNS = ("instance", "reward", "bound", "nodes", "hands", "essence")
 _DIGITS = 5  # of joints, where this does not change the reward
 
 
-def read() -> Entries:
-    """Return all entries; rows of instances as entries as well."""
+def read():
+    """Return all entries by task, lock of the base and other arm; rows of instances as well."""
     known = entries()
     solutions = json.loads(lzma.decompress(SOLUTIONS.read_bytes()))
     with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
@@ -44,7 +38,7 @@ def read() -> Entries:
     return {(entry["task"], entry["base"], entry["other_arm"]): entry for entry in known}
 
 
-def write(known: Entries) -> None:
+def write(known):
     """Write all entries into the files that they are from."""
     ranked = [known[key] for key in sorted(known)]
     rows = [entry | {"instance": entry["task"]} for entry in ranked if "/" in entry["task"]]
@@ -65,14 +59,14 @@ def write(known: Entries) -> None:
         unfinished.replace(path)
 
 
-def solution_in_short(task: Task, movements: Iterable[Movement], reward: int) -> list[Any]:
+def solution_in_short(task, movements, reward):
     """Return a solution as ``[goal, hand, kind, target, waypoints]`` for each movement.
 
     Raises CoarticError if its execution does not give the reward.
     """
     for digits in (_DIGITS, 17):
 
-        def short(joints: Any, digits: int = digits) -> Any:
+        def short(joints, digits=digits):
             return None if joints is None else np.round(joints, digits).tolist()
 
         content = [
@@ -84,7 +78,7 @@ def solution_in_short(task: Task, movements: Iterable[Movement], reward: int) ->
     raise CoarticError(f"{task.name}: the solution does not come to {reward}")
 
 
-def movements_of(content: list[Any]) -> tuple[Movement, ...]:
+def movements_of(content):
     """Return the movements of :func:`solution_in_short`."""
     return tuple(
         Movement(
