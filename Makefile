@@ -1,18 +1,18 @@
 # Two commands set everything up on a machine with Python >= 3.11 (with venv) and make:
 #   make benchmark   the paper's experiments, all methods, the report and the replication
 #   make test        the test suite
-# make benchmark FULL=1 adds the ablations and the search for the optima. make docs builds the
-# site; make findings and make studies make the numbers in it again.
+# make benchmark FULL=1 adds the ablations. make docs builds the site; make findings and make
+# studies make the numbers in it again.
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= results
 FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
-SUITES := comparison $(if $(FULL),ablations optimum)
+SUITES := comparison $(if $(FULL),ablations)
 STORED := comparison ablations families
 FAMILIES := one-armed two-armed aligned redundancy long many-goals
-STUDIES ?= $(notdir $(wildcard studies/[a-z]*))
+STUDIES ?= $(filter-out replication,$(notdir $(wildcard studies/[a-z]*)))
 
 .PHONY: benchmark test check format docs shipped findings studies speed release-check setup clean
 
@@ -77,8 +77,10 @@ studies: $(READY)
 	@for study in $(STUDIES); do \
 	  files=""; \
 	  for file in studies/$$study/*.v*.toml; do [ -e $$file ] && files="$$files --family-file $$file"; done; \
-	  if [ -e studies/$$study/protocols.py ]; then $(BIN)/python studies/$$study/protocols.py $(OUT)/$$study; else \
-	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; fi && \
+	  if [ -e studies/$$study/suite.toml ]; then \
+	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; \
+	  elif [ -e studies/$$study/protocols.py ]; then \
+	    $(BIN)/python studies/$$study/protocols.py $(OUT)/$$study; fi && \
 	  $(BIN)/python studies/$$study/study.py $(OUT)/$$study || exit; \
 	done
 	$(BIN)/python docs/make_findings.py

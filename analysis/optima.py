@@ -44,7 +44,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     ----------
     runs : DataFrame
         Stored runs of the folder, with ``task``, ``method``, ``setting``, ``run_id``, ``status``,
-        ``parameters``, ``reward`` and ``proven_bound`` (ticks), ``hands``.
+        ``parameters``, ``reward`` (ticks), ``hands``.
     tasks : iterable of Task
 
     Returns
@@ -52,8 +52,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     dict
         By the name of the task.
     """
-    asked = restrictions(runs)
-    solved = runs[(runs.status == "ok") & (asked.base == BASE)]
+    solved = runs[(runs.status == "ok") & (restrictions(runs).base == BASE)]
     is_search = solved.method.isin(SEARCHES)
     solved = pd.concat([solved[is_search], solved[~is_search]])  # of equal runs a search counts
     by_task, known = dict([*solved.groupby("task")]), {}
@@ -63,10 +62,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
         labels = {*map(label_of, here.method, here.setting)}
         if shipped is None and not len(searches) and len(labels) < 2:
             continue
-        # A search that keeps the other arm still proves nothing of solutions that move it.
-        bounds = [*searches.proven_bound[asked.other_arm[searches.index] == "free"].dropna()]
-        bounds += [shipped.bound] if shipped is not None and shipped.bound is not None else []
-        bound = min(map(int, bounds), default=None)
+        bound = None if shipped is None else shipped.bound
         if shipped is not None and not (here.reward > shipped.reward).any():
             best = BestKnown(shipped.reward, bound, shipped.hands)
         else:

@@ -1,11 +1,10 @@
-"""The optimum: the best reward that a global search finds, and a proof of how good it is.
+"""The search for the optimum: the best reward that a global search finds.
 
 Reward is lost in proportion to the joint-space path, so the shortest path that touches every disc
 is sought over all hand sequences, from the chains of posture graphs (layered dynamic programming).
 Every plan is then rounded to whole control ticks in every way, with and without goals that are hit
-as their turn comes because the other hand is already there. Branch and bound
-(:mod:`coartic.baselines.certificate`) proves a reward that nothing exceeds. A reference for the
-gaps of all other methods, not a competitor.
+as their turn comes because the other hand is already there. A reference for the gaps of all other
+methods, not a competitor. Bounds on the optima are proven outside the package (``studies/optima``).
 
 Another search for the same paths is ``trajectory-optimisation/path-length``, from graphs and starts
 of its own. When the shipped optima (``optima.json``) were made there was a third, from random
@@ -21,7 +20,6 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Task, TaskError, parse_task
-from coartic.baselines.certificate import certify
 from coartic.baselines.posture_graph import cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
@@ -32,7 +30,7 @@ MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the soluti
 
 
 class OptimumParameters(Parameters):
-    """The restriction, how long to search, and the budget of the proof."""
+    """The restriction, and how long to search."""
 
     other_arm: Literal["free", "still"] = "free"
     """``still``: the arm that is not chosen does not move."""
@@ -45,28 +43,24 @@ class OptimumParameters(Parameters):
     chains: Annotated[int, Field(ge=1)] = 100
     """Starts, over all graphs and hand sequences, each with the other arm spread out, too. With
     three, the best path known was missed on 9 of 40 random tasks for one arm."""
-    most_nodes: Annotated[int, Field(ge=0)] = 20_000
-    """Cone programmes that may be solved for the proof, some 300 a second with five goals. It ends
-    with the bound that it has then, and says how many ticks that leaves. 0: no proof."""
 
 
-class Optimum(Method):
-    """The shortest path over all hand sequences, in whole ticks, with a bound."""
+class OptimumSearch(Method):
+    """The shortest path over all hand sequences, in whole ticks."""
 
-    name = "optimum/branch-and-bound"
-    title = "Optimum: dynamic programming, with a proven bound"
+    name = "optimum/search"
+    title = "Optimum: dynamic programming over postures"
     citation = (
-        "G. P. McCormick (1976). Computability of global solutions to factorable nonconvex "
-        "programs. Mathematical Programming; P. J. Goulart, Y. Chen (2024). Clarabel: an "
-        "interior-point solver for conic programs with quadratic objectives."
+        "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "
+        "Journal of Guidance, Control, and Dynamics."
     )
     information = REWARD_INFORMATION
     stochastic = False
     Parameters = OptimumParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_nodes": 100}
+    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
     def solve(self, session: Session) -> Result:
-        """Search and prove; the solution has the fewest ticks found."""
+        """Search; the solution has the fewest ticks found."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)
@@ -93,21 +87,7 @@ class Optimum(Method):
             "failed_solves": plans.failed,
             "sequences_planned": len(plans.by_hands),
         }
-        if not parameters.most_nodes:
-            return Result(best.movements, details)
-        ticks = best.execution.ticks
-        with session.solving():
-            certificate = certify(
-                task, ticks, still=still, model=session.model, most_nodes=parameters.most_nodes
-            )
-        session.spend(solver_iterations=certificate.iterations)
-        details |= {
-            "proven_optimal": certificate.ticks == ticks,
-            "nodes": certificate.nodes,
-            "open_nodes": certificate.open_nodes,
-            "ticks_left": ticks - certificate.ticks,
-        }
-        return Result(best.movements, details, bound=-certificate.ticks)
+        return Result(best.movements, details)
 
 
 def with_locks(task: Task, base: str) -> Task:
@@ -122,4 +102,4 @@ def with_locks(task: Task, base: str) -> Task:
         raise MethodError("infeasible", str(error)) from None
 
 
-METHODS: tuple[type[Method], ...] = (Optimum,)
+METHODS: tuple[type[Method], ...] = (OptimumSearch,)

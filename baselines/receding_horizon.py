@@ -8,7 +8,7 @@ reaches the last goal is followed to its end, since planning again would find th
 a horizon of all goals it is the search for the optimum itself, so that its gap to the optimum is
 what the search alone costs.
 
-A window is planned as ``optimum/branch-and-bound`` plans a task (:mod:`coartic.baselines.
+A window is planned as ``optimum/search`` plans a task (:mod:`coartic.baselines.
 shortest_paths`): chains of posture graphs, IPOPT, whole ticks. Two things differ, for speed: the
 graphs are fewer and smaller, and only the shortest ``starts`` of them are polished. Without whole
 ticks in every window each goal would lose half a tick for a reason that has nothing to do with

@@ -107,16 +107,16 @@ class Instance:
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
 
 
-def held_joints(task: Task, hands: Sequence[Hand | None], *, still: bool) -> NDArray[np.bool_]:
+def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np.bool_]:
     """Joints that cannot move on the way to each goal, bool, shape ``(G, dof)``.
 
-    ``still`` holds the arm that is not chosen; of a hand that is undecided, None, neither.
+    ``still`` holds the arm that is not chosen.
     """
     held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
     held[:, ["xy".index(axis) for axis in task.locked_base]] = True
     for goal, hand in enumerate(hands):
         for arm in HANDS:
-            if arm not in task.hands or (still and hand not in (arm, None)):
+            if arm not in task.hands or (still and hand != arm):
                 held[goal, task.robot.joints(arm)] = True
     return held
 

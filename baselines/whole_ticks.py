@@ -145,20 +145,18 @@ class Rounding:
         return plan
 
 
-def mergeable(task: Task, hands: Sequence[Hand | None]) -> tuple[int, ...]:
-    """Goals (0-based) that can be hit without a movement; a hand of None is undecided.
+def mergeable(task: Task, hands: Sequence[Hand]) -> tuple[int, ...]:
+    """Goals (0-based) that can be hit without a movement.
 
     A goal can where its hand may be there already: at the start, or because another hand
     hits the goal before, or because the two discs overlap.
     """
-    first = task.hands if hands[0] is None else (hands[0],)
-    starts = [task.robot.forward_kinematics(task.q0, hand) for hand in first]
-    able = [0] if min(math.dist(q, task.goals[0]) for q in starts) <= task.radius else []
+    start = task.robot.forward_kinematics(task.q0, hands[0])
+    able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
     able += [
         g
         for g in range(1, len(hands))
-        if (hands[g] is None and len(task.hands) > 1)
-        or hands[g] != hands[g - 1]
+        if hands[g] != hands[g - 1]
         or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
     ]
     return tuple(able)

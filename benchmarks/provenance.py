@@ -24,8 +24,6 @@ from coartic.motion.compile import FINGERPRINT, PACKAGE
 
 _LIBRARIES = (
     "casadi",
-    "clarabel",
-    "cvxpy",
     "daqp",
     "llvmlite",
     "numba",

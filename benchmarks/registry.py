@@ -23,9 +23,8 @@ from coartic.internal.text import LONGEST_LINE, plain, unknown
 from coartic.internal.toml_files import check_file
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
-from coartic.runs.plan import SEARCH
 
-RESERVED = (METHOD_PREFIX, SEARCH)
+RESERVED = (METHOD_PREFIX, "optimum/")
 """Beginnings of ids that have a meaning in every table; they are reserved for built-in methods."""
 NAMES = ("CMA-ES", "learner", "optimum")
 """Names of built-in methods that an id of another method must not repeat."""

@@ -28,7 +28,6 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
             status=status,  # type: ignore[arg-type]
             reason="" if is_ok else plain(reason, LONGEST_REASON) or "it gave no reason",
             parts={},
-            bound=outcome.bound if status == outcome.status else None,
             environment=outcome.environment or current_environment(),
         )
         scores = {part: score_of(task, part, each) for part, each in parts.items() if is_ok}

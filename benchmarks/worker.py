@@ -32,7 +32,7 @@ from coartic.method import (
 from coartic.motion.solution import Movement
 from coartic.motion.trial import trials_outside
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import SEARCH, Job
+from coartic.runs.plan import Job
 from coartic.runs.record import PARTS, Outcome, Times
 
 _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
@@ -168,7 +168,7 @@ def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) 
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
             raise result
-        return Outcome("ok", **spent, **statement(method.name, result, session))
+        return Outcome("ok", **spent, **statement(result, session))
     except SolutionError as error:
         return Outcome("solver-failed", str(error), **spent)
     except NotApplicableError as error:
@@ -190,13 +190,13 @@ def place_of(error: BaseException, method: MethodInfo) -> str:
     return f"{Path(file).name}, line {lines[-1]}: " if lines else ""
 
 
-def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
+def statement(result: Any, session: Session) -> dict[str, Any]:
     """Return a method's result as plain data. Raises SolutionError for a result that cannot be
     stored."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
-    if result.bound is not None and not method.startswith(SEARCH):
-        raise SolutionError(f"it states a bound, which is for this project's methods {SEARCH}*")
+    if result.bound is not None:
+        raise SolutionError("it states a bound; bounds are proven outside of runs")
     try:
         parts = {
             part: [plain_movement(movement) for movement in getattr(result, part)]
@@ -205,7 +205,6 @@ def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
         }
         session.check_solution(parts["solution"])
         details = plain_details(result.details)
-        bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
     for part in ("initial", "replay"):
@@ -213,7 +212,7 @@ def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
             raise SolutionError(
                 f"movements in {part!r} follow a path; only those of a solution may"
             )
-    return {"parts": parts, "details": details, "bound": bound}
+    return {"parts": parts, "details": details}
 
 
 def plain_details(details: Any) -> dict[str, Any]:

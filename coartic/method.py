@@ -187,7 +187,7 @@ class Result:
     replay: tuple[Movement, ...] = ()
     """Movements of a learner's noiseless greedy trial after learning. None follows a path."""
     bound: int | None = None
-    """Proven upper bound of the reward; for searches of this project."""
+    """None: bounds of rewards are proven outside of runs."""
 
 
 class Outline(NamedTuple):

@@ -15,14 +15,12 @@ import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
 import pandas as pd
 from scipy import stats
 
 from coartic.analysis import fill_page, mean_beyond
 from coartic.analysis.judging import Verdict
 from coartic.analysis.methods import title_of
-from coartic.tasks.optima import BEST_KNOWN
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
@@ -115,27 +113,6 @@ def published_spreads() -> pd.DataFrame:
     return spreads.sort_index()
 
 
-def known_optima() -> pd.DataFrame:
-    """Count, by family, instances with best known rewards, and how near their bounds are.
-
-    Columns ``instances``, ``proven``, ``near`` (bound within 1 % of the reward), ``bounded``, and
-    ``median``: the median distance of a bound from the reward, per cent of the reward, for which an
-    instance without a bound counts as infinitely far.
-    """
-    instances = pd.read_csv(BEST_KNOWN)
-    instances["distance"] = 100 * (instances.bound - instances.reward) / -instances.reward
-    by_family = instances.groupby(instances.instance.str.partition("/")[0])
-    return pd.DataFrame(
-        {
-            "instances": by_family.size(),
-            "proven": by_family.distance.agg(lambda column: (column == 0).sum()),
-            "near": by_family.distance.agg(lambda column: (column <= 1).sum()),
-            "bounded": by_family.bound.count(),
-            "median": by_family.distance.agg(lambda column: column.fillna(np.inf).median()),
-        }
-    )
-
-
 def filled_pages() -> dict[str, str]:
     """Every page that is made from a template, by its path below ``docs``.
 
@@ -145,7 +122,7 @@ def filled_pages() -> dict[str, str]:
     values = {
         "table": table, "row": row, "claim": claim, "cells_of_the_paper": cells_of_the_paper,
         "verdicts": verdicts, "seen": seen,
-        "title_of": title_of, "known_optima": known_optima,
+        "title_of": title_of,
         "published_spreads": published_spreads,
         "p_of_shares": p_of_shares, "p_above": p_above,
         "published": tomllib.loads(

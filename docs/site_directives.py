@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -15,7 +14,7 @@ from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
 from coartic.play.page import part_of_page, play_page, player_figure, preset_of, up_or_down
-from coartic.tasks.optima import BEST_KNOWN, best_shipped
+from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import Task, shipped_tasks
 
 REPLICATION = Path(__file__).parents[1] / "studies" / "replication"
@@ -85,18 +84,6 @@ def tasks() -> Iterator[str]:
 
     heads = "task", "hands", "base", "goals (length units)", "best known reward", "reconstructed"
     yield from table(heads, map(row, shipped_tasks().values()))
-
-
-def families() -> Iterator[str]:
-    """Yield the table of the families with the number of proven optima."""
-    with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
-        instances = [*csv.DictReader(lines)]
-    rows = []
-    for family in dict.fromkeys(each["instance"].rpartition("/")[0] for each in instances):
-        best = [each for each in instances if each["instance"].startswith(f"{family}/")]
-        proven = sum(each["reward"] == each["bound"] for each in best)
-        rows.append((f"`{family}`", f"{proven} of {len(best)}"))
-    yield from table(("family", "optima proven"), rows)
 
 
 def columns() -> Iterator[str]:

@@ -1,10 +1,10 @@
-"""The search for the optimum: what is shipped is found again, and proven."""
+"""The search for the optimum: what is shipped is found again."""
 
 import numpy as np
 import pytest
 
 from coartic import load_task
-from coartic.baselines.optimum import Optimum, with_locks
+from coartic.baselines.optimum import OptimumSearch, with_locks
 from coartic.baselines.trajectory_optimisation import PathLength
 from coartic.baselines.whole_ticks import TickPlan
 from coartic.method import MethodError
@@ -15,29 +15,24 @@ from tests.support.strategies import changed, solve, tiny_task
 FEW = {"graphs": 1, "chains": 1, "nodes": 60}
 
 
-def test_two_searches_find_what_is_shipped_and_one_proves_it():
+def test_two_searches_find_what_is_shipped():
     task = load_task("descending")
-    for method in (Optimum, PathLength):
+    for method in (OptimumSearch, PathLength):
         result, execution, session = solve(method, task, **FEW)
         assert execution.reward == -304
         assert result.details["path_length"] == pytest.approx(3.005051233, abs=1e-8)
         assert session.meter.solver_iterations > 30
-        if method is Optimum:
-            assert (result.details["proven_optimal"], result.details["ticks_left"]) == (True, 0)
-            assert result.bound == -304
-    result, _, _ = solve(Optimum, task, **FEW, most_nodes=0)
-    assert result.bound is None
-    assert "proven_optimal" not in result.details
+        assert result.bound is None
 
 
 def test_searches_keep_the_other_arm_still():
     goals = [[2.6, 1.0], [-1.6, 1.0]]
     start = {"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
     task = tiny_task(goals=goals, start=start)
-    few = {"nodes": 40, "graphs": 1, "chains": 1, "most_nodes": 0}
+    few = {"nodes": 40, "graphs": 1, "chains": 1}
     travels = []
     for other_arm in ("free", "still"):
-        _, execution, _ = solve(Optimum, task, other_arm=other_arm, **few)
+        _, execution, _ = solve(OptimumSearch, task, other_arm=other_arm, **few)
         hands = hands_of(execution.hands)
         travels.append(other_arm_travel(task, hands, execution.configurations))
     assert travels[0] > travels[1] == 0.0
@@ -57,7 +52,7 @@ def test_the_base_is_locked_beside_the_task():
 def test_a_hand_that_is_there_already_saves_a_tick():
     """The left hand stands in goal 2 from the start: it is hit as its turn comes."""
     task = changed("two-armed-2", goals=[[4.5, 1.0], [3.5, 0.1]], initial_hands="RL")
-    _, execution, _ = solve(Optimum, task, **FEW, most_nodes=0)
+    _, execution, _ = solve(OptimumSearch, task, **FEW)
     assert execution.hands == "RL"
     assert execution.ticks_by_goal()[1] == 0
     assert execution.corrections == 0

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, load_task
-from coartic.baselines.optimum import Optimum
+from coartic.baselines.optimum import OptimumSearch
 from coartic.baselines.receding_horizon import RecedingHorizon
 from tests.support.processes import apart
 from tests.support.strategies import solve, tiny_task
@@ -53,7 +53,7 @@ def test_with_all_goals_in_view_it_is_the_search_for_the_optimum(name):
     task = load_task(name)
     nodes = 60
     result, execution = solved(task, nodes=nodes * len(task.hands), horizon=50, starts=1000)
-    reference, best = solved(task, Optimum, nodes=nodes, most_nodes=0)
+    reference, best = solved(task, OptimumSearch, nodes=nodes)
     assert execution.reward == best.reward
     assert result.details["windows"] == 1
     assert result.details["solves"] == reference.details["solves"]

@@ -233,7 +233,7 @@ def test_the_runs_of_a_batch_are_scored():
                 meter=Meter(trials=4), bound=-300, **information),
         Outcome("ok", details={"corrections": corrections[:-1]}, **information),
         Outcome("ok", times=times),
-        Outcome("ok", parts={"solution": movements, "replay": movements[:1]}, bound=-300),
+        Outcome("ok", parts={"solution": movements, "replay": movements[:1]}),
     ]  # fmt: skip
     job = Job(cell_on(task, info), 5, (0, 1, 2, 3), 60.0)
     runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]

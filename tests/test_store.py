@@ -159,8 +159,8 @@ def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
 
 
 MANY = {"runs": 30, "trials": 30}
-PROOF = cell_on(NEAR, KNOWN["optimum/branch-and-bound"], graphs=1, chains=1, nodes=60)
-PROVEN = [PROOF, *paper_cells()]
+SEARCH = cell_on(NEAR, KNOWN["optimum/search"], graphs=1, chains=1, nodes=60)
+SEARCHED = [SEARCH, *paper_cells()]
 
 
 def perform_until_killed(folder, most, progress):
@@ -171,7 +171,7 @@ def perform_until_killed(folder, most, progress):
         while at.done >= most:
             signal.pause()
 
-    perform(planned(PROVEN, **MANY), folder, executor=InProcess(), watch=watch)
+    perform(planned(SEARCHED, **MANY), folder, executor=InProcess(), watch=watch)
 
 
 @pytest.mark.process
@@ -180,8 +180,8 @@ def perform_until_killed(folder, most, progress):
     reason="forks a process that has imported everything, which is safe on Linux alone",
 )
 def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
-    """And what it has written is not begun again, a proof above all, which is the first run."""
-    whole, begun = run_and_write(tmp_path / "whole", PROVEN, **MANY), []
+    """And what it has written is not begun again, a search above all, which is the first run."""
+    whole, begun = run_and_write(tmp_path / "whole", SEARCHED, **MANY), []
 
     class Counts(InProcess):
         def perform(self, jobs):
@@ -207,9 +207,9 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
             there += plain_sql.execute("SELECT count(*) FROM results").fetchone()
     assert there == sorted(there)
     assert 0 < there[-1] < 211
-    resumed = run_and_write(folder, PROVEN, executor=Counts(), **MANY)
+    resumed = run_and_write(folder, SEARCHED, executor=Counts(), **MANY)
     assert len(begun) == 211 - there[-1]
-    assert "optimum/branch-and-bound" not in begun
+    assert "optimum/search" not in begun
     same_results(resumed, whole)
 
 

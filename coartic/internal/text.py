@@ -90,18 +90,19 @@ RENAMED = {
     "nullspace-qp/none": "posture-qp/current-goal",
     "nullspace-qp/next-goal": "posture-qp/goals-ahead",
     "trajectory-optimisation/squared-changes": "trajectory-optimisation/squared-displacement",
+    "optimum/branch-and-bound": "optimum/search",
 }
-"""Ids of methods that version 3.0.0 renamed."""
+"""Present ids of methods that were renamed."""
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """``; did you mean 'a'?`` with the name that is nearest; empty where none is near.
 
     Near are names that differ in small letters and punctuation, begin so, are spelt alike or end in
-    the same word, in this order. A method of version 2.0.0 has its present id instead.
+    the same word, in this order. A method that was renamed has its present id instead.
     """
     if RENAMED.get(name) in (names := list(names)):
-        return f"; since version 3.0.0 it is {RENAMED[name]!r}"
+        return f"; its present id is {RENAMED[name]!r}"
     words = {each: re.findall(r"[^\W_]+", each.lower()) for each in (name, *names)}
     meant = words.pop(name)
     if not meant:

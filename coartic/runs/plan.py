@@ -19,9 +19,6 @@ from coartic.model import PAPER
 from coartic.runs.method_info import MethodInfo
 from coartic.tasks.task import Task
 
-SEARCH = "optimum/"
-"""Beginning of the ids of searches for the optimum, the only methods that may state a bound."""
-
 
 @dataclass(frozen=True)
 class Cell:

@@ -77,7 +77,7 @@ class Outcome:
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
     """Movements by part (:data:`PARTS`), still to be executed and scored."""
     bound: int | None = None
-    """Proven reward that no solution exceeds."""
+    """Proven reward that no solution exceeds; in runs of version 3.0.0 and earlier alone."""
     details: dict[str, Any] = field(default_factory=dict)
     """Further data that the method keeps, such as corrective movements by trial."""
     used: tuple[str, ...] = ()
@@ -316,7 +316,7 @@ COLUMNS = tuple(
         ("other_arm_travel", "REAL", "solution.other_arm_travel",
          "joint travel of the arm that is not chosen, rad"),
         ("proven_bound", "INTEGER", "outcome.bound",
-         "reward that no solution can exceed, where a method proves one"),
+         "reward that no solution can exceed; in runs of version 3.0.0 and earlier alone"),
         ("build_s", "REAL", "counts.build_s", "seconds of setting up a solver's problems"),
         ("solve_s", "REAL", "counts.solve_s", "seconds of solving, without compiling"),
         ("wall_s", "REAL", "outcome.times.wall_s", "seconds of wall time"),

@@ -1,9 +1,8 @@
 """The best rewards known, as they are shipped, with what is proven about them.
 
-``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with run ids and
-solutions; ``docs/scripts/renew_optima.py`` makes it from the results folder of that suite.
-``best_known.csv`` holds the best reward that any method found for test instances of families;
-``docs/scripts/renew_best_known.py`` makes it from results folders.
+``optima.json`` has the best reward that any method found for the paper's tasks, with run ids and
+solutions, ``best_known.csv`` that for test instances of families. ``studies/optima`` takes over
+better rewards from results folders, and proves the bounds.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ from coartic.tasks.task import Task
 BASE = "task"
 """Base locked as the task has it: the case that rewards compare with."""
 DATA = Path(__file__).with_name("optima.json")
+"""Entries of the paper's tasks (:func:`entries`)."""
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
 """Columns ``instance``, ``reward``, ``bound`` (empty where nothing is proven), ``nodes`` (of the
 search that proved the bound), ``hands`` and ``essence``."""
@@ -82,8 +82,8 @@ def entries() -> list[dict[str, Any]]:
     ``task``, its :func:`essence`, ``base`` (directions in which it is locked; ``task``: as the task
     locks it), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``; then ``reward``,
     ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (reward that each found)
-    and ``solution`` (movements as :func:`coartic.runs.record.movements_from` reads them); or
-    ``infeasible``, why no search has a solution.
+    and ``solution`` (goal, hand, kind, target and waypoints of each movement); or ``infeasible``,
+    why no search has a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
     return content["optima"]

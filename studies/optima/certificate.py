@@ -1,14 +1,14 @@
-"""A proof that no solution takes fewer ticks: spatial branch and bound over relaxations.
+"""Proof that no solution takes fewer ticks: spatial branch and bound over relaxations.
 
-Whatever a method does, a solution in which every goal is hit passes through one
-configuration per goal, moves at most m per tick and pays one further tick for each
-movement, so that its ticks are at least
+Whatever a method does, a solution in which every goal is hit passes through one configuration for
+each goal, moves at most m per tick and pays one further tick for each movement, so that its ticks
+are at least
 
     (shortest path through such configurations) / m + (goals that are moved for).
 
-The path is bounded from below within boxes of link angles by :mod:`coartic.baselines.relaxation`;
-the narrower the intervals, the tighter the bound. Three things are split, until every subproblem
-is bounded above the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
+The path is bounded from below within boxes of link angles by :mod:`relaxation`; the narrower the
+intervals, the tighter the bound. Three things are split, until every subproblem is bounded above
+the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 
 - an interval of a link angle, in two;
 - a goal whose hand is undecided, into one subproblem for each hand. With five goals and more the
@@ -23,43 +23,26 @@ search can end at any time. The proven bound is then the least bound of the open
 bound from the speed of the hands (:func:`ticks_for_distance`), whichever is more.
 """
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import math
-from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from lagrangian import Array, Lagrangian
+from relaxation import PartialSequence, Relaxation, Relaxed, split
 
-from coartic import MotionModel, Task
-from coartic.baselines.relaxation import Lagrangian, PartialSequence, Relaxation, Relaxed, split
-from coartic.baselines.whole_ticks import mergeable
-from coartic.motion.trial import too_many_sequences
-from coartic.robot import HANDS, Array, Hand
+from coartic import PAPER
 
 _TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
+_MOST_SEQUENCES = 4096  # hand sequences that are bounded by distances
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
-class Certificate(NamedTuple):
-    """The proven bound, and the effort."""
-
-    ticks: int
-    """No solution takes fewer; the reward of any is at most minus this."""
-    nodes: int
-    """Cone programmes solved."""
-    open_nodes: int
-    """Subproblems that were neither split nor bounded when the search ended."""
-    iterations: int
-    """Iterations of the conic solver."""
-
-
-def fastest_hand(task: Task, hand: Hand) -> float:
-    """Largest norm of the hand's Jacobian: its path per joint-space path, length unit.
+def fastest_hand(task, hand):
+    """Return the largest norm of the hand's Jacobian: its path per joint-space path, length unit.
 
     The column of a joint is at right angles to its lever, which is no longer than the links beyond
     it; a base that moves has the unit vectors as its columns. The square of the norm is the largest
@@ -71,19 +54,20 @@ def fastest_hand(task: Task, hand: Hand) -> float:
     return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
 
 
-def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]]) -> int:
-    """Ticks that every solution takes with one of these hand sequences: by Cauchy and Schwarz.
+def ticks_for_distance(task, hands):
+    """Return ticks that every solution takes with one of these hand sequences: by Cauchy and
+    Schwarz.
 
     A hand that is in one disc and then in another goes at least the distance of their centres less
-    both radii, from the start that of the first goal less one. Per tick it goes no farther than
-    ``step`` times :func:`fastest_hand`, and one movement at least is made on the way, whose arrival
-    takes a tick beyond its steps. So a goal is hit no earlier than the goal before it, nor than
-    that many ticks after the goal that the same hand hit last. ``step`` is in joint space.
+    both radii, from the start that of the first goal less one. Per tick it goes no farther than a
+    step in joint space times :func:`fastest_hand`, and one movement at least is made on the way,
+    whose arrival takes a tick beyond its steps. So a goal is hit no earlier than the goal before
+    it, nor than that many ticks after the goal that the same hand hit last.
     """
-    speed = {hand: step * fastest_hand(task, hand) for hand in task.hands}
+    speed = {hand: PAPER.step * fastest_hand(task, hand) for hand in task.hands}
     start = {hand: task.robot.forward_kinematics(task.q0, hand) for hand in task.hands}
 
-    def least(sequence: Sequence[Hand]) -> int:
+    def least(sequence):
         where, when = {hand: (start[hand], 0.0, 0) for hand in task.hands}, 0
         for hand, goal in zip(sequence, task.goals, strict=True):
             place, radius, ticks = where[hand]
@@ -94,6 +78,25 @@ def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]])
         return when
 
     return min(map(least, hands))
+
+
+def mergeable(task, hands):
+    """Return the goals (0-based) that may be hit without a movement.
+
+    The hand of such a goal may be there already: at the start, or because another hand hits the
+    goal before, or because the two discs overlap.
+    """
+    first = [hand for hand in task.hands if hands[0] in (hand, None)]
+    starts = [task.robot.forward_kinematics(task.q0, hand) for hand in first]
+    able = [0] if min(math.dist(q, task.goals[0]) for q in starts) <= task.radius else []
+    able += [
+        g
+        for g in range(1, len(hands))
+        if hands[g] is None
+        or hands[g] != hands[g - 1]
+        or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
+    ]
+    return tuple(able)
 
 
 class Subproblem(NamedTuple):
@@ -108,7 +111,7 @@ class Subproblem(NamedTuple):
     """Intervals of the absolute link angles, shape ``(links, 2)``, rad."""
 
     @property
-    def moves(self) -> int:
+    def moves(self):
         """Least number of movements."""
         return len(self.hands) - len(self.merged) - len(self.open)
 
@@ -127,59 +130,51 @@ class Node(NamedTuple):
     lagrangian: Lagrangian
 
 
-def certify(
-    task: Task, ticks: int, *, still: bool, model: MotionModel, most_nodes: int
-) -> Certificate:
+def certify(task, ticks, most_nodes, *, still=False):
     """Prove that no solution takes fewer than ``ticks``, or as much as can be proven.
 
-    ``still`` holds the arm that is not chosen. The search ends when all is proven or after
-    ``most_nodes`` cone programmes.
+    Returns the proven ticks, and how many cone programmes this took. The search ends when all is
+    proven or after ``most_nodes`` of them. ``still`` holds the arm that is not chosen.
     """
-    search = ProofSearch(task, ticks, still, model.step)
+    search = ProofSearch(task, ticks, still)
     least = 0
-    if too_many_sequences(task.name, len(task.goals), len(task.hands)) is None:
+    if len(task.hands) ** len(task.goals) <= _MOST_SEQUENCES:
         sequences = itertools.product(task.hands, repeat=len(task.goals))
-        least = ticks_for_distance(task, model.step, sequences)
+        least = ticks_for_distance(task, sequences)
     while search.heap and search.solved < most_nodes and least < ticks:
         search.branch(heapq.heappop(search.heap))
-    least = max(least, math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks)
-    return Certificate(
-        ticks=min(least, ticks),
-        nodes=search.solved,
-        open_nodes=len(search.heap),
-        iterations=search.iterations,
-    )
+    proven = math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks
+    return min(max(least, proven), ticks), search.solved
 
 
 class ProofSearch:
-    """The open subproblems, and the effort so far."""
+    """The open subproblems, and the number of cone programmes so far."""
 
-    def __init__(self, task: Task, ticks: int, still: bool, step: float) -> None:
-        self.heap: list[Node] = []
-        self.solved = self.iterations = 0
-        self._task, self._ticks, self._step = task, ticks, step
+    def __init__(self, task, ticks, still):
+        self.heap = []
+        self.solved = 0
+        self._task, self._ticks, self._hands = task, ticks, sorted(task.hands)
         self._numbers = itertools.count()
-        self._robot_hands = tuple(hand for hand in HANDS if hand in task.hands)
 
         @lru_cache(maxsize=1024)
-        def relaxation(hands: PartialSequence, merged: tuple[int, ...]) -> Relaxation:
+        def relaxation(hands, merged):
             return Relaxation(task, hands, merged, still)
 
         self.relaxation = relaxation
         # All solutions: by hand sequence, or in one subproblem if there are many sequences.
         goals = len(task.goals)
-        sequences: list[PartialSequence] = [(None,) * goals]
-        if len(self._robot_hands) ** goals <= _FEW_SEQUENCES:
-            sequences = list(itertools.product(self._robot_hands, repeat=goals))
+        sequences = [(None,) * goals]
+        if len(task.hands) ** goals <= _FEW_SEQUENCES:
+            sequences = list(itertools.product(self._hands, repeat=goals))
         for hands in sequences if ticks else []:
             box = relaxation(hands, ()).first_box(self.longest(0))
             self.add(Subproblem(hands, (), mergeable(task, hands), box), 0.0)
 
-    def longest(self, moves: int) -> float:
-        """Path of any solution that takes fewer ticks with so many movements, or more."""
-        return max(0, self._ticks - 1 - moves) * self._step
+    def longest(self, moves):
+        """Return the longest path of solutions that take fewer ticks with so many movements."""
+        return max(0, self._ticks - 1 - moves) * PAPER.step
 
-    def branch(self, node: Node) -> None:
+    def branch(self, node):
         """Split a subproblem into others that together hold every solution in it."""
         problem, q = node.problem, node.relaxed.q
         moves = len(problem.hands) - len(problem.merged)
@@ -189,7 +184,7 @@ class ProofSearch:
         far = {
             g: min(
                 math.dist(self._task.robot.forward_kinematics(q[g], hand), self._task.goals[g])
-                for hand in self._robot_hands
+                for hand in self._hands
             )
             for g, decided in enumerate(problem.hands)
             if decided is None
@@ -200,7 +195,7 @@ class ProofSearch:
             bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3)
         ):
             # One subproblem for each hand, the new angles anywhere on a path of interest.
-            for hand in self._robot_hands:
+            for hand in self._hands:
                 hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
                 root = self.relaxation(hands, problem.merged)
                 of_goal = root.goal_of == goal
@@ -220,14 +215,13 @@ class ProofSearch:
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
 
-    def add(self, problem: Subproblem, parent: float) -> None:
+    def add(self, problem, parent):
         """Bound a subproblem; add it to the open ones if its bound is too low."""
         if problem.moves >= self._ticks:
             return
         root = self.relaxation(problem.hands, problem.merged)
         relaxed = root.solve(problem.box)
         self.solved += 1
-        self.iterations += relaxed.iterations
         lagrangian = root.lagrangian(relaxed.pulls, relaxed.forces, self.longest(0))
         slack = self.shortfall(lagrangian, problem.box, problem.moves)
         length = max(parent, self.longest(problem.moves) - slack)
@@ -237,12 +231,10 @@ class ProofSearch:
         if np.any(box[:, 0] > box[:, 1]):
             return
         problem = problem._replace(box=box)
-        ticks = length / self._step + problem.moves
-        heapq.heappush(
-            self.heap, Node(ticks, next(self._numbers), length, problem, relaxed, lagrangian)
-        )
+        ticks = length / PAPER.step + problem.moves
+        node = Node(ticks, next(self._numbers), length, problem, relaxed, lagrangian)
+        heapq.heappush(self.heap, node)
 
-    def shortfall(self, lagrangian: Lagrangian, box: Array, moves: int) -> float:
-        """By how much a bound is short of the longest path of interest."""
-        bound = lagrangian.constant + float(lagrangian.least(box).sum()) - _TOLERANCE
-        return self.longest(moves) - bound
+    def shortfall(self, lagrangian, box, moves):
+        """Return by how much a bound is short of the longest path of interest."""
+        return self.longest(moves) - (lagrangian.bound(box) - _TOLERANCE)

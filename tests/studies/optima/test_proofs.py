@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,22 +11,23 @@ from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, Task, execute, load_task
-from coartic.baselines.certificate import certify, fastest_hand, ticks_for_distance
-from coartic.baselines.relaxation import Relaxation, split, support_of
-from coartic.baselines.trajectory_problem import held_joints
-from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.solution import Movement, hand_sequences
 from coartic.robot import directions
 from coartic.tasks.task import hands_of, letters_of
+from tests.support.processes import program
 from tests.support.strategies import UNEVEN, changed, make_trials, uneven_task
 
+FOLDER = Path(__file__).parents[3] / "studies" / "optima"
+PROOF, RELAXED, LAGRANGIAN = (
+    program(FOLDER / f"{name}.py") for name in ("certificate", "relaxation", "lagrangian")
+)
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 
 
 @given(st.floats(1e-6, 12.0), st.lists(st.floats(-2, 2), min_size=3, max_size=3))
 def test_offsets_are_exact_maxima(half, normal):
     a, b, k = normal
-    offset = support_of(np.array(normal)[:, None, None], np.array([half])).item()
+    offset = RELAXED.offset_of(*np.array(normal)[:, None, None], np.array([half])).item()
     delta = np.linspace(-half, half, 40_001)
     cosine, sine = directions(delta).T
     true = (a * cosine + b * sine + k * delta).max()
@@ -75,8 +77,7 @@ def angles_of(task, hands, q):
 
 
 def bound(root, box, pulls, forces, longest):
-    lagrangian = root.lagrangian(pulls, forces, longest)
-    return lagrangian.constant + lagrangian.least(box).sum()
+    return root.lagrangian(pulls, forces, longest).bound(box)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -89,7 +90,7 @@ def test_a_relaxation_never_exceeds_a_true_path(name):
     checked = cut = 0
     for task, hands, q, length in itertools.islice(paths(name), 0, None, 4):
         for chosen in (hands, undecided(hands, rng)):
-            root = Relaxation(task, chosen, (), True)
+            root = RELAXED.Relaxation(task, chosen, (), True)
             box, angles = root.first_box(length), angles_of(task, chosen, q)
             assert np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
             for _ in range(5):
@@ -103,7 +104,7 @@ def test_a_relaxation_never_exceeds_a_true_path(name):
                 checked += 1
                 if not len(box):
                     break
-                below, above = split(box, relaxed)
+                below, above = RELAXED.split(box, relaxed)
                 inside = np.all((below[:, 0] <= angles) & (angles <= below[:, 1]))
                 tighter = below if inside else above
                 assert (tighter[:, 1] - tighter[:, 0]).sum() < (box[:, 1] - box[:, 0]).sum()
@@ -119,8 +120,8 @@ def test_any_multipliers_give_a_bound(name):
     rng = np.random.default_rng(3)
     for task, hands, q, length in paths(name):
         chosen = undecided(hands, rng)
-        root, angles = Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
-        moves = ~held_joints(task, chosen, still=True)
+        root, angles = RELAXED.Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
+        moves = ~RELAXED.held_joints(task, chosen, still=True)
         box = np.stack([angles - rng.random(len(angles)), angles + rng.random(len(angles))], 1)
         best = root.solve(box)
         for size in (0.0, 1e-3, 0.1, 1.0):
@@ -133,7 +134,7 @@ def test_any_multipliers_give_a_bound(name):
 def test_the_least_of_a_term_is_exact():
     rng = np.random.default_rng(4)
     task = load_task("two-armed-2")
-    root = Relaxation(task, hands_of("RLRR"), (), False)
+    root = RELAXED.Relaxation(task, hands_of("RLRR"), (), False)
     for _ in range(12):
         low = rng.uniform(-8, 8, 16)
         box = np.stack([low, low + rng.uniform(0, 9, 16)], 1)
@@ -142,7 +143,7 @@ def test_the_least_of_a_term_is_exact():
         sampled = np.linspace(*box.T, 1001)
         values = np.array([lagrangian.at(angles) for angles in sampled])
         true = values.min(axis=0)
-        least = lagrangian.least(box)
+        least = LAGRANGIAN.least(*lagrangian[1:], *box.T)
         assert np.all(least <= true + 1e-12)
         assert least == pytest.approx(true, abs=1e-4)
         left = lagrangian.within(box, 0.3)
@@ -168,7 +169,7 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         ),
         initial_hands="RR",
     )
-    assert not mergeable(task, hands_of("RR"))
+    assert not PROOF.mergeable(task, hands_of("RR"))
     least = np.inf
     for hands in itertools.product(task.hands, repeat=2):
         layers = []
@@ -192,42 +193,39 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         to_second, _ = KDTree(second[:, moving]).query(first[:, moving])
         least = min(least, (to_first + to_second).min())
     # In steps; the grid is not finer than one.
-    certificate = certify(task, 5000, still=True, model=PAPER, most_nodes=160)
-    merged = len(mergeable(task, (None, None)))
-    assert certificate.ticks <= math.ceil(least / PAPER.step) + 2
-    assert certificate.ticks >= math.floor(least / PAPER.step) + 2 - merged - 4
+    ticks, _ = PROOF.certify(task, 5000, 160, still=True)
+    merged = len(PROOF.mergeable(task, (None, None)))
+    assert ticks <= math.ceil(least / PAPER.step) + 2
+    assert ticks >= math.floor(least / PAPER.step) + 2 - merged - 4
 
 
 TWO = [list(goal) for goal in load_task("ascending").goals[:2]]
 
 
 @pytest.mark.parametrize(
-    ("task", "claim", "most_nodes", "proven", "ends"),
+    ("task", "claim", "most_nodes", "proven"),
     [
-        (changed("ascending", goals=TWO, initial_hands="RR"), 191, 300, 191, True),
+        (changed("ascending", goals=TWO, initial_hands="RR"), 191, 300, 191),
         # A goal in line needs the base alone: 1.9 less the disc, and the tick that ends it.
-        (changed("ascending", goals=[[6.5, 0.1]], initial_hands="R"), 191, 500, 191, True),
+        (changed("ascending", goals=[[6.5, 0.1]], initial_hands="R"), 191, 500, 191),
         # On this instance few cone programmes prove less than the distances alone.
-        (load_task("one-armed/v1/i028"), 813, 20, 520, False),
+        (load_task("one-armed/v1/i028"), 813, 20, 520),
     ],
 )
-def test_what_is_proven(task, claim, most_nodes, proven, ends):
-    certificate = certify(task, claim, still=True, model=PAPER, most_nodes=most_nodes)
-    assert certificate.ticks == proven
-    assert (certificate.open_nodes == 0) == ends
+def test_what_is_proven(task, claim, most_nodes, proven):
+    assert PROOF.certify(task, claim, most_nodes, still=True)[0] == proven
 
 
 def test_two_goals_hit_at_once_count_once():
     """Both hands stand at goals already: nothing has to move, so nothing is proven."""
     task = changed("two-armed-2", goals=[[3.5, 0.1], [4.5, 0.1]], initial_hands="LR", radius=0.1)
-    assert mergeable(task, hands_of("LR")) == (0, 1)
-    assert mergeable(task, hands_of("LL")) == (0,)
-    assert mergeable(task, (None, None)) == (0, 1)
+    assert PROOF.mergeable(task, hands_of("LR")) == (0, 1)
+    assert PROOF.mergeable(task, hands_of("LL")) == (0,)
+    assert PROOF.mergeable(task, (None, None)) == (0, 1)
     alone = [Movement(1, "left", "corrective"), Movement(2, "right", "corrective")]
     assert execute(task, alone).ticks == 0
-    certificate = certify(task, 1, still=False, model=PAPER, most_nodes=50)
-    assert certificate.ticks == 0
-    assert certify(task, 0, still=False, model=PAPER, most_nodes=50).ticks == 0
+    assert PROOF.certify(task, 1, 50)[0] == 0
+    assert PROOF.certify(task, 0, 50)[0] == 0
 
 
 @pytest.mark.parametrize("locked", [[], ["y"], ["x", "y"]])
@@ -242,7 +240,7 @@ def test_no_hand_is_faster_than_the_fastest(locked):
     moving[["xy".index(axis) for axis in locked]] = 0.0
     for hand in task.hands:
         norms = np.linalg.norm(UNEVEN.jacobian(q, hand) * moving, ord=2, axis=(1, 2))
-        assert fastest_hand(task, hand) == pytest.approx(norms.max(), rel=1e-12)
+        assert PROOF.fastest_hand(task, hand) == pytest.approx(norms.max(), rel=1e-12)
 
 
 def on_a_circle(start, angles):
@@ -277,6 +275,6 @@ def test_nothing_takes_fewer_ticks_than_the_distances_say(seed):
                 targets[:, g, joint] = before + ahead * (after - before)
         trials = make_trials(task, letters_of(hands), targets)
         best = trials.ticks[trials.completed].min()
-        ratios.append(ticks_for_distance(task, PAPER.step, [hands]) / best)
+        ratios.append(PROOF.ticks_for_distance(task, [hands]) / best)
         assert ratios[-1] <= 1.0
     assert max(ratios) > 0.8  # one hand goes as fast as it can; a chord is shorter than its arc

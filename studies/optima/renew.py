@@ -1,0 +1,84 @@
+"""Take over better rewards from results folders into the shipped data.
+
+    python studies/optima/renew.py results/families results/optima
+
+A task of the paper, or one of the first 40 test instances of a shipped family, gets the reward and
+the solution of the best run of any method, if the reward is better than the shipped one. Tasks of
+the paper have an entry for each restriction of the search (``base``, ``other_arm``).
+"""
+
+import argparse
+import sys
+
+import shipped
+
+from coartic import CoarticError, builtin_tasks, load_task
+from coartic.analysis import load
+from coartic.analysis.optima import restrictions
+from coartic.tasks.families import shipped_families
+from coartic.tasks.optima import essence
+
+MOST = 40
+"""Instances of each family."""
+MADE_BY = "coartic", "commit", "model_code", "python", "date"
+"""Facts of a folder that entries have."""
+
+
+def ships(task, restriction):
+    """Return whether rewards of a task under a restriction ship."""
+    if task.family not in shipped_families():
+        return task.name in builtin_tasks()
+    is_early = task.split == "test" and int(task.name.rpartition("/i")[2]) < MOST
+    return is_early and restriction == shipped.FREE
+
+
+def take_over(study, known):
+    """Take over what the runs of a folder improve; return the number of new entries.
+
+    The first 500 runs of a method with its parameters on a task count. Raises CoarticError for a
+    solution that does not give its reward on the shipped task of this name.
+    """
+    solutions, changed = study.movements(), 0
+    runs = study.stored[study.stored.run_id.isin(solutions)]
+    runs = runs[runs.status == "ok"].assign(**restrictions(runs)).astype({"reward": int})
+    for key, group in runs.groupby(["task", "base", "other_arm"]):
+        name, base, other_arm = map(str, key)
+        before, best = known.get((name, base, other_arm), {}), group.loc[group.reward.idxmax()]
+        if not ships(study.tasks[name], (base, other_arm)):
+            continue
+        if before.get("reward") is not None and before["reward"] >= best.reward:
+            continue
+        task, made_with = load_task(name), study.made_with
+        known[name, base, other_arm] = {
+            "task": name,
+            "essence": essence(task),
+            "base": base,
+            "other_arm": other_arm,
+            "run_ids": [best.run_id],
+            "made_by": {fact: made_with[fact] for fact in MADE_BY},
+            "reward": int(best.reward),
+            "hands": best.hands,
+            "bound": before.get("bound"),
+            "nodes": before.get("nodes"),
+            "searches": group.groupby("method").reward.max().to_dict(),
+            "solution": shipped.solution_in_short(task, solutions[best.run_id], int(best.reward)),
+        }
+        changed += 1
+    return changed
+
+
+def main():
+    """Take over what the folders of the command line improve."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folders", nargs="+", metavar="FOLDER", help="results folder")
+    known = shipped.read()
+    try:
+        for folder in parser.parse_args().folders:
+            print(f"{folder}: {take_over(load(folder), known)} better rewards")
+    except CoarticError as error:
+        sys.exit(str(error))
+    shipped.write(known)
+
+
+if __name__ == "__main__":
+    main()

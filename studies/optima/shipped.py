@@ -1,0 +1,92 @@
+"""Read and write the shipped best known rewards, with their bounds and solutions.
+
+``coartic/tasks/optima.json`` has entries of the paper's tasks, ``best_known.csv`` rows of instances
+of families, whose solutions are in ``solutions.json.xz`` here.
+"""
+
+import csv
+import io
+import json
+import lzma
+from pathlib import Path
+
+import numpy as np
+
+from coartic import CoarticError, Movement, execute
+from coartic.tasks.optima import BASE, BEST_KNOWN, DATA, entries
+
+SOLUTIONS = Path(__file__).with_name("solutions.json.xz")
+FREE = (BASE, "free")
+"""Restriction of entries without restriction: base and other arm."""
+_COLUMNS = ("instance", "reward", "bound", "nodes", "hands", "essence")
+_DIGITS = 5  # of joints, where this does not change the reward
+
+
+def read():
+    """Return all entries by task, lock of the base and other arm; rows of instances as well."""
+    known = entries()
+    solutions = json.loads(lzma.decompress(SOLUTIONS.read_bytes()))
+    with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
+        for row in csv.DictReader(lines):
+            name = row["instance"]
+            numbers = {
+                column: int(row[column]) if row[column] else None
+                for column in ("reward", "bound", "nodes")
+            }
+            entry = {"task": name, "base": BASE, "other_arm": "free", "solution": solutions[name]}
+            known.append(row | numbers | entry)
+    return {(entry["task"], entry["base"], entry["other_arm"]): entry for entry in known}
+
+
+def write(known):
+    """Write all entries into the files that they are from."""
+    ranked = [known[key] for key in sorted(known)]
+    rows = [entry | {"instance": entry["task"]} for entry in ranked if "/" in entry["task"]]
+    table = io.StringIO()
+    writer = csv.DictWriter(table, _COLUMNS, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    solutions = json.dumps({row["task"]: row["solution"] for row in rows}).encode()
+    optima = {"optima": [entry for entry in ranked if "/" not in entry["task"]]}
+    text = f"{json.dumps(optima, indent=1, ensure_ascii=False)}\n"
+    for path, content in (
+        (BEST_KNOWN, table.getvalue().encode("ascii")),
+        (SOLUTIONS, lzma.compress(solutions, preset=9)),
+        (DATA, text.encode()),
+    ):
+        unfinished = path.with_name(f"{path.name}.new")
+        unfinished.write_bytes(content)
+        unfinished.replace(path)
+
+
+def solution_in_short(task, movements, reward):
+    """Return a solution as ``[goal, hand, kind, target, waypoints]`` for each movement.
+
+    Raises CoarticError if its execution does not give the reward.
+    """
+    for digits in (_DIGITS, 17):
+
+        def short(joints, digits=digits):
+            return None if joints is None else np.round(joints, digits).tolist()
+
+        content = [
+            [each.goal, each.hand, each.kind, short(each.target), short(each.waypoints)]
+            for each in movements
+        ]
+        if execute(task, movements_of(content)).reward == reward:
+            return content
+    raise CoarticError(f"{task.name}: the solution does not come to {reward}")
+
+
+def movements_of(content):
+    """Return the movements of :func:`solution_in_short`."""
+    return tuple(
+        Movement(
+            goal,
+            hand,
+            kind,
+            None if target is None else np.array(target, dtype=np.float64),
+            waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
+        )
+        for goal, hand, kind, target, waypoints in content
+    )
