@@ -12,6 +12,8 @@ _MODULES = {
     "TwoContexts": "analysis.signatures.two_contexts",
     "all_of": "analysis.judging",
     "beyond_p": "analysis.signatures.context_tests",
+    "contexts_of_control": "analysis.control",
+    "control_suite": "analysis.control",
     "ecdf": "analysis.frames",
     "fill_page": "analysis.pages",
     "gaps": "analysis.frames",
@@ -20,6 +22,7 @@ _MODULES = {
     "load": "analysis.study",
     "mean": "estimates",
     "mean_beyond": "analysis.judging",
+    "mean_excess": "analysis.control",
     "means": "analysis.frames",
     "number": "analysis.words",
     "other_tasks": "analysis.statistics.instances",
@@ -27,6 +30,7 @@ _MODULES = {
     "shares": "analysis.frames",
     "solutions_of": "analysis.frames",
     "runtimes": "analysis.sections.costs",
+    "with_control": "analysis.control",
     "write_study": "analysis.pages",
 }
 __all__ = [*_MODULES]

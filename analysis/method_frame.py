@@ -92,16 +92,16 @@ def method_row(
 def group_of(cells: Iterable[CellRuns]) -> str:
     """Return the group of a method, one of :data:`GROUPS`, from its cells.
 
+    A method that learns from the reward of its trials is in the first group, whatever else it uses.
     A method that makes a single trial on every task does not use the reward of trials.
     """
     parts = [cell.runs for cell in cells]
     information = {each for runs in parts for text in runs.information.unique()
                    for each in text.split(", ")}  # fmt: skip
-    if Information.REWARD_FORMULA.value in information:
-        return BY_FORMULA
     several = any((runs.trials > 1).any() for runs in parts)
-    learns = several and Information.REWARD_BY_TRIAL.value in information
-    return BY_TRIAL if learns else WITHOUT_REWARD
+    if several and Information.REWARD_BY_TRIAL.value in information:
+        return BY_TRIAL
+    return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
 
 
 def joined_conditions(

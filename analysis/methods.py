@@ -51,7 +51,7 @@ _WORDS = {
     "noise_sd": "σ ",
     "epsilon": "ε ",
     "hands": "hands ",
-    "half_width": "± ",
+    "sigma": "σ ",
     "stop": "stop ",
 }
 """Words for parameters, before their values."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -55,13 +55,6 @@ class Solutions:
             if (reference := references[run.hands]).completed:
                 row[:] = np.subtract(run.ticks_by_goal(), reference.ticks_by_goal())
         return changes
-
-    def improved(self) -> Solutions:
-        """Return the runs that take fewer ticks than the corrective process alone with their
-        hands."""
-        chosen = np.flatnonzero(self.against_same_hands.sum(axis=1) < 0).tolist()
-        run_ids = tuple(self.run_ids[n] for n in chosen if self.run_ids)
-        return replace(self, runs=tuple(self.runs[n] for n in chosen), run_ids=run_ids)
 
 
 def initial_solution(task: Task) -> Execution | None:

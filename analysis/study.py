@@ -192,15 +192,28 @@ class Study:
         return best_known(self.stored, self.tasks.values())
 
     @cached_property
+    def corrective_best(self) -> dict[str, float]:
+        """Reward of the corrective process alone with its best hands by task, from which gain,
+        share and targets count.
+
+        With the task's initial hands where there are over 4,096 hand sequences; NaN if the
+        corrective process completes the task with none.
+        """
+        alone = {}
+        for name in self.tasks:
+            of_hands = self.sequences(name).reward
+            highest = max(of_hands.dropna(), default=math.nan)
+            alone[name] = highest if len(of_hands) else initial_reward(self.tasks[name])
+        return alone
+
+    @cached_property
     def runs(self) -> pd.DataFrame:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
         Further columns: ``family``, ``split``, number of ``goals``, of ``arms`` (1 or 2),
-        ``best_known`` reward of the task and ``corrective_best``, the reward of the corrective
-        process alone with its best hands (with the task's initial hands where there are over 4,096
-        hand sequences; NaN if it completes the task with none); ``gap``, a share of the best known
-        reward; and parameters by name, but for names that are taken: ``trials`` is the number of
-        trials made, ``hands`` the hands of the solution.
+        ``best_known`` reward of the task and :attr:`corrective_best`; ``gap``, a share of the best
+        known reward; and parameters by name, but for names that are taken: ``trials`` is the
+        number of trials made, ``hands`` the hands of the solution.
         """
         runs, tasks = self.stored, self.tasks
         parameters = {text: json.loads(text) for text in runs.parameters.unique()}
@@ -219,12 +232,7 @@ class Study:
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: each.reward for name, each in self.optima.items()}
         runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
-        alone = dict[str, float]()
-        for name in best:
-            of_hands = self.sequences(name).reward
-            highest = max(of_hands.dropna(), default=math.nan)
-            alone[name] = highest if len(of_hands) else initial_reward(tasks[name])
-        runs["corrective_best"] = runs.task.map(alone).astype(np.float64)
+        runs["corrective_best"] = runs.task.map(self.corrective_best).astype(np.float64)
         rewards = runs[["reward", "best_known"]].astype("Float64")
         runs["gap"] = gap_share(*rewards.to_numpy(np.float64, na_value=np.nan).T)
         runs.attrs["units"] = UNITS
@@ -301,7 +309,7 @@ class Study:
         ----------
         task, method : str
             Names as in :attr:`runs`; a setting follows its method: ``"random-search
-            half_width=0.5"``. Conditions of the learner may go by their own names, ``"EC4"``.
+            sigma=0.1"``. Conditions of the learner may go by their own names, ``"EC4"``.
         replay : bool
             Execute the noiseless trial after learning in place of the solution, for runs that have
             such a trial. The solution of a learner is its best trial; the replay shows what was
@@ -386,17 +394,13 @@ class Study:
         return SIGNATURES[name].of(self.executed(task, method, replay=replay))
 
     @cached
-    def signature_by_hands(
-        self, name: str, task: str, method: str, *, every: bool = False
-    ) -> dict[str, Array]:
-        """Return a signature of the runs of a method on a task that improved, by hand sequence.
+    def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
+        """Return a signature of the runs of a method on a task by hand sequence.
 
-        A run improved if it takes fewer ticks than the corrective process alone with the same
-        hands; ``every``: of all runs. Arrays have shape ``(n,)``; runs without the signature are
-        left out. Signature ``hand``, the choice of hands itself, is of all hand sequences together.
+        Arrays have shape ``(n,)``; runs without the signature are left out. Signature ``hand``, the
+        choice of hands itself, is of all hand sequences together, ``""``.
         """
         executed = self.executed(task, method)
-        executed = executed if every else executed.improved()
         values = SIGNATURES[name].each(executed)
         hands = np.array(["" if name == "hand" else run.hands for run in executed.runs])
         there = np.isfinite(values)

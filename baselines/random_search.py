@@ -1,23 +1,15 @@
-"""Random search: uniform noise on target configurations; the best trial is kept.
+"""Random search: the paper's learner without its memory; the best trial is kept.
 
-``random-search`` is the best of uniformly drawn targets around the corrective process with its best
-hands. It cannot coarticulate by learning: no target depends on any reward. Its best trial shows the
-effect of selecting one of many noisy trials by the reward of the whole task. A signature of
-coarticulation of a method that selects its solution from trials counts if it exceeds this one. The
-half width was tuned for reward at 10 000 trials on 24 development instances (twelve for one arm,
-four of each of two-armed, aligned and redundancy), two runs each. Mean gain over the corrective
-process with the best hands, per cent: 0.06 2.53, 0.08 2.67, 0.10 2.80, 0.12 2.83, 0.15 2.80, 0.20
-2.75, 0.25 2.68. Other widths show larger signatures. Means over twelve development instances each,
-for 0.06, 0.12, 0.18, 0.25, 0.5 and 1.0: first movement slower by -2.3, -2.2, -2.1,
--0.1, 3.1 and 2.7 ticks with one arm, 0.2, 2.0, 2.4, 3.6, 2.8 and 0 with two; next goal nearer by
-5.5, 8.0, 9.6, 14.2, 19.0 and 18.7, and by 2.2, 3.2, 3.1, 2.5, 1.0 and 0; path of the idle hand
-0.06, 0.07, 0.16, 0.24, 0.30 and 0; on four long tasks next goal nearer by 1.6, 1.9 and from 0.18 on
-0. So suites have all of these but the last.
+Every trial draws Gaussian noise with the learner's standard deviation around the postures in which
+the corrective process hits the goals; trial 0 is the corrective process alone. No target depends on
+any reward, so that random search cannot coarticulate by learning: its best trial shows the effect
+of selecting one of many noisy trials by the reward of the whole task. It is the control of
+signatures of coarticulation (:mod:`coartic.analysis.control`), and differs from the learner in one
+thing: it forgets.
 
-``random-search`` has the hands with which the corrective process alone does best, so that its
-hands could not come out otherwise. In ``random-search/hands`` every sequence gets as many of the
-trials, the first by the corrective process alone, the others around it. The best of all is the
-solution.
+``random-search`` has the hands with which the corrective process alone does best, or those that are
+given. In ``random-search/hands`` every hand sequence gets as many of the trials; the best of all is
+the solution.
 """
 
 from __future__ import annotations
@@ -25,34 +17,52 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
+from coartic.learner.conditions import MOST_NOISE
 from coartic.learner.learning import TRIALS
 from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
-from coartic.optimisers import (
-    OPTIMISER_INFORMATION,
-    Objective,
-    Optimiser,
-    OptimiserParameters,
-    sequences_of,
-)
+from coartic.optimisers import OPTIMISER_INFORMATION, Objective, sequences_of
 
 _POINTS_AT_ONCE = 500
 
 
-class RandomSearchParameters(OptimiserParameters):
+class RandomSearchHandsParameters(Parameters):
+    """Parameters of random search with every hand sequence."""
+
+    trials: Annotated[int, Field(gt=0)] = TRIALS
+    """Trials of a run, the corrective process alone among them."""
+    sigma: Annotated[float, Field(gt=0, le=MOST_NOISE)] = 0.05
+    """SD of the noise on each explored joint, length unit (base) and rad (joints): the
+    learner's."""
+
+
+class RandomSearchParameters(RandomSearchHandsParameters):
     """Parameters of random search."""
 
-    half_width: Annotated[float, Field(gt=0, le=100)] = 0.12
-    """Half the width of the box of targets, length unit (base) and rad (joints)."""
+    hands: str | None = None
+    """Hand sequence; by default the sequence with which the corrective process alone does best, or
+    the task's own where there are too many to try."""
 
 
-class RandomSearch(Optimiser):
-    """Uniform targets in a box around the postures in which the corrective process hits the goals.
+def draw_trials(session: Session, hands: str | None, sigma: float, trials: int) -> Objective:
+    """Make trials with noise around the corrective process's postures; return their objective.
 
-    The hands are those with which the corrective process alone does best. The best trial is the
-    solution; the first is the corrective process alone.
+    Raises BudgetError if no trial is left, and MethodError if the corrective process completes no
+    hand sequence.
+    """
+    problem = Objective(session, hands, trials=trials)
+    with suppress(BudgetError):
+        while True:
+            noise = session.rng.normal(0.0, sigma, (_POINTS_AT_ONCE, problem.dim))
+            problem.many(problem.x0 + noise)
+    return problem
+
+
+class RandomSearch(Method):
+    """Gaussian noise around the postures in which the corrective process hits the goals.
+
+    The best trial is the solution.
     """
 
     name = "random-search"
@@ -61,22 +71,18 @@ class RandomSearch(Optimiser):
         "L. A. Rastrigin (1963). The convergence of the random search method in the extremal "
         "control of a many parameter system. Automation and Remote Control."
     )
+    information = OPTIMISER_INFORMATION
     Parameters = RandomSearchParameters
 
-    def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
+    def solve(self, session: Session) -> Result:
         """Draw targets until no trial is left."""
-        low, high = objective.bounds.T
-        while True:
-            objective.many(rng.uniform(low, high, (_POINTS_AT_ONCE, objective.dim)))
-
-
-class RandomSearchHandsParameters(Parameters):
-    """Parameters of random search with every hand sequence."""
-
-    trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, as many for each hand sequence."""
-    half_width: Annotated[float, Field(gt=0, le=100)] = 0.12
-    """Half the width of the box of targets, length unit (base) and rad (joints)."""
+        parameters: RandomSearchParameters = self.parameters
+        with session.solving():
+            try:
+                best = draw_trials(session, parameters.hands, parameters.sigma, parameters.trials)
+            except BudgetError:
+                raise MethodError("infeasible", "the budget leaves no trial to make") from None
+        return Result(best.solution, {"evaluations": best.evaluations})
 
 
 class RandomSearchHands(Method):
@@ -90,19 +96,16 @@ class RandomSearchHands(Method):
 
     def solve(self, session: Session) -> Result:
         """Draw targets for one sequence after the other; the solution is the best trial's."""
-        sequences = sequences_of(session)
-        left = session.trials_left
-        trials = self.parameters.trials if left is None else min(self.parameters.trials, left)
+        parameters: RandomSearchHandsParameters = self.parameters
+        sequences, left = sequences_of(session), session.trials_left
+        trials = parameters.trials if left is None else min(parameters.trials, left)
         shares = [trials * n // len(sequences) for n in range(len(sequences) + 1)]
         problems: list[Objective] = []
         with session.solving():
             for n, hands in enumerate(sequences):
-                share, width = shares[n + 1] - shares[n], self.parameters.half_width
                 with suppress(BudgetError, MethodError):
-                    problem = Objective(session, hands, half_width=width, trials=share)
-                    problems.append(problem)
-                    low, high = problem.bounds.T
-                    problem.many(session.rng.uniform(low, high, (share - 1, problem.dim)))
+                    share = shares[n + 1] - shares[n]
+                    problems.append(draw_trials(session, hands, parameters.sigma, share))
         if not problems:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         best = min(problems, key=lambda problem: problem.best_cost)

@@ -10,7 +10,7 @@ import math
 from shlex import quote
 from typing import Any
 
-from coartic.analysis.random_search import every_random_search_for
+from coartic.analysis.control import contexts_of_control
 from coartic.analysis.sections.coarticulation import shared_goal
 from coartic.analysis.sections.own import own_methods
 from coartic.analysis.standings import compared
@@ -25,7 +25,7 @@ def player(study: Study) -> str:
 
     The figure has a preset for each task, with the run nearest the median reward of each method
     that moves straight. The first preset is the goal that two tasks share, if two tasks do, with
-    the largest standardised posture difference of random search there.
+    the standardised posture difference of random search there.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
@@ -37,9 +37,9 @@ def player(study: Study) -> str:
             "optimum": None,
         }
         both["runs"] = methods_played(study, [up.name, down.name])
-        every = every_random_search_for(study, shared)
-        by_chance = [float(each.standardised_posture_difference) for each in every]
-        presets.append(both | {"by_chance": max(filter(math.isfinite, by_chance), default=None)})
+        control = contexts_of_control(study, shared)
+        by_chance = control.standardised_posture_difference if control else math.nan
+        presets.append(both | {"by_chance": by_chance if math.isfinite(by_chance) else None})
     alone = {
         name: preset_of(task) | {"runs": methods_played(study, [name])}
         for name, task in one_by_one(study).items()

@@ -28,11 +28,11 @@ from coartic.internal.text import one_line
 
 IN_LATEX = {
     "own": "task, method, runs, reward, gap, nearest, nearest_gap",
-    "contexts": "place, method, runs, distance, standardised_difference, p_holm, p_random_search",
+    "contexts": "place, method, runs, distance, p_holm, control, p_random_search",
     "ranking": "method, gap, on *",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "learning": "task, method, runs, after_*, trials_to_half_gain",
-    "signatures": "task, method, runs, first, total, as_in_isolation, preshaping",
+    "signatures": "task, method, hands, runs, first, first_control, first_p, arm, arm_p",
     "family-gaps": "method, gap, in *",
     "tasks": "task, arms, base, initial, optimum, bound",
     "methods": "task, method, runs, reward, gap, hands, trials",

@@ -12,7 +12,6 @@ from coartic.analysis.sections import (
     learning,
     methods,
     own,
-    random_search,
     random_tasks,
     ranking,
     scores,
@@ -73,9 +72,8 @@ SECTIONS = (
         figure=coarticulation.draw_postures,
         sentence=coarticulation.next_goal,
         answer="Coarticulation",
-        note="Postures are compared in length units and rad. Random search learns "
-        "nothing; the best of many is selected. Its rows in the table are of all runs, figure and "
-        "sentence of the runs that improved on the corrective process.",
+        note="Postures are compared in length units and rad. Random search is "
+        "the learner without its memory: the best of as many trials is selected. All runs count.",
     ),
     Section(
         "nearest",
@@ -137,24 +135,15 @@ SECTIONS = (
         "Signatures",
         "Which signatures of coarticulation does each method show?",
         table=coarticulation.list_signatures,
-        caption="Signatures of coarticulation, means over goals and runs",
+        caption="Signatures of coarticulation, means over runs, next to random search",
         sentence=coarticulation.joints_or_hand,
         note="Ticks are compared with those of the corrective process with the same hands. A first "
         "movement that gets slower while the whole task gets faster is sacrificed for it. Idle "
-        "hand nearer: share of the path to its next goal that a hand covers while idle.",
-        folded=True,
-    ),
-    Section(
-        "random-search",
-        "Random search",
-        "Is it more than selection alone?",
-        table=random_search.list_beside_random_search,
-        caption="Signatures beside random search with the same hands, means over runs",
-        note="Random search learns nothing: it selects the best of many targets, drawn in a box "
-        "around the corrective process's postures. Runs improved if they take fewer ticks than the "
-        "corrective process alone with the same hands; other runs show nothing. Of several widths "
-        "of the box, the one that shows most counts, in each column, if it has three such runs. "
-        "p is one-tailed, uncorrected.",
+        "hand nearer: share of the path to its next goal that a hand covers while idle. A row has "
+        "the runs with one hand sequence (of at least a tenth of a method's runs); random search, "
+        "the learner without its memory, has the same hands and as many trials, and all its runs "
+        "count. The choice of hands, in rows without a sequence, is compared with random search "
+        "that tries every sequence. p is one-tailed, uncorrected; a dash: no such random search.",
         folded=True,
     ),
     Section(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from operator import attrgetter
-from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -15,28 +13,23 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
+from coartic.analysis.control import contexts_of_control, selects, with_control
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH
-from coartic.analysis.random_search import (
-    context_beyond_p,
-    every_random_search_for,
-    random_search_for,
-    selects,
-)
 from coartic.analysis.signatures.context_tests import smallest_p
-from coartic.analysis.signatures.measures import as_in_isolation, preshaping_of_the_other_arm
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.standings import failed_runs, is_learner
-from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, row_of_cell, runs_of, table
 from coartic.analysis.words import number, p_value
 from coartic.drawing import MARKERS
-from coartic.estimates import LEVEL
+from coartic.estimates import LEVEL, difference_of_means, mean
 from coartic.internal.text import counted
-from coartic.robot import HANDS, Array
+from coartic.robot import HANDS
 
 SAME = 1e-9
 """Largest posture difference that is rounding, length unit and rad mixed."""
@@ -73,7 +66,8 @@ def shared_goal(study: Study) -> TwoContexts | None:
 @table(
     "method; place: shared goal; runs; distance: posture difference .2; "
     "standardised_difference: standardised posture difference (SD of the runs) .1; "
-    "p_holm: p (corrected) .p; p_random_search: p beyond random search .p; "
+    "p_holm: p (corrected) .p; control: random search .2; control_runs: its runs; "
+    "p_random_search: p beyond random search .p; "
     "equivalent: difference that keeps the hand in place (null space, per dimension) .3; "
     "other: difference that moves the hand (per dimension) .3"
 )
@@ -93,7 +87,7 @@ def list_contexts(study: Study) -> Rows:
                 "distance": shared.posture_difference,
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
-                "p_random_search": context_beyond_p(study, shared),
+                **beside_control(study, shared),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **runs_of(*(study.cells[task.name, label] for task in shared.tasks)),
@@ -102,50 +96,74 @@ def list_contexts(study: Study) -> Rows:
 
 
 @table(
-    "task; method; runs; first: first movement slower by (ticks) .1; "
-    "total: whole task slower by (ticks) .1; "
-    "as_in_isolation: same hand as for the goal alone (%) .0; "
-    "preshaping: idle hand nearer to its next goal (share) .2"
+    "task; method; hands; runs; control_runs: runs of random search; "
+    + "; ".join(
+        f"{column}[]: {words} .{digits}; {column}_control: random search .{digits}; "
+        f"{column}_difference[]: -; {column}_p: p .p; {column}_control_runs: -"
+        for column, words, digits in (
+            ("first", "first movement slower by (ticks)", 1),
+            ("whole", "whole task faster by (ticks)", 1),
+            ("arm", "next goal nearer by (ticks)", 1),
+            ("other_arm", "idle hand nearer to its next goal (share)", 2),
+            ("hand", "goals with the slower hand for them alone (share)", 2),
+        )
+    )
 )
 def list_signatures(study: Study) -> Rows:
-    """List the main signatures of every method on every task, means over runs and goals."""
+    """List the signatures of every method on every task, next to those of random search.
+
+    A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
+    the choice of hands (``hands`` empty). Means over runs; p is one-tailed and uncorrected.
+    """
     labels = study.methods.index[study.methods.kind != "optimum search"]
     for name, label in itertools.product(one_by_one(study), labels):
         cell = study.cells.get((name, label))
         if cell is None or not len(cell.good):
             continue
-        runs = study.executed(name, label)
-        row = row_of_cell(study, cell) | {
-            "runs": len(cell.good),
-            "first": mean_of_goals(runs.against_same_hands[:, :1]),
-            "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),
-            "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
-            "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),
-        }
-        yield f"{name} {label}", row
+        rows: dict[str, Row] = {}
+        for signature in SIGNATURES:
+            column = signature.replace(" ", "_")
+            for hands, (values, control) in with_control(study, signature, name, label).items():
+                row = rows.setdefault(hands, {"runs": len(values), "control_runs": len(control)})
+                row |= mean(values).columns(column) | {f"{column}_control_runs": len(control)}
+                if len(control) and selects(study, label):
+                    row |= {
+                        f"{column}_control": control.mean(),
+                        **difference_of_means(values, control).columns(f"{column}_difference"),
+                        f"{column}_p": bootstrap_test(values, control).p,
+                    }
+        for hands, row in rows.items():
+            yield (
+                " ".join(filter(None, (name, label, hands))),
+                row_of_cell(study, cell) | row | {"hands": hands},
+            )
 
 
-def mean_of_goals(values: Array) -> float:
-    """Return the mean over goals of the means over runs, for values of shape ``(n, G)``, without
-    NaN and infinite values; NaN without other values."""
-    there = [of_goal[np.isfinite(of_goal)] for of_goal in values.T]
-    means = [of_goal.mean() for of_goal in there if len(of_goal)]
-    return fmean(means) if means else math.nan
+def beside_control(study: Study, shared: TwoContexts) -> Row:
+    """Return the posture difference of random search in the same two contexts, the number of its
+    runs, and the p-value of the test that the method's difference exceeds it."""
+    control = contexts_of_control(study, shared)
+    if control is None:
+        return {}
+    return {
+        "control": control.posture_difference,
+        "control_runs": control.n,
+        "p_random_search": shared.p_beyond(control),
+    }
 
 
 @figure(
     "One goal, two postures",
-    "Postures of one method's runs when they hit a goal that two tasks share, and of random search "
-    "with as many trials, at its strongest width, of the runs that improved on the corrective "
-    "process. Thick: mean posture; thin: every run. Dashed arrows lead to the next goal. The bar "
-    "is one length unit.",
+    "Postures of one method's runs when they hit a goal that two tasks share, and of all runs of "
+    "random search with as many trials. Thick: mean posture; thin: every run. Dashed arrows lead "
+    "to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
     """Draw postures at a goal before two different next goals, and those of random search."""
     shared = shared_goal(study)
     if shared is None:
         return None
-    chance = random_search_for(study, shared) if selects(study, shared.method) else None
+    chance = contexts_of_control(study, shared)
     contexts = [shared, chance] if chance else [shared]
     size = (style.ONE, style.TWO)[len(contexts) - 1], 2.0
     drawing, panels = style.panels((1, len(contexts)), size, sharex=True, sharey=True)
@@ -226,61 +244,47 @@ def next_goal(study: Study) -> str:
     if shared is None or not is_subject(study.methods.loc[shared.method]):
         return ""
     method: Any = study.methods.loc[shared.method]
-    titles = study.methods.title
     # Stochastic methods need a test; methods that select from trials need random search.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
-    needed, random_search = selects(study, shared.method), random_search_for(study, shared)
-    beyond = context_beyond_p(study, shared)
+    needed, control = selects(study, shared.method), contexts_of_control(study, shared)
+    beyond = beside_control(study, shared).get("p_random_search", math.nan)
     drawn, who = method.stochastic, "The learner" if is_learner(method) else method.title
     runs, p = counted(shared.n, "run"), p_value(shared.p)
-    distance, digits, unit = attrgetter("standardised_posture_difference"), 1, "SD"
-    if math.isnan(shared.standardised_posture_difference):
-        distance, digits, unit = attrgetter("posture_difference"), 2, "length units and rad"
-    posture_difference = f"{number(distance(shared), digits)} {unit}"
-    differences = map(distance, every_random_search_for(study, shared))
-    by_chance = [each for each in differences if not math.isnan(each)]
-    chance = f"random search: {number(max(by_chance), digits)}" if by_chance else ""
-    both_differences = f"{posture_difference} ({chance})" if chance else posture_difference
+    difference = number(shared.posture_difference, 2)
+    both = difference
+    if control is not None:
+        both += f" (random search: {number(control.posture_difference, 2)})"
     if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):
         text = "Too few runs to tell whether the next goal changes the posture."
     elif not drawn and shared.posture_difference <= SAME:
         text = f"No. {who} hits the same goal in the same posture."
     elif drawn and not shared.p < LEVEL:
-        text = f"No significant difference: between next goals it is {both_differences}."
+        text = f"No significant difference: the posture difference is {both}."
     elif not needed or beyond < LEVEL:
         different = "clearly different" if drawn else "different"
+        text = f"Yes. {who} hits the same goal in {different} postures (difference {both})."
+    elif control is None:
         text = (
-            f"Yes. {who} hits the same goal in {different} postures "
-            f"(difference {'; '.join(filter(None, (posture_difference, chance)))})."
-        )
-    elif random_search is None:
-        text = (
-            f"Undecided: the posture difference is {posture_difference}, and no random search "
-            "with as many trials ran."
+            f"Undecided: the posture difference is {difference}, and no random search with as many "
+            "trials ran."
         )
     elif math.isnan(beyond):
         text = (
-            f"Undecided: the posture difference is {posture_difference}, and too few runs of "
-            "random search to compare."
+            f"Undecided: the posture difference is {difference}, and too few runs of random search "
+            "to compare."
         )
     else:
-        text = (
-            f"Not shown: the posture difference is {both_differences}, which is not "
-            "significantly more."
-        )
+        text = f"Not shown: the posture difference is {both}, which is not significantly more."
     text += (
         f"\nBetween next goals, the posture difference of {method.title} at goal "
-        f"{shared.goal} is {number(shared.posture_difference, 2)} (length units and rad; "
+        f"{shared.goal} is {difference} (length units and rad; "
         f"{', '.join(filter(None, (runs, p)))})"
     )
-    if random_search is not None:
-        text += (
-            f", that of {titles[random_search.method]} "
-            f"{number(random_search.posture_difference, 2)}"
-        )
+    if control is not None:
+        text += f", that of random search {number(control.posture_difference, 2)}"
         text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
     elif needed:
-        text += f". To tell, add {RANDOM_SEARCH} to --methods, or run suite comparison"
+        text += f". To compare, run {RANDOM_SEARCH} on both tasks with as many trials"
     return f"{text}.{failed_runs(study, cells, ' and are not counted')}"
 
 

@@ -13,7 +13,6 @@ from coartic.analysis import standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import BY_TRIAL, headline_methods
-from coartic.analysis.optima import initial_reward
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import CellRuns, Study, cached, load
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -25,7 +24,8 @@ from coartic.robot import Array
 SPENDS = ("trials", "forward_kinematics", "solve_s")
 """Costs, as columns of ``runs``; ``solve_s`` is wall time, s."""
 TARGETS = tuple(n / 20 for n in range(1, 21))
-"""Targets, as shares of the distance from the initial solution to the optimum."""
+"""Targets, as shares of the distance from the corrective process alone, with its best hands, to the
+optimum."""
 COSTS = (
     ("trials_to_quarter", "trials", 0.25),
     ("trials_to_half", "trials", 0.5),
@@ -51,15 +51,14 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 @cached
 def spans(study: Study) -> dict[str, tuple[float, int]]:
-    """Return the reward of the initial solution and the best known reward of each task.
+    """Return the reward of the corrective process alone with its best hands and the best known
+    reward of each task.
 
-    Targets lie between the two. Tasks without an initial solution, or with an initial solution that
+    Targets lie between the two. Tasks that the corrective process does not complete, or on which it
     is the best known, are left out.
     """
-    rewards = {
-        name: (initial_reward(study.tasks[name]), best.reward)
-        for name, best in study.optima.items()
-    }
+    zero = study.corrective_best
+    rewards = {name: (zero[name], best.reward) for name, best in study.optima.items()}
     return {name: pair for name, pair in rewards.items() if pair[0] < pair[1]}  # NaN: none
 
 
@@ -137,8 +136,9 @@ def runtimes(
     results : str, Path or Study
         A results folder, or its study.
     targets : sequence of float, shape (n,), optional
-        Shares of the distance from the initial solution to the optimum, above 0 and up to 1; by
-        default 0.05, 0.1, ..., 1. Targets are rounded up to whole ticks.
+        Shares of the distance from the corrective process alone, with its best hands, to the
+        optimum, above 0 and up to 1; by default 0.05, 0.1, ..., 1. Targets are rounded up to whole
+        ticks.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def runtimes(
     ------
     CoarticError
         The folder is no results folder, targets are out of bounds, or no task has a best known
-        reward above the reward of its initial solution.
+        reward above the reward of the corrective process alone.
     """
     study = results if isinstance(results, Study) else load(results)
     shares = np.asarray(targets, dtype=np.float64)
@@ -206,9 +206,10 @@ def list_runtimes(study: Study) -> Rows:
 @figure(
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget (mean over all "
-    "tasks where there are several). Targets are evenly spaced from the corrective process alone "
-    "to the optimum; a run counts for each target that it has reached. a: trials, for methods that "
-    "make trials. b: forward-kinematics evaluations, spread evenly over a run's trials. Bands: "
+    "tasks where there are several). Targets are evenly spaced from the corrective process alone, "
+    "with its best hands, to the optimum; a run counts for each target that it has reached. a: "
+    "trials, for methods that make trials. b: forward-kinematics evaluations, spread evenly over a "
+    "run's trials. Bands: "
     f"{style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:

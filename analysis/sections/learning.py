@@ -12,7 +12,6 @@ from coartic.analysis import standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.methods import EC1, LEARNERS, most_exploring
-from coartic.analysis.optima import initial_reward
 from coartic.analysis.sections.costs import improvements
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Rows, row_of_cell, table
@@ -25,13 +24,15 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 
 
 @table(
-    "task; method; runs; initial .1; after_100: after 100 trials .1; "
+    "task; method; runs; corrective_best: corrective process, best hands .1; "
+    "after_100: after 100 trials .1; "
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1; "
     "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]"
 )
 def list_learning(study: Study) -> Rows:
     """List the best reward after some numbers of trials (mean over runs), and the trial at which a
-    run has half of its gain over the initial solution (median and quartiles; ∞ without gain)."""
+    run has half of its gain over the corrective process with its best hands (median and quartiles;
+    ∞ without gain)."""
     for (task, label), cell in study.cells.items():
         learned = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
         runs = [run for run in learned if run is not None]
@@ -41,13 +42,13 @@ def list_learning(study: Study) -> Rows:
             continue
         if cell.runs.trials.min() < BUDGETS[0]:  # a try or two, no learning
             continue
-        initial = initial_reward(study.tasks[task])
-        row = row_of_cell(study, cell) | {"initial": initial}
+        zero = study.corrective_best[task]
+        row = row_of_cell(study, cell) | {"corrective_best": zero}
         for budget in (each for each in BUDGETS if each <= cell.runs.trials.min()):
             best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
             row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan
         gained = [
-            trials[(rewards >= (initial + rewards[-1]) / 2) & (rewards[-1] > initial)]
+            trials[(rewards >= (zero + rewards[-1]) / 2) & (rewards[-1] > zero)]
             for trials, rewards in runs
         ]
         halves = [trials[0] if len(trials) else math.inf for trials in gained]
@@ -60,8 +61,8 @@ def list_learning(study: Study) -> Rows:
 @figure(
     "Learning curves",
     "Best reward so far (mean over runs; band: their quartiles). Grey lines: corrective process "
-    "alone (dash-dotted); optimum, or best known reward (dotted). n = {n} runs of a method on a "
-    "task.",
+    "alone, best hands (dash-dotted); optimum, or best known reward (dotted). n = {n} runs of a "
+    "method on a task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
     """Draw the best reward so far of the learner, hill climbing, CMA-ES and methods from files, by
@@ -83,10 +84,10 @@ def draw_learning_curves(study: Study) -> Parts | None:
             axes.fill_between(curve.trial, curve.best_low, curve.best_high, **band)
             axes.plot(curve.trial, curve.best, linewidth=1.3, **look)
         floor, top = of_task.best.min(), of_task.best_high.max()
-        initial, optimum = initial_reward(task), study.optima.get(task.name)
-        if not math.isnan(initial):
-            axes.axhline(initial, **style.INITIAL)
-            floor, top = initial, max(top, initial)
+        zero, optimum = study.corrective_best[task.name], study.optima.get(task.name)
+        if not math.isnan(zero):
+            axes.axhline(zero, **style.INITIAL)
+            floor, top = min(floor, zero), max(top, zero)
         if optimum is not None:
             axes.axhline(optimum.reward, **style.OPTIMUM)
             top = max(top, optimum.reward)
@@ -102,7 +103,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
         style.legend_line(study.methods.title[label], linewidth=1.3, **look)
         for label, look in looks.items()
     ]
-    handles += [style.legend_line("corrective process alone", **style.INITIAL)]
+    handles += [style.legend_line("corrective process alone, best hands", **style.INITIAL)]
     if known := [task.name for task in tasks if task.name in study.optima]:
         handles.append(style.legend_line(standings.reference(study, known), **style.OPTIMUM))
     style.legend(drawing, handles, min(len(handles), 4))

@@ -125,8 +125,8 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
     """The learner under a condition as a method, with fields of the condition as parameters."""
     names, citation = ["epsilon", "noise_sd"], DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-    if condition.is_informed:  # to move in the null space of a hand
-        information |= {Information.JACOBIAN}
+    if condition.is_informed:  # to move in the null space of a hand, where paths are short
+        information |= {Information.JACOBIAN, Information.REWARD_FORMULA}
         names += ["drift", "pull", "direction"]
     if condition.hand_exploration == "closest":  # to find the closest hand
         information |= {Information.GOALS, Information.FORWARD_KINEMATICS}
@@ -178,6 +178,7 @@ class CustomDualProcess(DualProcess):
             Information.GOALS,
             Information.FORWARD_KINEMATICS,
             Information.JACOBIAN,
+            Information.REWARD_FORMULA,
         }
     )
     Parameters: ClassVar[type[Parameters]] = create_model(

@@ -1,4 +1,8 @@
-"""The paper's claims with their verdicts, by their tests corrected together.
+"""The paper's claims with two verdicts, by their tests corrected together.
+
+A claim *replicates* if our runs show what the paper measured: compared with the corrective process
+alone, or with the runs before learning. It is *more than selection* if the learner shows more than
+random search, which is the learner without its memory. The verdicts:
 
 - *Supported*: the runs show the claim, and the largest p-value of its tests, which must all hold
   (intersection-union test), is below 5 % after Holm's correction; tests over random tasks also
@@ -34,46 +38,63 @@ CLAIMS = pd.DataFrame.from_dict(
 ).fillna({"fitted": False, "short": ""})
 """A row for each claim, as ``claims.toml`` explains."""
 RULES = postures.RULES | hands.RULES | performance.RULES | families.RULES
+"""Rules that say whether claims replicate, by id."""
+BEYOND = postures.BEYOND | hands.BEYOND | families.BEYOND
+"""Rules that say whether learners show more than random search, for claims that need it."""
+COLUMNS = [
+    *("statement", "replicates", "evidence", "test", "p_holm", "opposite_p_holm"),
+    *("more_than_selection", "evidence_beyond", "test_beyond", "p_beyond", "opposite_p_beyond"),
+    *("sets", "place", "quote", "suite", "run_ids"),
+]
 
 
 def judge_claims(study, names):
-    """Judge claims by a folder, each corrected over the claims of its group among ``names``.
+    """Judge claims by a folder: whether each *replicates*, and is *more than selection*.
 
-    Returns a row for each claim, as :func:`coartic.analysis.judge` does, with ``run_ids`` of the
-    runs that the claim read; ``sets``, the number of sets of goals that support and refute it;
+    Returns a row for each claim: ``replicates``, the verdict on what the paper measured, and
+    ``more_than_selection``, the verdict on the comparison with random search, empty for claims that
+    need none, each with evidence, test and p-values, which are corrected over the claims of its
+    group among ``names``; ``sets``, the number of sets of goals that support and refute the claim;
     ``place`` and ``quote`` of the paper; ``suite``, empty for a claim for which the folder lacks
-    runs or tasks.
+    runs or tasks; ``run_ids`` of the runs that both verdicts read.
     """
-    findings, run_ids, suites = {}, {}, {}
+    names, claims = [*names], CLAIMS.loc[[*names]]
+    judged, read = judge_rules(study, names, RULES, claims.test)
+    compared = [name for name in names if name in BEYOND]
+    beyond, read_beyond = judge_rules(study, compared, BEYOND, claims.test_beyond)
+    few = pd.Series([*map(few_sets_support, names)], names)
+    goals = few & (judged.verdict == "supported")
+    renamed = {"verdict": "more_than_selection", "evidence": "evidence_beyond",
+               "test": "test_beyond", "p_holm": "p_beyond",
+               "opposite_p_holm": "opposite_p_beyond"}  # fmt: skip
+    judged = judged.join(beyond[[*renamed]].rename(columns=renamed))
+    run_ids = {name: [*read.get(name, ()), *read_beyond.get(name, ())] for name in names}
+    return judged.assign(
+        statement=judged.statement + claims.fitted.map({True: " †", False: ""}),
+        replicates=judged.verdict.mask(goals, "depends on the goals"),
+        sets=[*map(sets_in_words, names)],
+        place=claims.place,
+        quote=claims.quote,
+        suite=[study.suite if name in read else "" for name in names],
+        run_ids=[" ".join(dict.fromkeys(run_ids[name])) for name in names],
+    )[COLUMNS].rename_axis("row")
+
+
+def judge_rules(study, names, rules, tests):
+    """Judge claims by rules, corrected within groups; also return the ids of the runs that each
+    rule read, without the rules for which the folder lacks runs or tasks."""
+    findings, run_ids = {}, {}
     for name in names:
         read = Reader(study)
         try:
-            findings[name] = RULES[name](read)
-            run_ids[name], suites[name] = " ".join(dict.fromkeys(read.run_ids)), study.suite
+            findings[name], run_ids[name] = rules[name](read), read.run_ids
         except MissingError as missing:
             findings[name] = Finding(None, str(missing))
-    claims = CLAIMS.loc[names]
     judged = pd.concat(
-        judge({name: (claim.text, claim.test, findings[name]) for name, claim in group.iterrows()})
-        for _, group in claims.groupby("group", sort=False)
-    ).loc[names]
-    few = pd.Series([*map(few_sets_support, names)], names)
-    marks = claims.fitted.map({True: " †", False: ""})
-    return (
-        judged.assign(
-            statement=judged.statement + marks,
-            verdict=judged.verdict.mask(
-                few & (judged.verdict == "supported"), "depends on the goals"
-            ),
-            sets=[*map(sets_in_words, names)],
-            place=claims.place,
-            quote=claims.quote,
-            suite=[suites.get(name, "") for name in names],
-            run_ids=[run_ids.get(name, "") for name in names],
-        )
-        .drop(columns="p_without")
-        .rename_axis("row")
+        judge({name: (claim.text, tests[name], findings[name]) for name, claim in group.iterrows()})
+        for _, group in CLAIMS.loc[names].groupby("group", sort=False)
     )
+    return judged.loc[names], run_ids
 
 
 SETS = pd.read_csv(HERE / "sets.csv")

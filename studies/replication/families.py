@@ -147,20 +147,25 @@ RULES = {
     "first-movement-sacrificed-in-general": in_families(
         OF_ONE_ARM,
         shows("first", by=MARGINS.rounding_ticks),
-        shows_beyond_random_search("first"),
         shows("whole"),
     ),
     "hand-coarticulation-in-general": in_families(
-        OF_TWO_ARMS,
-        (", more than EC2", shows_beyond_closest_hands),
-        shows_beyond_random_search("hand"),
+        OF_TWO_ARMS, (", more than EC2", shows_beyond_closest_hands)
     ),
     "arm-coarticulation-in-general": in_families(
-        EVERY_FAMILY, shows("arm", by=MARGINS.rounding_ticks), shows_beyond_random_search("arm")
+        EVERY_FAMILY, shows("arm", by=MARGINS.rounding_ticks)
     ),
-    "other-arm-coarticulation-in-general": in_families(
-        OF_TWO_ARMS, shows("other arm"), shows_beyond_random_search("other arm")
-    ),
+    "other-arm-coarticulation-in-general": in_families(OF_TWO_ARMS, shows("other arm")),
     "corrective-ensures-in-general": every_trial_completes,
 }
 """Rules by the ids of their claims."""
+BEYOND = {
+    f"{name}-in-general": in_families(families, shows_beyond_random_search(signature))
+    for name, families, signature in (
+        ("first-movement-sacrificed", OF_ONE_ARM, "first"),
+        ("hand-coarticulation", OF_TWO_ARMS, "hand"),
+        ("arm-coarticulation", EVERY_FAMILY, "arm"),
+        ("other-arm-coarticulation", OF_TWO_ARMS, "other arm"),
+    )
+}
+"""Rules that say whether learners show more than random search, by the ids of their claims."""

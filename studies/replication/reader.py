@@ -12,12 +12,7 @@ from comparisons import Higher, Measurement
 from published import TRIALS, published_alone, published_cell
 
 from coartic import NotApplicableError, corrective_trial, initial_hands
-from coartic.analysis import SIGNATURES, Study
-from coartic.analysis.random_search import (
-    beside_random_search,
-    excess_on_instance,
-    random_search_on,
-)
+from coartic.analysis import SIGNATURES, Study, mean_excess, with_control
 from coartic.estimates import FEWEST
 
 LEARNER = "dual-process/"
@@ -149,40 +144,28 @@ class Reader:
         values = self.study.signature_of(name, task, label, replay=replay)
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
-    def beside_random_search(self, name, task, label):
-        """Return the order of a signature of a method and of random search, for each hand sequence.
-
-        The rule is that of :mod:`coartic.analysis.random_search`: equal hands, runs that improved,
-        as many trials, and the width of the box that shows most.
-        """
-        for each in (label, *self.random_search(task)):
-            self.runs(task, each)
+    def beyond_random_search(self, name, task, label):
+        """Return the order of a signature of a method and of random search, for each hand sequence,
+        by the rule of :func:`coartic.analysis.with_control`."""
+        self.runs(task, label)
         pairs = []
         one_handed = len(self.task(task).hands) == 1
-        for hands, both in beside_random_search(self.study, name, task, label).items():
-            words = "" if one_handed else f"with hands {hands}, "
-            if not len(both[1]):
+        for hands, (values, control) in with_control(self.study, name, task, label).items():
+            if len(control) < FEWEST:
                 raise MissingError(
-                    f"fewer than {FEWEST} runs of {RANDOM_SEARCH} on {task} with hands {hands} "
-                    "improved on the corrective process alone"
+                    f"fewer than {FEWEST} runs of {RANDOM_SEARCH} on {task} with hands {hands} and "
+                    f"{TRIALS} trials"
                 )
-            pairs.append(
-                Higher(
-                    self.shown(name, task, label, both[0], words),
-                    self.shown(name, task, RANDOM_SEARCH, both[1], words),
-                )
-            )
-        if not pairs:
-            raise MissingError(
-                f"no run of {self.who(label)} on {task} improved on the corrective process alone"
-            )
+            words = "" if one_handed else f"with hands {hands}, "
+            first = self.shown(name, task, label, values, words)
+            pairs.append(Higher(first, self.shown(name, task, RANDOM_SEARCH, control, words)))
         return pairs
 
     def excess_over_random_search(self, name, task, label):
         """Return the excess of a method's signature over random search on an instance of a family,
         a single number, by the same rule."""
         self.runs(task, label)
-        excess = excess_on_instance(self.study, name, task, label)
+        excess = mean_excess(self.study, name, task, label)
         if math.isnan(excess):
             raise MissingError(f"no random search on {task} has the hands of {self.who(label)}")
         return self.shown(name, task, label, np.array([excess]))
@@ -193,11 +176,6 @@ class Reader:
             raise MissingError(f"{self.who(label)} on {self.title(task)} has no {name}")
         quantity = words + SIGNATURES[name].words
         return Measurement(self.title(task), self.who(label), values, quantity)
-
-    def random_search(self, task):
-        """Return the labels of the settings of random search that solved a task in 10,000
-        trials."""
-        return random_search_on(self.study, task, TRIALS) or [RANDOM_SEARCH]
 
     def initial_execution(self, task):
         """Return the initial solution of a task: the corrective process with its initial hands."""

@@ -1,0 +1,160 @@
+"""Comparisons of signatures of coarticulation with random search, their control.
+
+Selection by reward alone produces signatures of coarticulation, so the signatures of a method that
+selects its solution from trials are compared with the signatures of random search
+(:mod:`coartic.baselines.random_search`), which is the paper's learner without its memory. Like is
+compared with like:
+
+- runs with the same hand sequence. The choice of hands itself, signature ``hand``, is compared with
+  random search that tries every hand sequence, whatever the hands;
+- as many trials;
+- all runs of both: a run that does not improve counts with what it shows, often 0.
+
+The test is the one-tailed bootstrap test of the difference of means over runs.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import mode
+
+import numpy as np
+
+from coartic.analysis.method_frame import BY_TRIAL
+from coartic.analysis.signatures.two_contexts import TwoContexts
+from coartic.analysis.study import Study
+from coartic.robot import Array
+
+LEAST_SHARE = 0.1
+"""Share of a method's runs that a hand sequence has at least where it is compared."""
+
+
+def with_control(
+    study: Study, signature: str, task: str, label: str
+) -> dict[str, tuple[Array, Array]]:
+    """Return a signature of the runs of a method and of random search, by hand sequence.
+
+    Parameters
+    ----------
+    study : Study
+        Results that have both.
+    signature : str
+        Name in ``coartic.analysis.SIGNATURES``.
+    task, label : str
+        Task, and method with its setting, as in ``study.runs``.
+
+    Returns
+    -------
+    dict
+        For each hand sequence with which at least a tenth of the method's runs end, the commonest
+        first: the values of the runs of the method with these hands and of the runs of random
+        search with these hands and as many trials, shape ``(n,)`` each, without runs that lack the
+        signature; the second empty if there is no such random search. For signature ``hand`` one
+        entry, ``""``, with all runs.
+
+    Examples
+    --------
+    >>> values, control = with_control(study, "first", "ascending", "dual-process/EC1")["RRR"]
+    ... # doctest: +SKIP
+    """
+    of_method = study.signature_by_hands(signature, task, label)
+    total = len(study.cells[task, label].good)
+    pairs = {}
+    for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
+        if len(values) >= LEAST_SHARE * total:
+            control = control_of(study, task, label, hands)
+            of_control = study.signature_by_hands(signature, task, control) if control else {}
+            pairs[hands] = values, of_control.get(hands, np.empty(0))
+    return pairs
+
+
+def control_of(study: Study, task: str, label: str, hands: str) -> str:
+    """Return the label of random search with these hands and as many trials as a method on a task;
+    ``hands`` empty: with every hand sequence. Empty without such runs."""
+    method = "random-search" if hands else "random-search/hands"
+    trials = most_trials(study, task, label)
+    for other in study.methods.index[study.methods.base == method]:
+        cell = study.cells.get((task, other))
+        if cell is None or not len(cell.good) or most_trials(study, task, other) != trials:
+            continue
+        if not hands or set(cell.good.hands) == {hands}:
+            return str(other)
+    return ""
+
+
+def most_trials(study: Study, task: str, label: str) -> float:
+    """Return the most trials that a run of a method made on a task."""
+    return float(study.cells[task, label].runs.trials.fillna(0).max())
+
+
+def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
+    """Return the excess of a method's signature over random search on a task: the mean over the
+    runs of the method with whose hands random search has runs; NaN without any."""
+    pairs = with_control(study, signature, task, label).values()
+    excess = [values - control.mean() for values, control in pairs if len(control)]
+    return float(np.concatenate(excess).mean()) if excess else math.nan
+
+
+def selects(study: Study, label: str) -> bool:
+    """Return whether a method may select its solution from many trials by their rewards."""
+    method = study.methods.loc[label]
+    return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
+
+
+def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
+    """Return all runs of random search, as many trials as the method's, that hit the same goal in
+    the same two contexts; None for a method that selects nothing, and without such runs.
+
+    On both tasks the hands are those with which the most runs of the method end.
+    """
+    if not selects(study, contexts.method):
+        return None
+    both = contexts.first, contexts.second
+    commonest = (mode(run.hands for run in runs.runs) for runs in both)
+    labels = [
+        control_of(study, runs.task.name, contexts.method, hands)
+        for runs, hands in zip(both, commonest, strict=True)
+    ]
+    if not all(labels):
+        return None
+    first, second = (
+        study.executed(runs.task.name, label) for runs, label in zip(both, labels, strict=True)
+    )
+    pair = TwoContexts(first, second, contexts.goal, contexts.hand)
+    return pair if pair.in_both else None
+
+
+def control_suite(study: Study, *, runs: int = 20) -> str:
+    """Return a suite of random search for the hands with which methods end that have no control.
+
+    Run it with the folder of the study included, and all signatures have a control.
+
+    Parameters
+    ----------
+    study : Study
+        Results with learners.
+    runs : int
+        Runs of each cell.
+
+    Returns
+    -------
+    str
+        The suite as TOML; empty if nothing is missing.
+    """
+    blocks = dict[tuple[str, str, int], None]()
+    for task, label in study.cells:
+        if study.cells[task, label].good.empty or not selects(study, label):
+            continue
+        trials = int(most_trials(study, task, label))
+        for hands, share in (
+            study.cells[task, label].good.hands.value_counts(normalize=True).items()
+        ):
+            if share >= LEAST_SHARE and not control_of(study, task, label, str(hands)):
+                blocks[task, str(hands), trials] = None
+    lines = ['title = "Random search with the hands of learners"', f"runs = {runs}"]
+    lines += [
+        f'\n[[blocks]]\ntasks = ["{task}"]\nmethods = ["random-search"]\n'
+        f'parameters = {{ hands = "{hands}", trials = {trials} }}'
+        for task, hands, trials in blocks
+    ]
+    return "\n".join(lines) + "\n" if blocks else ""
