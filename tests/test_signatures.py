@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import tomllib
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ import pytest
 from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task, movements_of
-from coartic.analysis import random_search
+from coartic.analysis import control
 from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.signatures import context_tests, measures
@@ -23,6 +24,9 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.baselines.random_search import RandomSearch
+from coartic.method import run_method
 from coartic.robot import HANDS
 from tests.support.golden import golden
 from tests.support.made_up import runs_of, study_of_solutions
@@ -363,15 +367,15 @@ def test_a_method_that_selects_has_to_exceed_random_search(made_up, answer):
     assert contexts.method == EC1
     assert contexts.posture_difference == pytest.approx(made_up["posture_difference"])
     assert coarticulation.next_goal(study).startswith(answer)
-    compared = random_search.random_search_for(study, contexts)
+    compared = control.contexts_of_control(study, contexts)
     if compared is not None:
         assert compared.posture_difference == pytest.approx(made_up.get("of_random_search", 0.5))
-        beyond = random_search.context_beyond_p(study, contexts)
+        beyond = coarticulation.beside_control(study, contexts)["p_random_search"]
         assert (beyond < 0.05) == (
             made_up["posture_difference"] == 2.0 and len(compared.configurations[0]) > 1
         )
-        # it is not tested itself
-        assert math.isnan(random_search.context_beyond_p(study, compared))
+        # it is not compared itself
+        assert control.contexts_of_control(study, compared) is None
 
 
 def shifted(task, label, first, *, others=-20, shift=0.0, hands="RRR"):
@@ -384,64 +388,52 @@ def shifted(task, label, first, *, others=-20, shift=0.0, hands="RRR"):
     return Solutions(task, label, tuple(runs))
 
 
-def test_the_random_search_that_shows_most_of_a_signature_counts():
-    tasks, drawn = [load_task("ascending"), load_task("descending")], "random-search/hands"
-    cells = [
-        shifted(task, label, slower, shift=shift * number)
-        for label, shift, slower in ((EC1, 1.0, 5), (RANDOM_SEARCH, 0.8, 1), (drawn, 0.3, 2))
-        for number, task in enumerate(tasks)
-    ]
-    study = study_of_solutions(cells)
-    assert random_search.random_search_on(study, "ascending") == [RANDOM_SEARCH, drawn]
-    assert (
-        random_search.random_search_for(study, coarticulation.shared_goal(study)).method
-        == RANDOM_SEARCH
-    )
-    (beside,) = random_search.beside_random_search(study, "first", "ascending", EC1).items()
-    assert beside[0] == "RRR"
-    assert [values.tolist() for values in beside[1]] == [[5, 5, 5], [2, 2, 2]]
-    assert not random_search.selects(study, drawn)
-
-
-def test_random_search_is_compared_at_equal_hands_where_it_improved():
-    """Runs that are no faster than the corrective process alone do not count, nor other hands, nor
-    other numbers of trials."""
+def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs():
+    """Hands of fewer than a tenth of the runs are not compared."""
     task = load_task("two-armed-2")
-    learned = [shifted(task, EC4, 5, hands="RRRR"), shifted(task, EC4, 9, hands="RLRR")]
-    cells = [replace(learned[0], runs=learned[0].runs + learned[1].runs)]
-    rows = runs_of(task.name, EC4, [-300] * 6)
-    # The wide box has two runs that improved.
-    for setting, first, trials in (
-        ("", [2, 3, 4], 10), ("half_width=0.5", [7, 8, 50], 10), ("trials=100", [9, 9, 9], 100)
+    learned = [shifted(task, EC4, 5, hands="RRRR"), shifted(task, EC4, 9, hands="RLRR"),
+               shifted(task, EC4, 7, hands="LRRR")]  # fmt: skip
+    runs = (*learned[0].runs * 6, *learned[1].runs, *learned[2].runs[:1])
+    cells = [replace(learned[0], runs=runs)]
+    rows = runs_of(task.name, EC4, [-300] * len(runs), hands=[run.hands for run in runs])
+    # One of the runs is no faster than the corrective process alone, and counts.
+    for setting, first, hands, trials in (
+        ("", [2, 3, 400], "RRRR", 10), ("trials=100", [9, 9, 9], "RRRR", 100),
+        ("hands=RLLR", [1, 1, 1], "RLLR", 10),
     ):  # fmt: skip
         label = f"{RANDOM_SEARCH} {setting}".strip()
-        cells.append(shifted(task, label, first, hands="RRRR"))
-        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 3, setting=setting, trials=trials)
+        cells.append(shifted(task, label, first, hands=hands))
+        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 3, setting=setting, trials=trials,
+                        hands=hands)  # fmt: skip
     study = study_of_solutions(cells, rows)
-    beside = random_search.beside_random_search(study, "first", task.name, EC4)
-    assert {each: [v.tolist() for v in pair] for each, pair in beside.items()} == {
-        "RRRR": [[5, 5, 5], [2, 3, 4]],
-        "RLRR": [[9, 9, 9], []],
+    compared = control.with_control(study, "first", task.name, EC4)
+    assert {each: [v.tolist() for v in pair] for each, pair in compared.items()} == {
+        "RRRR": [[5] * 18, [2, 3, 400]],
+        "RLRR": [[9] * 3, []],
     }
-    every = random_search.most_of_random_search(study, "first", task.name, "RRRR", 10, every=True)
-    assert every.tolist() == [7, 8, 50]
-    more = random_search.most_of_random_search(study, "first", task.name, "RRRR", 100)
-    assert more.tolist() == [9, 9, 9]
-    assert len(random_search.most_of_random_search(study, "first", task.name, "RRRR", 1000)) == 0
+    assert control.mean_excess(study, "first", task.name, EC4) == 5 - 135
+    table = TABLES["signatures"](study).loc[f"{task.name} {EC4} RRRR"]
+    test = bootstrap_test([5.0] * 18, [2.0, 3.0, 400.0])
+    assert (table["first"], table.first_control, table.first_p) == (5, 135, test.p)
+    assert (table.runs, table.control_runs) == (18, 3)
+    suite = tomllib.loads(control.control_suite(study))
+    assert suite["blocks"] == [
+        {"tasks": [task.name], "methods": ["random-search"],
+         "parameters": {"hands": "RLRR", "trials": 10}}
+    ]  # fmt: skip
 
 
-def test_of_a_family_one_width_counts():
-    """The width with the highest mean: 3 ticks and 3 against 9 and -7, though 9 is the most of
-    one."""
-    drawn = "random-search/hands"
-    cells = [
-        shifted(task, label, slower[number])
-        for number, task in enumerate(map(load_task, ("one-armed/v1/i001", "one-armed/v1/i002")))
-        for label, slower in ((RANDOM_SEARCH, (9, -7)), (drawn, (3, 3)), (EC1, (5, 4)))
-    ]
-    study = study_of_solutions(cells)
-    excess = [random_search.excess_on_instance(study, "first", name, EC1) for name in study.tasks]
-    assert excess == [2, 1]
+def test_the_control_exceeds_itself_in_five_of_a_hundred_studies():
+    """First movements of 400 runs of random search: of 500 pairs of samples few more than 5 % are
+    significant."""
+    task = load_task("ascending")
+    results = (run_method(RandomSearch(RandomSearch.Parameters(trials=300)), task, seed)[0] for seed in range(400))
+    runs = tuple(execute(task, result.solution) for result in results)
+    first = SIGNATURES["first"].of(Solutions(task, RANDOM_SEARCH, runs))
+    drawn = np.random.default_rng(3)
+    p = [bootstrap_test(*drawn.permutation(first)[:200].reshape(2, 100), resamples=999).p
+         for _ in range(500)]  # fmt: skip
+    assert 0.03 <= np.mean(np.array(p) < 0.05) <= 0.07
 
 
 def test_p_of_shared_goals_is_corrected_by_method():
@@ -504,7 +496,7 @@ def beside_corrective(method, posture_difference, *, stochastic, runs):
 def test_no_difference_is_significant_or_not_without_a_test(made_up, answer):
     """A method that draws nothing takes none, and one run a context allows none."""
     study = beside_corrective("mine", **made_up)
-    assert not random_search.selects(study, "mine")
+    assert not control.selects(study, "mine")
     assert coarticulation.next_goal(study).startswith(answer)
 
 

@@ -5,13 +5,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
+from coartic.baselines import random_search
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.hill_climbing import HillClimbing
-from coartic.baselines.random_search import RandomSearchHands
+from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import Meter, MethodError, Session
+from coartic.method import BudgetError, Meter, MethodError, Session
 from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import solve, tiny_task
 
@@ -62,6 +64,37 @@ def test_hands_chosen_goal_by_goal():
     assert execute(many, result.solution).reward == max(filter(None, session.rewards))
 
 
+def test_random_search_is_the_learner_without_its_memory():
+    """Trial 0 of the corrective process, then noise of one SD around its postures, whatever the
+    rewards: on a task of one goal the offsets of targets are Gaussian."""
+    task = load_task("ascending")
+    result, _, session = solve(RandomSearch, task, trials=2000)
+    alone = corrective_trial(task, "RRR").reward
+    assert session.rewards[0] == alone
+    assert session.meter.trials == 2000
+    completed = [reward for reward in session.rewards if reward is not None]
+    assert execute(task, result.solution).reward == max(completed) > alone
+    drawn = []
+
+    class Recorder:
+        x0, dim, left = np.full(6, 2.0), 6, 2000
+
+        def __init__(self, *_, **__):
+            pass
+
+        def many(self, points):
+            drawn.append(points)
+            self.left -= len(points)
+            if self.left <= 0:
+                raise BudgetError("no trial is left")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(random_search, "Objective", Recorder)
+        random_search.draw_trials(SimpleNamespace(rng=np.random.default_rng(0)), "RRR", 0.3, 2000)
+    offsets = (np.concatenate(drawn) - 2.0).ravel() / 0.3
+    assert stats.kstest(offsets, "norm").pvalue > 0.01
+
+
 def test_random_search_with_every_hand_sequence():
     """Each sequence has its corrective trial and as many random trials; the best of all is kept."""
     task = load_task("two-armed-2")
@@ -72,7 +105,7 @@ def test_random_search_with_every_hand_sequence():
     assert sorted(session.rewards[n] for n in starts) == sorted(alone.values())
     completed = [reward for reward in session.rewards if reward is not None]
     assert execute(task, result.solution).reward == max(completed)
-    *_, far = solve(RandomSearchHands, task, trials=165, half_width=3.0)
+    *_, far = solve(RandomSearchHands, task, trials=165, sigma=3.0)
     assert max(filter(None, far.rewards)) == max(alone.values())  # no such random trial is better
     assert solve(RandomSearchHands, task, trials=301, budget=20)[2].meter.trials == 20
 

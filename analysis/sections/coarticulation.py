@@ -251,9 +251,8 @@ def next_goal(study: Study) -> str:
     drawn, who = method.stochastic, "The learner" if is_learner(method) else method.title
     runs, p = counted(shared.n, "run"), p_value(shared.p)
     difference = number(shared.posture_difference, 2)
-    both = difference
-    if control is not None:
-        both += f" (random search: {number(control.posture_difference, 2)})"
+    chance = f"random search: {number(control.posture_difference, 2)}" if control else ""
+    both = f"{difference} ({chance})" if chance else difference
     if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):
         text = "Too few runs to tell whether the next goal changes the posture."
     elif not drawn and shared.posture_difference <= SAME:
@@ -262,7 +261,8 @@ def next_goal(study: Study) -> str:
         text = f"No significant difference: the posture difference is {both}."
     elif not needed or beyond < LEVEL:
         different = "clearly different" if drawn else "different"
-        text = f"Yes. {who} hits the same goal in {different} postures (difference {both})."
+        shown = "; ".join(filter(None, (difference, chance)))
+        text = f"Yes. {who} hits the same goal in {different} postures (difference {shown})."
     elif control is None:
         text = (
             f"Undecided: the posture difference is {difference}, and no random search with as many "

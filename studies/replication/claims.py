@@ -67,7 +67,7 @@ def judge_claims(study, names):
     renamed = {"verdict": "more_than_selection", "evidence": "evidence_beyond",
                "test": "test_beyond", "p_holm": "p_beyond",
                "opposite_p_holm": "opposite_p_beyond"}  # fmt: skip
-    judged = judged.join(beyond[[*renamed]].rename(columns=renamed))
+    judged = judged.join(beyond.reindex(columns=[*renamed]).rename(columns=renamed))
     run_ids = {name: [*read.get(name, ()), *read_beyond.get(name, ())] for name in names}
     return judged.assign(
         statement=judged.statement + claims.fitted.map({True: " †", False: ""}),
@@ -90,11 +90,12 @@ def judge_rules(study, names, rules, tests):
             findings[name], run_ids[name] = rules[name](read), read.run_ids
         except MissingError as missing:
             findings[name] = Finding(None, str(missing))
-    judged = pd.concat(
-        judge({name: (claim.text, tests[name], findings[name]) for name, claim in group.iterrows()})
-        for _, group in CLAIMS.loc[names].groupby("group", sort=False)
-    )
-    return judged.loc[names], run_ids
+    groups = CLAIMS.loc[names].groupby("group", sort=False).groups.values()
+    judged = [
+        judge({name: (CLAIMS.text[name], tests[name], findings[name]) for name in group})
+        for group in groups
+    ]
+    return pd.concat([judge({}), *judged]).loc[names], run_ids
 
 
 SETS = pd.read_csv(HERE / "sets.csv")

@@ -118,7 +118,8 @@ def study_of_solutions(cells, rows=None, replays=(), **parts):
     """A study whose runs are executed as these ``Solutions``; one without runs is a failed run."""
     if rows is None:
         rows = [run for cell in cells for run in runs_of(
-            cell.task.name, cell.label, [-300] * len(cell.runs) or [None])]  # fmt: skip
+            cell.task.name, cell.label, [-300] * len(cell.runs) or [None],
+            hands=[getattr(run, "hands", "LRLR") for run in cell.runs] or "")]  # fmt: skip
     executed = {(cell.task.name, cell.label): cell for cell in cells}
     executed |= {(*key, True): replace(cell, runs=()) for key, cell in executed.items()}
     executed |= {(cell.task.name, cell.label, True): cell for cell in replays}

@@ -11,7 +11,7 @@ from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
 from tests.support.made_up import MadeUp, made
 from tests.support.processes import program
 from tests.support.suites import ROOT
-from tests.test_random_tasks import ALONE, ONE, RISING, TWO, rewarded
+from tests.test_random_tasks import ALONE, ONE, RISING, TWO, hands_of, rewarded
 
 STUDY = program(ROOT / "studies" / "replication" / "study.py")
 claims, reader = map(importlib.import_module, ("claims", "reader"))
@@ -49,9 +49,13 @@ def with_signatures(study, **values):
     by_cell = made_up_signatures(study, **values)
     signatures = {(name, *cell): of_cell.get(name, np.empty(0))
                   for cell, of_cell in by_cell.items() for name in SIGNATURES}  # fmt: skip
-    with_hands = {cell: {"R": values} for cell, values in signatures.items() if len(values)}
+    with_hands = {
+        cell: {"" if cell[0] == "hand" else hands_of(cell[1]): values}
+        for cell, values in signatures.items()
+        if len(values)
+    }
 
-    def by_hands(*cell, every=False):
+    def by_hands(*cell):
         return with_hands.get(cell, {})
 
     parts = {"signature_of": made(signatures), "signature_by_hands": by_hands}
@@ -71,15 +75,17 @@ def test_claims_of_generality(monkeypatch):
         "arm-coarticulation",
     ):
         entry = entries.loc[f"{name}-in-general"]
-        assert entry.verdict == "supported", entry.evidence
+        assert entry.replicates == "supported", entry.evidence
         assert entry.p_holm < 0.05
     of_random_search = with_signatures(rewarded(centres, families=ONE + TWO), of_random_search=1.0)
     of_signatures = ["other-arm-coarticulation-in-general", "arm-coarticulation-in-general"]
     # No more than random search shows:
-    assert set(claims.judge_claims(of_random_search, of_signatures).verdict) == {"undecided"}
-    assert entries.verdict["corrective-ensures-in-general"] == "supported"
+    judged = claims.judge_claims(of_random_search, of_signatures)
+    assert set(judged.more_than_selection) == {"undecided"}
+    assert set(entries.more_than_selection[of_signatures]) == {"supported"}
+    assert entries.replicates["corrective-ensures-in-general"] == "supported"
     jerk = entries.loc["beats-inaccurate-in-general"]
-    assert jerk.verdict == "undecided"
+    assert jerk.replicates == "undecided"
     assert "fewer than 3 instances of one-armed/v1" in jerk.evidence
 
 
@@ -87,17 +93,17 @@ def test_a_claim_that_one_family_does_not_judge_says_what_the_others_show():
     """Random search improves on the corrective process on two tasks of a family alone."""
     study = with_signatures(rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8))
 
-    def by_hands(name, task, label, *, every=False):
+    def by_hands(name, task, label):
         if label == RANDOM_SEARCH and task.startswith("long/") and int(task[-1]) > 1:
             return {}
-        return study.signature_by_hands(name, task, label, every=every)
+        return study.signature_by_hands(name, task, label)
 
     seen = MadeUp(study, **vars(study) | {"signature_by_hands": by_hands})
     entry = claims.judge_claims(seen, ["arm-coarticulation-in-general"]).iloc[0]
-    assert entry.verdict == "undecided"
-    said, _, shown = entry.evidence.partition(". ")
+    assert entry.more_than_selection == "undecided"
+    assert "long/v1: 2.68 [" in entry.evidence  # the mean of 2, and 3 + n / 10, over n = 0 to 7
+    said, _, shown = entry.evidence_beyond.partition(". ")
     assert said.endswith("can be judged of long/v1, more than random search")
-    assert "long/v1: 2.68 [" in shown  # the mean of 2, and 3 + n / 10, over n = 0 to 7
     assert "aligned/v1, more than random search: 1.3" in shown
     assert "long/v1, more than random search" not in shown
 
@@ -113,12 +119,9 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
                 return study.signature_of(name, task, label)
             return np.array([0.4, 0.6]) + (more + 0.01 * int(task[-1])) * (label == EC4)
 
-        def by_hands(*cell, every=False):
-            return {"": values} if len(values := signature_of(*cell)) else {}
-
-        parts = {"signature_of": signature_of, "signature_by_hands": by_hands}
+        parts = {"signature_of": signature_of}
         seen = MadeUp(study, **vars(study) | parts)
-        return claims.judge_claims(seen, ["hand-coarticulation-in-general"]).verdict.iloc[0]
+        return claims.judge_claims(seen, ["hand-coarticulation-in-general"]).replicates.iloc[0]
 
     assert [verdict(more) for more in (0.1, -0.2, -0.02)] == [
         "supported", "not supported", "undecided",
@@ -133,8 +136,8 @@ def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
     names = [
         f"{name}-in-general" for name in ("other-arm-pays", "proficiency-rises", "random-hands-pay")
     ]
-    assert set(claims.judge_claims(falling, names).verdict) == {"not supported"}
-    assert claims.judge_claims(mixed, names).verdict.iloc[0] == "undecided"
+    assert set(claims.judge_claims(falling, names).replicates) == {"not supported"}
+    assert claims.judge_claims(mixed, names).replicates.iloc[0] == "undecided"
 
 
 def test_development_instances_are_not_judged():
@@ -142,6 +145,6 @@ def test_development_instances_are_not_judged():
     entries = STUDY.judge_by_first(
         [with_signatures(rewarded(centres, families=ONE + TWO, split="d"))]
     )
-    assert set(entries.verdict) == {"undecided"}
+    assert set(entries.replicates) == {"undecided"}
     words = "has no instances of two-armed/v1 that can be judged"
     assert words in entries.evidence["other-arm-pays-in-general"]
