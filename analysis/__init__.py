@@ -12,6 +12,7 @@ _MODULES = {
     "TwoContexts": "analysis.signatures.two_contexts",
     "all_of": "analysis.judging",
     "beyond_p": "analysis.signatures.context_tests",
+    "by_task": "analysis.frames",
     "contexts_of_control": "analysis.control",
     "control_suite": "analysis.control",
     "ecdf": "analysis.frames",

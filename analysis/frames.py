@@ -228,6 +228,42 @@ def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.
     return pd.DataFrame(rows, columns=[*by, "rows", *ends])
 
 
+def by_task(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean reward of each method on each task, from which means over tasks can be
+    computed again.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        As :func:`ranking` takes it.
+
+    Returns
+    -------
+    DataFrame
+        A row for each pair of ``task`` and ``method``: mean ``reward`` (negative ticks) of ``n``
+        solved runs, ``gap``, and ``share`` where the frame has ``corrective_best``.
+
+    Raises
+    ------
+    CoarticError
+        As :func:`ranking` does.
+
+    Examples
+    --------
+    >>> frame = pd.DataFrame(
+    ...     {"method": "mine", "task": "ascending", "reward": [-300, -296], "best_known": -292}
+    ... )
+    >>> by_task(frame).round(3)
+            task method  reward  n    gap
+    0  ascending   mine  -298.0  2  0.021
+    """
+    values = scored(frame).assign(task=frame.task)
+    scores = [name for name in ("gap", "share") if name in values]
+    groups = values.groupby(["task", "method"], sort=False)
+    table = groups.agg(reward=("reward", "mean"), n=("reward", "count")).join(groups[scores].mean())
+    return table.reset_index()
+
+
 def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     """Rank methods by their mean gap over tasks.
 

@@ -18,7 +18,7 @@ from typing import Any, get_args
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import fill_page, mean_beyond
+from coartic.analysis import by_task, fill_page, load, mean_beyond
 from coartic.analysis.judging import Verdict
 from coartic.analysis.methods import title_of
 
@@ -27,7 +27,7 @@ STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
 KEPT = {
     "comparison": (
-        "beside-random-search contexts learning methods runtimes ranking scores",
+        "contexts learning methods runtimes ranking scores signatures",
         "postures ranking runtimes learning-curves",
     ),
     "families": ("family-gaps", ""),
@@ -71,8 +71,9 @@ def cells_of_the_paper() -> pd.DataFrame:
 
 
 def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]:
-    """How many claims on the paper's tasks have each verdict; ``others``: without the three that
-    carry the paper's point; ``published``: that rest on published goals alone."""
+    """How many claims on the paper's tasks replicate, by verdict; ``others``: without the three
+    that carry
+    the paper's point; ``published``: that rest on published goals alone."""
     judged = table("replication", "claims")
     judged = judged[judged.suite != "families"]
     if published:
@@ -80,7 +81,7 @@ def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]
     if others:
         words = tomllib.loads((STUDIES / "replication" / "claims.toml").read_text("utf-8"))
         judged = judged[["short" not in words[name] for name in judged.index]]
-    counts = judged.verdict.value_counts()
+    counts = judged.replicates.value_counts()
     return {verdict: int(counts.get(verdict, 0)) for verdict in get_args(Verdict)}
 
 
@@ -157,6 +158,11 @@ def store(results: Path) -> None:
             frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
         for name in figures.split():
             shutil.copy(report / "figures" / f"{name}.svg", kept)
+        if suite == "families":  # what means over tasks are computed from
+            table = by_task(load(results / suite).runs)
+            table.to_csv(
+                kept / "by-task.csv", float_format="%.6g", lineterminator="\n", index=False
+            )
 
 
 def main() -> None:

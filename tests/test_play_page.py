@@ -289,7 +289,7 @@ def test_the_learner_is_that_of_the_python_that_the_page_shows(opened, state, fi
 
 def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
     page = settled(opened("preset=2&others=&trials=100"))
-    dial = page.get_by_role("slider", name="From trial and error to planning")
+    dial = page.get_by_role("slider", name="How far exploration leans towards the next goal")
     by_drift = [ticks(page, "The learner")]
     dial.focus()
     for drift in ("0.03", "0.1", "0.3", "1"):

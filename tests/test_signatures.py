@@ -427,7 +427,10 @@ def test_the_control_exceeds_itself_in_five_of_a_hundred_studies():
     """First movements of 400 runs of random search: of 500 pairs of samples few more than 5 % are
     significant."""
     task = load_task("ascending")
-    results = (run_method(RandomSearch(RandomSearch.Parameters(trials=300)), task, seed)[0] for seed in range(400))
+    results = (
+        run_method(RandomSearch(RandomSearch.Parameters(trials=300)), task, seed)[0]
+        for seed in range(400)
+    )
     runs = tuple(execute(task, result.solution) for result in results)
     first = SIGNATURES["first"].of(Solutions(task, RANDOM_SEARCH, runs))
     drawn = np.random.default_rng(3)

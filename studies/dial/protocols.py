@@ -1,4 +1,4 @@
-"""Run the informed learner along the dial, from trial and error to planning.
+"""Run the informed learner along the dial: how far exploration leans towards the next goal.
 
     python studies/dial/protocols.py results/dial
 
@@ -21,7 +21,6 @@ from coartic import (
     MethodError,
     corrective_trial,
     execute,
-    learn,
     learn_many,
     load_task,
     objective,
@@ -34,7 +33,7 @@ from coartic.method import run_method
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 INSTANCES = [f"{family}/v1/i{number:03d}" for number in range(40) for family in FAMILIES]
 COLUMNS = [
-    "task", "family", "setting", "run", "initial", "best_known",
+    "task", "family", "setting", "run", "corrective_best", "best_known",
     *(f"reward_{trials}" for trials in AFTER), "quarter", "half", "first", "hands",
 ]  # fmt: skip
 OTHERS = {
@@ -48,8 +47,8 @@ OTHERS = {
 def run_task(name):
     """Run every setting on a task; rows of :data:`COLUMNS`."""
     task, rows = load_task(name), []
-    one_armed, best_known = len(task.hands) == 1, -objective(task).best_known
-    base = base_of(task)
+    one_armed, base = len(task.hands) == 1, base_of(task)
+    start, best_known = span_of(task)
     for setting, fields in SETTINGS.items():
         if one_armed and setting in ("hands", "all"):
             fields = {key: value for key, value in fields.items() if key != "hand_exploration"}
@@ -57,7 +56,6 @@ def run_task(name):
         runs = learn_many(task, replace(base, **fields), seeds=range(RUNS), trials=trials, jobs=1)
         for number, run in enumerate(runs):
             best = np.maximum.accumulate(run.rewards.filled(-(10**9)))
-            start = int(best[0])
             reached = trials_to_shares(best, start, best_known)
             reached[reached > trials] = np.inf if trials == TRIALS else np.nan
             done = run.execute()
@@ -74,6 +72,13 @@ def run_task(name):
     return rows
 
 
+def span_of(task):
+    """Return the reward of the corrective process alone with its best hands, from which the gain
+    counts, and the best known reward."""
+    problem = objective(task)
+    return -int(problem.best_cost), -problem.best_known
+
+
 def trials_to_shares(best, start, best_known):
     """Return the trials until the best reward so far is a quarter and half of the way from a first
     reward to the best known, one more than all where it never is."""
@@ -84,12 +89,10 @@ def trials_to_shares(best, start, best_known):
 def run_others(name):
     """Run the other methods on a task; rows of :data:`COLUMNS`.
 
-    The gain counts from the learner's initial solution. A planner makes no trial: its plan is
-    executed once. A method that fails gains nothing.
+    A planner makes no trial: its plan is executed once. A method that fails gains nothing.
     """
     task, rows = load_task(name), []
-    start = int(learn(task, base_of(task), seed=0, trials=1).rewards[0])
-    best_known = -objective(task).best_known
+    start, best_known = span_of(task)
     for setting, (method, runs) in OTHERS.items():
         for number in range(runs):
             try:

@@ -1,4 +1,4 @@
-"""Settings of the learner along the dial, from trial and error to planning, and off it."""
+"""Settings of the learner along the dial, of leaning towards the next goal, and off it."""
 
 from coartic import CONDITIONS
 

@@ -1,4 +1,4 @@
-"""Measure the dial from trial and error to planning on tasks on which it was not tuned.
+"""Measure how far exploration leans towards the next goal, on tasks on which it was not tuned.
 
     python studies/dial/protocols.py results/dial
     python studies/dial/study.py results/dial
@@ -6,7 +6,8 @@
 writes results.csv, claims.csv, shifts.csv, shift_claims.csv, figure.svg and the page, README.md;
 without a folder figure and page, of the stored tables.
 
-The *gain* of a run is the share of the way from the task's initial solution to the best known.
+The *gain* of a run is the share of the way from the corrective process alone, with its best hands,
+to the best known reward.
 """
 
 import sys
@@ -26,12 +27,13 @@ POINTS = 5.0
 def measure_runs(raw):
     """Add gains and logarithms of trials to the stored runs, a row for each run.
 
-    ``gain_N`` after N trials, in per cent; NaN where the initial solution is the best known.
+    ``gain_N`` after N trials, in per cent; NaN where nothing can be gained.
     ``log_quarter`` and ``log_half``: trials to a quarter and to half of the gain, as a power of
     ten; a run that does not come there counts as all trials.
     """
-    possible = (raw.best_known - raw.initial).where(raw.best_known > raw.initial)
-    gains = {f"gain_{n}": 100 * (raw[f"reward_{n}"] - raw.initial) / possible for n in AFTER}
+    zero = raw.corrective_best
+    possible = (raw.best_known - zero).where(raw.best_known > zero)
+    gains = {f"gain_{n}": 100 * (raw[f"reward_{n}"] - zero) / possible for n in AFTER}
     gaps = {f"gap_{n}": 100 * (raw[f"reward_{n}"] / raw.best_known - 1) for n in AFTER}
     logs = {f"log_{name}": np.log10(raw[name].clip(upper=TRIALS).where(possible.notna()))
             for name in ("quarter", "half")}  # fmt: skip
@@ -202,6 +204,14 @@ def measure(folder):
     shifts = measure_shifts(pd.read_csv(Path(folder) / "shifts.csv"))
     return {
         "results": tabulate(runs),
+        "by_task": runs.groupby(["task", "setting"], sort=False)[
+            [
+                *(f"reward_{n}" for n in AFTER),
+                *(f"gain_{n}" for n in AFTER),
+            ]
+        ]
+        .mean()
+        .join(runs.groupby(["task", "setting"]).size().rename("n")),
         "claims": judge_claims(runs),
         "shifts": tabulate_shifts(shifts),
         "shift_claims": judge_shifts(shifts),

@@ -217,7 +217,12 @@ def draw(table):
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     runs = measure_runs(study)
-    return {"results": tabulate(study, runs), "claims": judge_claims(study, runs)}
+    by_task = runs.groupby(["task", "kind"], sort=False)[["reward", "replay_reward", *MEASURES]]
+    return {
+        "results": tabulate(study, runs),
+        "claims": judge_claims(study, runs),
+        "by_task": by_task.mean().join(by_task.size().rename("n")),
+    }
 
 
 if __name__ == "__main__":

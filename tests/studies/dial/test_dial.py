@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic.analysis import judging
+from coartic import corrective_trial, hand_sequences, load_task
+from coartic.analysis import judging, ranking, runtimes, shares
+from tests.support.made_up import study_of_rewards
 from tests.support.processes import program
 
 FOLDER = Path(__file__).parents[3] / "studies" / "dial"
@@ -32,7 +34,7 @@ def planted(gains, quarters=None):
                 ))  # fmt: skip
                 rows.append({
                     "task": f"{family}/v1/i{number:03d}", "family": family, "setting": setting,
-                    "run": 0, "initial": -600, "best_known": -500, **rewards,
+                    "run": 0, "corrective_best": -600, "best_known": -500, **rewards,
                     "quarter": (quarters or {}).get(setting, 1000) + number, "half": np.inf,
                     "first": 0.0,
                 })  # fmt: skip
@@ -80,8 +82,8 @@ def test_a_task_is_run_under_every_setting(monkeypatch):
     for name, value in (("TRIALS", 40), ("FEW", 40), ("AFTER", (5, 10, 20, 40)), ("RUNS", 2)):
         monkeypatch.setattr(PROTOCOLS, name, value)
     rows = pd.DataFrame(PROTOCOLS.run_task("ascending"), columns=[
-        "task", "family", "setting", "run", "initial", "best_known", *"abcd", "quarter", "half",
-        "first", "hands",
+        "task", "family", "setting", "run", "corrective_best", "best_known", *"abcd",
+        "quarter", "half", "first", "hands",
     ])  # fmt: skip
     assert rows.groupby("setting").size().eq(2).all()
     assert {*rows.setting} == {*PROTOCOLS.SETTINGS}
@@ -89,7 +91,26 @@ def test_a_task_is_run_under_every_setting(monkeypatch):
     assert (rows.c <= rows.d).all()
     assert (rows.d <= rows.best_known).all()
     half = rows[rows.half < np.inf]
-    assert (half.d >= (half.initial + half.best_known) / 2).all()
+    assert (half.d >= (half.corrective_best + half.best_known) / 2).all()
+
+
+def test_the_corrective_process_with_its_best_hands_gains_nothing():
+    """Shares, targets, ranking and the dial have one zero, whatever the initial hands."""
+    task = load_task("two-armed-1")
+    best = max(corrective_trial(task, hands).reward for hands in hand_sequences(task))
+    assert best > corrective_trial(task, task.initial_hands).reward
+    start, best_known = PROTOCOLS.span_of(task)
+    assert start == best
+    raw = {"corrective_best": start, "best_known": best_known, "quarter": np.inf, "half": np.inf}
+    rows = pd.DataFrame([raw | {f"reward_{n}": best for n in PROTOCOLS.AFTER}])
+    assert (STUDY.measure_runs(rows)[[f"gain_{n}" for n in PROTOCOLS.AFTER]] == 0).all(axis=None)
+    alone = "corrective-alone/best-hands"
+    seen = study_of_rewards({(task.name, alone): [best], (task.name, "mine"): [best_known]})
+    row = seen.runs[seen.runs.method == alone]
+    assert shares(row).tolist() == [0]
+    assert ranking(row).share.tolist() == [0]
+    curve = runtimes(seen)
+    assert curve[(curve.method == alone) & (curve.spend == "trials")].share.tolist() == [0]
 
 
 def planted_shifts(settings):
