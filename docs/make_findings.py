@@ -72,8 +72,7 @@ def cells_of_the_paper() -> pd.DataFrame:
 
 def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]:
     """How many claims on the paper's tasks replicate, by verdict; ``others``: without the three
-    that carry
-    the paper's point; ``published``: that rest on published goals alone."""
+    that carry the paper's point; ``published``: that rest on published goals alone."""
     judged = table("replication", "claims")
     judged = judged[judged.suite != "families"]
     if published:
