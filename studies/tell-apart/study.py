@@ -194,6 +194,9 @@ def find_power(changes, starts, steps):
     for name, items in (("same", 400), ("kept", records)):
         (a, spread), (b, other) = person.loc["learner", name], person.loc["planner", name]
         cases[f"step {name}"] = a, b, max(spread, other) * np.sqrt(items), items
+    ahead = shares[(shares.distance == 0.5) & (shares.model == "planner, next goal")]
+    noise = NOISE * np.sqrt(1.05) / ahead["shift"].quantile(0.25)
+    cases |= {f"change 0.5, {k} goals, one goal ahead": (0, 1, noise, k) for k in (1, 4)}
     rows = {
         name: {"learner": case[0], "planner": case[1], "noise": case[2] / np.sqrt(case[3]),
                **{f"people_{kind}": people_needed(*case, planned, rng) for kind, planned in
