@@ -16,6 +16,7 @@ import pandas as pd
 from coartic.analysis import (
     TwoContexts,
     all_of,
+    contexts_of_control,
     figures,
     judge,
     load,
@@ -86,16 +87,15 @@ def tabulate_posture_difference(study, runs):
     permutation test that there is no difference. ``beyond_p``: p of the test that the difference is
     no larger than in random search.
     """
-    random_search = TwoContexts(
-        *(study.executed(task, RANDOM_SEARCH) for task in SHARED), 1, "right"
-    )
     rows = {}
     first = runs[runs.task == SHARED[0]].groupby("kind").first()
     labels = (first.method + " " + first.setting).str.strip()
     for kind, label in labels.items():
-        learned = [study.executed(task, label, replay=True) for task in SHARED]
-        ours = random_search if label == RANDOM_SEARCH else TwoContexts(*learned, 1, "right")
-        beyond = np.nan if label == RANDOM_SEARCH else ours.p_beyond(random_search)
+        replay = label != RANDOM_SEARCH
+        runs_on_both = [study.executed(task, label, replay=replay) for task in SHARED]
+        ours = TwoContexts(*runs_on_both, 1, "right")
+        control = contexts_of_control(study, ours)
+        beyond = np.nan if control is None else ours.p_beyond(control)
         posture_difference = {
             "posture_difference": ours.posture_difference,
             "posture_difference_p": ours.p,
