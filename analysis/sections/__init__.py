@@ -136,6 +136,7 @@ SECTIONS = (
         "Which signatures of coarticulation does each method show?",
         table=coarticulation.list_signatures,
         caption="Signatures of coarticulation, means over runs, next to random search",
+        figure=coarticulation.draw_coarticulation,
         sentence=coarticulation.joints_or_hand,
         note="Ticks are compared with those of the corrective process with the same hands. A first "
         "movement that gets slower while the whole task gets faster is sacrificed for it. Idle "

@@ -15,13 +15,13 @@ from matplotlib.patheffects import withStroke
 
 from coartic.analysis.control import contexts_of_control, selects, with_control
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure
+from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.standings import failed_runs, is_learner
+from coartic.analysis.standings import common_tasks, failed_runs, is_learner
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, row_of_cell, runs_of, table
@@ -29,7 +29,8 @@ from coartic.analysis.words import number, p_value
 from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL, difference_of_means, mean
 from coartic.internal.text import counted
-from coartic.robot import HANDS
+from coartic.robot import HANDS, Array
+from coartic.runs.plan import label_of
 
 SAME = 1e-9
 """Largest posture difference that is rounding, length unit and rad mixed."""
@@ -96,7 +97,8 @@ def list_contexts(study: Study) -> Rows:
 
 
 @table(
-    "task; method; hands; runs; control_runs: runs of random search; "
+    "task; method; hands; runs; gain[]: gain (ticks) .1; share[]: share of the possible gain (%) .0; "
+    "control_runs: runs of random search; "
     + "; ".join(
         f"{column}[]: {words} .{digits}; {column}_control: random search .{digits}; "
         f"{column}_difference[]: -; {column}_p: p .p; {column}_control_runs: -"
@@ -114,6 +116,7 @@ def list_signatures(study: Study) -> Rows:
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
     the choice of hands (``hands`` empty). Means over runs; p is one-tailed and uncorrected.
+    ``gain``: ticks by which a run is faster than the corrective process alone with its best hands.
     """
     labels = study.methods.index[study.methods.kind != "optimum search"]
     for name, label in itertools.product(one_by_one(study), labels):
@@ -121,6 +124,8 @@ def list_signatures(study: Study) -> Rows:
         if cell is None or not len(cell.good):
             continue
         rows: dict[str, Row] = {}
+        best = study.optima.get(name)
+        possible = best.reward - study.corrective_best[name] if best else math.nan
         for signature in SIGNATURES:
             column = signature.replace(" ", "_")
             for hands, (values, control) in with_control(study, signature, name, label).items():
@@ -132,11 +137,102 @@ def list_signatures(study: Study) -> Rows:
                         **difference_of_means(values, control).columns(f"{column}_difference"),
                         f"{column}_p": bootstrap_test(values, control).p,
                     }
+        gains = gain_by_hands(study, name, label)
         for hands, row in rows.items():
+            row |= mean(gains[hands]).columns("gain")
+            row |= mean(gains[hands] / possible).columns("share") if possible > 0 else {}
             yield (
                 " ".join(filter(None, (name, label, hands))),
                 row_of_cell(study, cell) | row | {"hands": hands},
             )
+
+
+def gain_by_hands(study: Study, task: str, label: str) -> dict[str, Array]:
+    """Return the gains of the runs of a method on a task over the corrective process alone with its
+    best hands, ticks, shape ``(n,)``, by hand sequence; of all runs under ``""``."""
+    runs = study.executed(task, label).runs
+    gains = np.array([-run.ticks for run in runs]) - study.corrective_best[task]
+    hands = np.array([run.hands for run in runs])
+    return {"": gains, **{str(each): gains[hands == each] for each in np.unique(hands)}}
+
+
+AGAINST_GAIN = {
+    "arm": "next goal nearer (ticks)",
+    "other arm": "idle hand nearer (share)",
+    "first": "first movement slower (ticks)",
+}
+"""Signatures of the figure against gain, with the labels of their axes."""
+
+
+def against_gain(study: Study) -> pd.DataFrame:
+    """Return gains and signatures, means over tasks of means over runs, a row for each method that
+    ran on all tasks that the most methods share.
+
+    Columns ``method``, ``base`` (the method with its setting, but for its number of trials),
+    ``trials``, ``tasks``, ``gain`` (ticks) and a column for each signature of
+    :data:`AGAINST_GAIN`.
+    """
+    runs = study.runs[(study.runs.status == "ok")]
+    runs = runs.assign(
+        label=[*map(label_of, runs.method, runs.setting)],
+        gain=runs.reward.astype(float) - runs.task.map(study.corrective_best),
+        **{name: study.signature(name) for name in AGAINST_GAIN},
+    )
+    columns = ["gain", *AGAINST_GAIN]
+    of_tasks = runs.groupby(["label", "task"], sort=False)[columns].mean()
+    rows = []
+    for label, parts in study.methods.parts[study.methods.kind != "optimum search"].items():
+        of_method = pd.concat([of_tasks.loc[each] for each in parts if each in of_tasks.index])
+        if {*common_tasks(study)} <= {*of_method.index}:
+            means = of_method.loc[[*common_tasks(study)]].mean()
+            made = runs.trials[runs.label.isin(parts)].max()
+            base = ", ".join(
+                each
+                for each in study.methods.setting[label].split(", ")
+                if not each.startswith("trials=")
+            )
+            base = label_of(study.methods.base[label], base)
+            rows.append({"method": label, "base": base, "trials": made,
+                         "tasks": len(common_tasks(study)), **means})  # fmt: skip
+    return pd.DataFrame(rows, columns=["method", "base", "trials", "tasks", *columns])
+
+
+@figure(
+    "Coarticulation against gain",
+    "Signatures of coarticulation of each method against its gain over the corrective process "
+    "alone with its best hands: means over tasks of means over runs. A line joins numbers of "
+    "trials of one method.",
+)
+def draw_coarticulation(study: Study) -> Parts | None:
+    """Draw signatures against gain, a point for each method."""
+    data = against_gain(study)
+    if len(data) < 2:
+        return None
+    shown = [name for name in AGAINST_GAIN if data[name].notna().any()]
+    drawing, panels = style.panels((1, len(shown)), (style.TWO, 2.8))
+    looks = looks_in(study, data.method)
+    for axes, name in zip(panels, shown, strict=True):
+        for _, rows in data.groupby("base", sort=False):
+            rows = rows.dropna(subset=name).sort_values("trials")
+            if not len(rows):
+                continue
+            look = looks[rows.method.iloc[-1]]
+            axes.plot(rows.gain, rows[name], marker="o", markersize=3, linewidth=0.8, **look)
+            end = rows.iloc[-1]
+            title = study.methods.title[end.method]
+            style.tip(axes.lines[-1], f"{title}: gain {end.gain:.1f}, {end[name]:.2f}")
+        axes.axhline(0, color=style.GREY, linewidth=0.5)
+        axes.set_xlabel("gain (ticks)")
+        axes.set_title(AGAINST_GAIN[name])
+    style.letters(panels)
+    lasts = data.sort_values("trials").drop_duplicates("base", keep="last").sort_index()
+    handles = [
+        style.legend_line(study.methods.title[label], marker="o", markersize=3, **looks[label])
+        for label in lasts.method
+    ]
+    style.legend(drawing, handles, 3)
+    words = spoken(lasts.join(study.methods.title, on="method"), "{title}: gain {gain:.0f}")
+    return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
 
 
 def beside_control(study: Study, shared: TwoContexts) -> Row:
