@@ -3,9 +3,8 @@
     coartic run studies/gain/suite.toml --out results/gain
     python studies/gain/study.py results/gain
 
-writes results.csv (method means by family), equal.csv (differences to the learner at equal gain, a
-row for each method and task), claims.csv, figure.svg and the page, README.md; without a folder
-figure and page, of the stored tables.
+writes results.csv (method means by family), equal.csv (differences to the learner at equal gain),
+cells.csv (means over runs), claims.csv, the figure and the page; without a folder figure and page.
 
 The *gain* of a run is the number of ticks by which it is faster than the corrective process alone
 with its best hands. At equal gain: on each task a method's signature, less the learner's signature
@@ -23,9 +22,9 @@ from coartic.analysis import all_of, figures, judge, load, mean_beyond, means, w
 from coartic.analysis.judging import Finding
 
 SIGNATURES = {"arm": "next goal nearer", "other arm": "idle hand nearer", "first": "first slower"}
-LEARNER = "dual-process/EC"
+BELOW, BEYOND = "gain below 0", "beyond the learner"
 NAMES = {
-    LEARNER: "learner",
+    "dual-process/EC": "learner",
     "random-search": "random search",
     "hill-climbing": "hill climbing",
     "cma-es/bandit": "CMA-ES",
@@ -35,11 +34,9 @@ NAMES = {
     "trajectory-optimisation/jerk": "minimum jerk",
     "trajectory-optimisation/acceleration": "minimum acceleration",
 }
-SAME_TICKS, SAME_SHARE = 1.0, 0.1
-"""Differences within which signatures are the same, ticks and share of the distance; set before the
-test instances were run."""
-LEAST_CORRELATION = 0.6
-"""Rank correlation of method means that counts as one curve, set before the runs."""
+SAME_TICKS, SAME_SHARE, LEAST_CORRELATION = 1.0, 0.1, 0.6
+"""Differences that count as none, in ticks and in shares of the distance, and the rank correlation
+that counts as one curve; set before the test instances were run."""
 
 
 def measure_cells(study):
@@ -50,51 +47,48 @@ def measure_cells(study):
               for method in runs.method],
         group=runs.family.str.partition("/")[0],
         gain=runs.reward.astype(float) - runs.corrective_best,
+        whole=study.signature("whole"),
         **{name: study.signature(name) for name in SIGNATURES},
     )  # fmt: skip
     # A method without a grid of trials has one setting, whatever trials it makes.
-    settled = runs.groupby("name").setting.transform("nunique") == 1
-    runs["trials"] = runs.trials.where(~settled, 0)
+    runs["trials"] *= runs.groupby("name").setting.transform("nunique") > 1
     keys = ["group", "task", "name", "trials"]
-    return runs.groupby(keys, sort=False)[["gain", *SIGNATURES]].mean().reset_index()
+    return runs.groupby(keys, sort=False)[["gain", "whole", *SIGNATURES]].mean().reset_index()
 
 
 def at_equal_gain(cells, how="linear"):
     """Return differences to the learner at equal gain, a row for each method, setting and task.
 
-    ``status``: ``compared``, ``gain below 0`` or ``beyond the learner`` (no number of its trials
-    gains as much). ``how``: ``linear`` between numbers of trials, with 0 at gain 0, or ``nearest``.
+    ``how``: ``linear`` between numbers of trials, with 0 at gain 0; ``nearest`` number of trials;
+    or ``same hands``, linear with another zero: the corrective process with each run's own hands.
     """
+    gain = "whole" if how == "same hands" else "gain"
     rows = []
-    for task, of_task in cells.groupby("task", sort=False):
-        learner = of_task[of_task.name == "learner"].sort_values("gain")
-        learner = learner[learner.gain > 0]
+    for _, of_task in cells.groupby("task", sort=False):
+        learner = of_task[(of_task.name == "learner") & (of_task[gain] > 0)].sort_values(gain)
         for row in of_task[of_task.name != "learner"].to_dict("records"):
-            most = learner.gain.max() if len(learner) else 0.0
-            status = "gain below 0" if row["gain"] < 0 else "compared"
-            status = "beyond the learner" if row["gain"] > most else status
-            out = {key: row[key] for key in ("group", "task", "name", "trials", "gain")}
+            most = learner[gain].max() if len(learner) else 0.0
+            status = BEYOND if row[gain] > most else BELOW if row[gain] < 0 else "compared"
+            out = {key: row[key] for key in ("group", "task", "name", "trials")}
             for name in SIGNATURES:
                 known = learner.dropna(subset=name)
-                there = status == "compared" and len(known) and known.gain.max() >= row["gain"]
-                gains = np.append(0.0, known.gain)
-                values = np.append(0.0, known[name])
-                at = (np.interp(row["gain"], gains, values) if how == "linear"
-                      else values[np.abs(gains - row["gain"]).argmin()])  # fmt: skip
-                out[name] = row[name] - at if there else np.nan
+                covered = status == "compared" and len(known) and known[gain].max() >= row[gain]
+                gains, values = np.append(0.0, known[gain]), np.append(0.0, known[name])
+                nearest = values[np.abs(gains - row[gain]).argmin()]
+                at = nearest if how == "nearest" else np.interp(row[gain], gains, values)
+                out[name] = row[name] - at if covered else np.nan
             rows.append(out | {"status": status})
     return pd.DataFrame(rows)
 
 
 def by_task(equal, name, column):
     """Return a method's differences, a value for each task: means over its numbers of trials."""
-    of_method = equal[(equal.name == name) & (equal.status == "compared")]
+    of_method = equal[equal.name == name]
     return of_method.groupby("task", sort=False)[column].mean().dropna()
 
 
 def correlations(cells):
-    """Return the rank correlation of method means between gain and the next goal nearer, by
-    family, over the methods of the family with each number of trials."""
+    """Return the rank correlation of method means between gain and next goal nearer, by family."""
     table = cells.groupby(["group", "name", "trials"])[["gain", "arm"]].mean().reset_index()
     return {group: float(stats.spearmanr(rows.gain, rows.arm).statistic)
             for group, rows in table.groupby("group", sort=False)}  # fmt: skip
@@ -131,8 +125,7 @@ def judge_claims(cells, equal):
                         by_task(equal, "random search", "arm"), 0.0, "less"),
         ),
         "cma-es-sacrifices-more": (
-            "At equal gain CMA-ES has a slower first movement than the learner, by more than a "
-            "tick.",
+            "At equal gain CMA-ES slows the first movement more than the learner, by a tick.",
             f"{test}: above {SAME_TICKS:g} tick",
             mean_beyond("CMA-ES first slower by {} ticks more than the learner",
                         by_task(equal, "CMA-ES", "first"), SAME_TICKS),
@@ -160,17 +153,15 @@ def tabulate_equal(equal, how):
     for group, of_group in (("all", equal), *equal.groupby("group", sort=False)):
         for name, of_method in of_group.groupby("name", sort=False):
             counts = of_method.status.value_counts()
-            row = {"group": group, "name": name, "how": how, "cells": len(of_method),
-                   "below_0": counts.get("gain below 0", 0),
-                   "beyond": counts.get("beyond the learner", 0)}  # fmt: skip
+            row = {"group": group, "name": name, "how": how, "cells": len(of_method)}
+            row |= {name: counts.get(name, 0) for name in (BELOW, BEYOND)}
             for column in SIGNATURES:
                 values = by_task(of_method, name, column)
                 if len(values):
                     mean = means(values.to_frame().assign(all=0), ["all"], [column]).iloc[0]
                     row |= {f"{column}_tasks": len(values), f"{column}_median": values.median()}
-                    row |= {
-                        f"{column}{end}": mean[f"{column}{end}"] for end in ("", "_low", "_high")
-                    }
+                    ends = ("", "_low", "_high")
+                    row |= {f"{column}{end}": mean[f"{column}{end}"] for end in ends}
             rows[f"{group} {name} {how}"] = row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
@@ -180,17 +171,15 @@ def draw(table):
     """Signatures against gain: a line for each method over its numbers of trials, all tasks."""
     figure, panels = figures.panels((1, len(SIGNATURES)), (figures.TWO, 3.0))
     rows = table[table.group == "all"]
+    colors = [*figures.PALETTE, figures.GREY, "black", "saddlebrown"]
+    looks = dict(zip(NAMES.values(), zip("os^Dv<>pP", colors, strict=False), strict=False))
     for axes, column in zip(panels, SIGNATURES, strict=True):
-        for mark, color, (name, of_method) in zip(
-            "os^Dv<>pP", [*figures.PALETTE, figures.GREY, "black", "#8c564b"],
-            rows.groupby("name", sort=False), strict=False,
-        ):  # fmt: skip
-            axes.plot(of_method.gain, of_method[column], marker=mark, markersize=4, linewidth=1,
-                      color=color, label=name)  # fmt: skip
+        for name, of_method in rows.groupby("name", sort=False):
+            mark, color = looks[name]
+            axes.plot(of_method.gain, of_method[column], marker=mark, color=color, label=name)
         axes.axhline(0, color=figures.GREY, linewidth=0.5)
         axes.set_xlabel("gain (ticks)")
         axes.set_title(SIGNATURES[column])
-    figures.letters(panels)
     figures.legend(figure, panels[0].get_legend_handles_labels()[0], 5)
     return figure
 
@@ -198,10 +187,13 @@ def draw(table):
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     cells = measure_cells(study)
-    linear, nearest = (at_equal_gain(cells, how) for how in ("linear", "nearest"))
-    equal = pd.concat([tabulate_equal(linear, "linear"), tabulate_equal(nearest, "nearest")])
-    return {"results": tabulate(cells), "equal": equal, "claims": judge_claims(cells, linear),
-            "cells": cells.set_index("task")}  # fmt: skip
+    equal = {how: at_equal_gain(cells, how) for how in ("linear", "nearest", "same hands")}
+    return {
+        "results": tabulate(cells),
+        "equal": pd.concat([tabulate_equal(each, how) for how, each in equal.items()]),
+        "claims": judge_claims(cells, equal["linear"]),
+        "cells": cells.set_index("task"),
+    }
 
 
 if __name__ == "__main__":
