@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -29,7 +30,7 @@ from coartic.analysis.words import number, p_value
 from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL, difference_of_means, mean
 from coartic.internal.text import counted
-from coartic.robot import HANDS, Array
+from coartic.robot import HANDS
 from coartic.runs.plan import label_of
 
 SAME = 1e-9
@@ -97,8 +98,8 @@ def list_contexts(study: Study) -> Rows:
 
 
 @table(
-    "task; method; hands; runs; gain[]: gain (ticks) .1; share[]: share of the possible gain (%) .0; "
-    "control_runs: runs of random search; "
+    "task; method; hands; runs; gain[]: gain (ticks) .1; "
+    "share[]: share of the possible gain (%) .0; control_runs: runs of random search; "
     + "; ".join(
         f"{column}[]: {words} .{digits}; {column}_control: random search .{digits}; "
         f"{column}_difference[]: -; {column}_p: p .p; {column}_control_runs: -"
@@ -137,23 +138,15 @@ def list_signatures(study: Study) -> Rows:
                         **difference_of_means(values, control).columns(f"{column}_difference"),
                         f"{column}_p": bootstrap_test(values, control).p,
                     }
-        gains = gain_by_hands(study, name, label)
+        runs = study.executed(name, label).runs
+        gains = np.array([-run.ticks for run in runs]) - study.corrective_best[name]
+        made = np.array([run.hands for run in runs])
         for hands, row in rows.items():
-            row |= mean(gains[hands]).columns("gain")
-            row |= mean(gains[hands] / possible).columns("share") if possible > 0 else {}
-            yield (
-                " ".join(filter(None, (name, label, hands))),
-                row_of_cell(study, cell) | row | {"hands": hands},
-            )
-
-
-def gain_by_hands(study: Study, task: str, label: str) -> dict[str, Array]:
-    """Return the gains of the runs of a method on a task over the corrective process alone with its
-    best hands, ticks, shape ``(n,)``, by hand sequence; of all runs under ``""``."""
-    runs = study.executed(task, label).runs
-    gains = np.array([-run.ticks for run in runs]) - study.corrective_best[task]
-    hands = np.array([run.hands for run in runs])
-    return {"": gains, **{str(each): gains[hands == each] for each in np.unique(hands)}}
+            gained = gains[made == hands] if hands else gains
+            row |= mean(gained).columns("gain") | {"hands": hands}
+            row |= mean(100 * gained / possible).columns("share") if possible > 0 else {}
+            key = " ".join(filter(None, (name, label, hands)))
+            yield key, row_of_cell(study, cell) | row
 
 
 AGAINST_GAIN = {
@@ -172,36 +165,28 @@ def against_gain(study: Study) -> pd.DataFrame:
     ``trials``, ``tasks``, ``gain`` (ticks) and a column for each signature of
     :data:`AGAINST_GAIN`.
     """
-    runs = study.runs[(study.runs.status == "ok")]
+    runs = study.runs[study.runs.status == "ok"]
     runs = runs.assign(
-        label=[*map(label_of, runs.method, runs.setting)],
         gain=runs.reward.astype(float) - runs.task.map(study.corrective_best),
         **{name: study.signature(name) for name in AGAINST_GAIN},
     )
-    columns = ["gain", *AGAINST_GAIN]
-    of_tasks = runs.groupby(["label", "task"], sort=False)[columns].mean()
-    rows = []
-    for label, parts in study.methods.parts[study.methods.kind != "optimum search"].items():
-        of_method = pd.concat([of_tasks.loc[each] for each in parts if each in of_tasks.index])
-        if {*common_tasks(study)} <= {*of_method.index}:
-            means = of_method.loc[[*common_tasks(study)]].mean()
-            made = runs.trials[runs.label.isin(parts)].max()
-            base = ", ".join(
-                each
-                for each in study.methods.setting[label].split(", ")
-                if not each.startswith("trials=")
-            )
-            base = label_of(study.methods.base[label], base)
-            rows.append({"method": label, "base": base, "trials": made,
-                         "tasks": len(common_tasks(study)), **means})  # fmt: skip
+    labels = pd.Series([*map(label_of, runs.method, runs.setting)], runs.index)
+    columns, tasks, rows = ["gain", *AGAINST_GAIN], common_tasks(study), []
+    for method, parts in study.methods.parts[study.methods.kind != "optimum search"].items():
+        of_method = runs[labels.isin(parts)]
+        of_tasks = of_method.groupby("task")[columns].mean().reindex([*tasks])
+        if of_tasks.gain.notna().all():
+            row: Row = {"method": method, "base": re.sub(r"(, )?trials=\w+", "", str(method))}
+            row |= {"trials": of_method.trials.max(), "tasks": len(tasks)}
+            rows.append(row | of_tasks.mean().to_dict())
     return pd.DataFrame(rows, columns=["method", "base", "trials", "tasks", *columns])
 
 
 @figure(
     "Coarticulation against gain",
     "Signatures of coarticulation of each method against its gain over the corrective process "
-    "alone with its best hands: means over tasks of means over runs. A line joins numbers of "
-    "trials of one method.",
+    "alone with its best hands: means over tasks (the idle hand: with two arms) of means over "
+    "runs. A line joins numbers of trials of one method.",
 )
 def draw_coarticulation(study: Study) -> Parts | None:
     """Draw signatures against gain, a point for each method."""
@@ -210,26 +195,21 @@ def draw_coarticulation(study: Study) -> Parts | None:
         return None
     shown = [name for name in AGAINST_GAIN if data[name].notna().any()]
     drawing, panels = style.panels((1, len(shown)), (style.TWO, 2.8))
-    looks = looks_in(study, data.method)
+    lasts = data.sort_values("trials").drop_duplicates("base", keep="last").sort_index()
+    looks: Any = looks_in(study, lasts.method)
+    for look, mark in zip(looks.values(), itertools.cycle("osD^v<>pPX*"), strict=False):
+        look |= {"marker": mark, "markersize": 4}
     for axes, name in zip(panels, shown, strict=True):
-        for _, rows in data.groupby("base", sort=False):
-            rows = rows.dropna(subset=name).sort_values("trials")
-            if not len(rows):
-                continue
-            look = looks[rows.method.iloc[-1]]
-            axes.plot(rows.gain, rows[name], marker="o", markersize=3, linewidth=0.8, **look)
-            end = rows.iloc[-1]
-            title = study.methods.title[end.method]
-            style.tip(axes.lines[-1], f"{title}: gain {end.gain:.1f}, {end[name]:.2f}")
+        for _, rows in data.dropna(subset=name).sort_values("trials").groupby("base"):
+            last: Any = rows.iloc[-1]
+            axes.plot(rows.gain, rows[name], linewidth=0.8, **looks[last.method])
+            title = study.methods.title[last.method]
+            style.tip(axes.lines[-1], f"{title}: gain {last.gain:.1f}, {last[name]:.2f}")
         axes.axhline(0, color=style.GREY, linewidth=0.5)
         axes.set_xlabel("gain (ticks)")
         axes.set_title(AGAINST_GAIN[name])
     style.letters(panels)
-    lasts = data.sort_values("trials").drop_duplicates("base", keep="last").sort_index()
-    handles = [
-        style.legend_line(study.methods.title[label], marker="o", markersize=3, **looks[label])
-        for label in lasts.method
-    ]
+    handles = [style.legend_line(study.methods.title[each], **looks[each]) for each in looks]
     style.legend(drawing, handles, 3)
     words = spoken(lasts.join(study.methods.title, on="method"), "{title}: gain {gain:.0f}")
     return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
