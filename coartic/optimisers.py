@@ -238,10 +238,18 @@ class Objective:
 
     def evaluations_to(self, targets: ArrayLike) -> Any:
         """Evaluations after which the cost was at or below targets: a float, or an array of the
-        shape of ``targets``, ticks; infinite for targets that are not reached so far."""
+        shape of ``targets``, ticks; infinite for targets that are not reached so far.
+
+        Raises ValueError for a target that is no cost, from 0 to ``FAILED``.
+        """
         wanted = real_array("targets", targets)
+        if not ((wanted >= 0) & (wanted <= FAILED)).all():
+            raise ValueError(
+                f"targets are {brief_value(wanted.tolist())}; each must be a cost, the ticks of a "
+                f"trial, from 0 to {FAILED:_}"
+            )
         evaluations, costs = np.array([*self._better, (np.inf, -np.inf)]).T
-        found = evaluations[np.searchsorted(-costs, -np.nan_to_num(wanted, nan=-np.inf))]
+        found = evaluations[np.searchsorted(-costs, -wanted)]
         return float(found) if wanted.ndim == 0 else found
 
     @property
@@ -392,8 +400,8 @@ class Objective:
         made = self._session.make_trials(codes, targets)
         np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self.best_cost:
-            lowest = np.minimum.accumulate(costs)
-            for n in np.flatnonzero(lowest < np.append(self.best_cost, lowest[:-1])).tolist():
+            before = np.minimum.accumulate(np.append(self.best_cost, costs))[:-1]
+            for n in np.flatnonzero(costs < before).tolist():
                 at = self.evaluations + n + 1
                 self._keep(float(costs[n]), at, points[n], codes, made, n)
         self.evaluations += len(points)
@@ -401,7 +409,8 @@ class Objective:
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
-        """Note the best trial so far."""
+        """Note the best trial so far, whose cost is below that of each one before it."""
+        assert cost < self.best_cost
         self.best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
         self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
