@@ -15,11 +15,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
+from coartic.internal.limits import real_array
 from coartic.internal.text import error_line
 from coartic.method import (
     Information,
@@ -45,8 +45,8 @@ def plain_movement(movement: Movement) -> Movement:
         int(movement.goal),
         str(movement.hand),  # type: ignore[arg-type]
         str(movement.kind),  # type: ignore[arg-type]
-        None if target is None else np.array(target, dtype=np.float64),
-        waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
+        None if target is None else real_array("a target", target),
+        waypoints=None if waypoints is None else real_array("a path", waypoints),
     )
 
 
@@ -139,7 +139,7 @@ def perform_job(job: Job) -> list[Outcome]:
         made = trials_outside() - made
         if made and not cell.method.is_ours:
             text = f"the method made {made} trials outside its session, which are not counted"
-            raise UndeclaredError(f"{text}: by coartic.objective, learn or execute")
+            raise UndeclaredError(f"{text}: by coartic.objective, learn, execute or an environment")
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu

@@ -113,14 +113,23 @@ def test_what_a_session_shows_cannot_be_written(methods):
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
 
 
-@pytest.mark.parametrize("means", ["objective", "learn", "execute"])
-def test_trials_outside_the_session_are_noticed(methods, means):
+OUTSIDE = {
+    **{"objective": 6, "learn": 9, "execute": 1, "hands": 1, "path": 2},
+    **{"environment": 1, "environments in a thread": 5},
+}
+"""Trials that each way around a session makes."""
+
+
+@pytest.mark.parametrize("means", OUTSIDE)
+def test_trials_outside_the_session_stop_a_run(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
+    if "environment" in means:
+        pytest.importorskip("gymnasium")
     cell = cell_on(load_task("ascending"), methods["test/outsider"], means=means)
     for _ in range(2):
         (outcome,) = perform_job(Job(cell, 0, (0,)))
         assert outcome.status == "crashed"
-        assert "trials outside its session" in outcome.reason
+        assert f"made {OUTSIDE[means]} trials outside its session" in outcome.reason
 
 
 CASES = [

@@ -40,16 +40,29 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Numbers as an array of the shape that they have. Raises ValueError for anything else."""
+    """Numbers as an array of the shape that they have. Raises ValueError for anything else, and
+    for masked entries, under which an array holds numbers that do not count."""
     import numpy as np  # which the command line's help does without
 
     try:
         array = np.asarray(value)
     except ValueError:
         raise ValueError(f"{name} has rows of different lengths") from None
+    refuse_mask(name, value)
     if array.dtype.kind not in "uif":
         raise ValueError(f"{name} is {brief_value(value)}; needed are real numbers")
     return array.astype(np.float64, copy=False)
+
+
+def refuse_mask(name: str, value: Any) -> None:
+    """Raise ValueError for an array with masked entries, or a list that contains one."""
+    import numpy as np
+
+    if isinstance(value, list | tuple):
+        for each in value:
+            refuse_mask(name, each)
+    elif np.ma.is_masked(value):
+        raise ValueError(f"{name} has masked entries; needed are numbers without a mask")
 
 
 def brief_value(value: object) -> str:

@@ -37,7 +37,13 @@ from coartic.motion.solution import (
     movements_by_goal,
     movements_in,
 )
-from coartic.motion.trial import COUNTED, compiled_task, empty_accounts, make_trials, note_trials
+from coartic.motion.trial import (
+    COUNTED,
+    compiled_task,
+    count_trials,
+    empty_accounts,
+    make_trials,
+)
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 
@@ -180,7 +186,6 @@ def learn_many(
     else:
         hands = check_hands(task, initial_hands(task, condition.hands, model=model))
         first = corrective_movements(hands)
-    note_trials(trials * len(ordered))
     threads = threads_for(jobs)
     together = max(min(SLOTS, math.ceil(len(ordered) / threads)), 1)
     batches = [ordered[begin : begin + together] for begin in range(0, len(ordered), together)]
@@ -224,6 +229,7 @@ def learn_together(
     generators = [np.random.default_rng(seed) for seed in seeds]
     learner, rngs = learner_parameters(compiled, condition, first), addresses(generators)
     workspace = workspace_for(runs, task)
+    count_trials(runs * trials)
     clock = time.perf_counter()
     learn_kernel(compiled.parameters, learner, tables, results, rngs, workspace)
     wall = time.perf_counter() - clock

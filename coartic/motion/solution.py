@@ -27,9 +27,9 @@ from coartic.motion.trial import (
     CompiledTask,
     account_type,
     compiled_task,
+    count_trials,
     hands_among,
     make_trials,
-    note_trials,
     reason_of_failure,
     search_initial_hands,
     sequences_with,
@@ -180,7 +180,6 @@ def execute(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    note_trials(1)
     (execution,) = execute_many(compiled_task(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
@@ -300,6 +299,7 @@ def movements_in(
 
 def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
     """Execute a plan that has paths, one movement after the other."""
+    count_trials(1)
     task, model, q = compiled.task, compiled.model, compiled.starts[0]
     made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
@@ -428,7 +428,7 @@ def check_movement(task: Task, movement: Movement) -> Movement:
 def check_point(task: Task, point: Any) -> Array:
     """The point, with its base held (:func:`hold_base`). Raises ValueError for what is no
     configuration of the robot, and where it moves a locked base coordinate."""
-    usual = isinstance(point, np.ndarray) and point.dtype == np.float64
+    usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
         point = configuration(task.robot, point)
@@ -456,7 +456,7 @@ def hold_base(task: Task, points: Array) -> Array:
 
 def check_targets(task: Task, targets: Any) -> Configs:
     """Return a copy of the targets. Raises ValueError for targets that do not fit the task."""
-    copy = np.array(targets, dtype=np.float64)
+    copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
             f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"

@@ -1,6 +1,8 @@
 """Methods that break one law of the conformance kit each, and one that keeps them all."""
 
 import random
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 from pydantic import ConfigDict
 
@@ -161,6 +163,25 @@ class Outsider(Good):
             coartic.objective(task, "RRR").many([[0.0] * 18] * 5)
         elif self.parameters.means == "learn":
             coartic.learn(task, "EC1", seed=0, trials=9)
+        elif self.parameters.means == "hands":
+            coartic.corrective_trial(task, "RRR")
+        elif self.parameters.means == "path":
+            alone = coartic.corrective_trial(task, "RRR")
+            path = [replace(m, kind="path", waypoints=[m.target]) for m in alone.movements]
+            coartic.trajectory(task, path)
+        elif self.parameters.means == "environment":
+            from coartic.gym import TaskEnv
+
+            env = TaskEnv(task)
+            env.reset()
+            env.step(env.action_space.sample())
+        elif self.parameters.means == "environments in a thread":
+            from coartic.gym import TaskVectorEnv
+
+            env = TaskVectorEnv(5, task)
+            env.reset()
+            with ThreadPoolExecutor(1) as pool:
+                pool.submit(env.step, env.action_space.sample()).result()
         else:
             coartic.execute(task, by_correction(session, ["right"] * 3))
         return Result(by_correction(session))
