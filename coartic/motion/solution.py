@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -104,7 +105,8 @@ class Execution:
         names = ("hands", "reward", "ticks", "corrections")
         facts = {name: getattr(self, name) for name in names}
         facts |= {"reason": self.reason} if self.reason else {}
-        return short_repr(self, **facts)
+        alone = goals_without_target(self.movements)
+        return short_repr(self, **facts | ({"goals_without_target": alone} if alone else {}))
 
     @property
     def completed(self) -> bool:
@@ -183,23 +185,31 @@ def execute(
     (execution,) = execute_many(compiled_task(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
-    if execution.ticks > WHOLE_TURNS / model.step:
-        hint_at_degrees(execution.movements)
+    if execution.ticks > WHOLE_TURNS / model.step and (hint := hint_of(execution.movements)):
+        warnings.warn(hint, stacklevel=2)
     return execution
 
 
-def hint_at_degrees(movements: Iterable[Movement]) -> None:
-    """Warn of a target that turns a joint so far as degrees would."""
+def hint_of(movements: Iterable[Movement]) -> str:
+    """Return the hint of movements of which a target turns a joint so far as degrees would; empty
+    without such a target."""
     for movement in movements:
         if movement.kind != "corrective" and movement.target is not None:
             angle = max(movement.target[BASE_DOF:].tolist(), key=abs)
             if abs(angle) > WHOLE_TURNS:
-                warnings.warn(
+                return (
                     f"goal {movement.goal}: the target has the angle {angle:.4g}; angles are in "
-                    f"rad. Did you mean {angle:.4g}° = {math.radians(angle):.3f}?",
-                    stacklevel=3,
+                    f"rad. Did you mean {angle:.4g}° = {math.radians(angle):.3f}?"
                 )
-                return
+    return ""
+
+
+def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
+    """Return the numbers of the goals that corrective movements alone were made for."""
+    kinds = defaultdict[int, set[str]](set)
+    for movement in movements:
+        kinds[movement.goal].add(movement.kind)
+    return tuple(goal for goal, made in sorted(kinds.items()) if made == {"corrective"})
 
 
 def execute_many(

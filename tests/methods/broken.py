@@ -4,12 +4,14 @@ import random
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import numpy as np
 from pydantic import ConfigDict
+from scipy._lib._util import check_random_state
 
 import coartic
 from coartic import load_task
 from coartic.method import Information, Method, Parameters, Result
-from coartic.motion.solution import Movement
+from coartic.motion.solution import Movement, movements_of
 
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
 SEEN = []
@@ -195,6 +197,59 @@ class Lucky(Good):
 
     def solve(self, session):
         return Result(by_correction(session), {"drawn": session.rng.random()})
+
+
+class OwnGeneratorParameters(Parameters):
+    maker: str = "default_rng"
+
+
+class OwnGenerator(Good):
+    """Has a lucky seed, though it says that no seed matters."""
+
+    name = "test/own-generator"
+    stochastic = False
+    Parameters = OwnGeneratorParameters
+
+    def solve(self, session):
+        makers = {
+            "default_rng": lambda: np.random.default_rng(7),
+            "RandomState": lambda: np.random.RandomState(7).uniform(),
+            "Random": lambda: random.Random(7).random(),
+            "subclass": lambda: OwnRandom(7).doubled(),
+            "seed": lambda: np.random.seed(7),  # noqa: NPY002
+            "scipy": lambda: check_random_state(7),
+        }
+        makers[self.parameters.maker]()
+        assert isinstance(np.random.mtrand._rand, np.random.RandomState)
+        return Result(by_correction(session))
+
+
+class OwnRandom(random.Random):
+    def doubled(self):
+        return 2 * self.random()
+
+
+class Degrees(Good):
+    """Moves to targets in degrees."""
+
+    name = "test/degrees"
+
+    def solve(self, session):
+        q, goals = session.q0, range(1, session.goals_count + 1)
+        q[-4:] = 90.0, -30.0, 10.0, 5.0
+        by_correction(session)
+        return Result(tuple(Movement(goal, "right", "planned", q) for goal in goals))
+
+
+class NoTarget(Good):
+    """Has an inverse kinematics that fails, which looks like a solution."""
+
+    name = "test/no-target"
+
+    def solve(self, session):
+        by_correction(session)
+        targets = np.full((session.goals_count, session.dof), np.nan)
+        return Result(movements_of("R" * session.goals_count, targets))
 
 
 class Quits(Good):
