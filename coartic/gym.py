@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.estimates import Estimate, mean
 from coartic.gym_kernel import VectorState, observe, step_robots
-from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
+from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import unknown
 from coartic.method import Method, MethodError, run_method
 from coartic.model import PAPER, MotionModel, check_model
@@ -366,7 +366,7 @@ def whole_seed(seed: Any) -> int | None:
     """A seed as Gymnasium takes it. Raises ValueError for anything else."""
     if seed is None:
         return None
-    check_limits("seed", seed, 0, 2**128 - 1)
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
     return int(seed)
 
 

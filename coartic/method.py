@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
-from coartic.internal.limits import real_array
+from coartic.internal.limits import MOST_RUN_SEED, check_limits, real_array
 from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import Correction, correct
@@ -705,10 +705,13 @@ def run_method(
         It uses information that it does not declare.
     NotApplicableError
         It does not apply to the task.
+    ValueError
+        The seed is no whole number from 0.
     """
     built_in = [getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES]
     is_ours = type(method) in chain.from_iterable(built_in)
-    session = Session(as_task(task), seed, method.information, model=model, trusted=is_ours)
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    session = Session(as_task(task), int(seed), method.information, model=model, trusted=is_ours)
     result = method.solve(session)
     session.check_solution(result.solution)
     return result, session

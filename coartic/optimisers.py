@@ -443,11 +443,16 @@ class Objective:
         if np.isinf(points).any():
             raise ValueError("points have infinite entries; needed are finite ones")
 
+    @property
+    def trials_left(self) -> int:
+        """Number of trials left."""
+        return self._end - self._session.trials_made
+
     def _trials_left(self, wanted: int) -> int:
         """Return how many of the trials wanted are left. Raises BudgetError if none is."""
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
-        left = self._end - self._session.trials_made
+        left = self.trials_left
         if left <= 0 < wanted:
             raise BudgetError("all trials of the budget are made")
         return min(wanted, left)
@@ -490,7 +495,7 @@ def objective(
         The task cannot be used.
     ValueError
         Hands do not fit, the half width is not from 1e-9 to 100, or the budget is not from 1 to
-        10,000,000.
+        10,000,000, or less than the hand sequences to choose among.
     TypeError
         The model is none, or the task is neither a Task nor a text nor a path.
     MethodError
@@ -503,6 +508,11 @@ def objective(
     reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
     if hands is None and reason:
         raise MethodError("infeasible", f"{reason}; say which hands")
+    if hands is None and budget is not None and budget < (first := len(chosen.hands) ** goals):
+        raise ValueError(
+            f"budget is {budget}; to choose among the hand sequences of task {chosen.name!r} takes "
+            f"{counted(first, 'trial')}: give more, or say which hands"
+        )
     session = Session(chosen, 0, OPTIMISER_INFORMATION, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
 
@@ -586,6 +596,8 @@ class Optimiser(Method):
             raise MethodError("infeasible", "the trial budget leaves no trial to make") from None
         with session.solving(), suppress(BudgetError):
             self.optimise(cost, session.rng)
+        if cost.evaluations == 0 and cost.trials_left > 0:
+            raise MethodError("solver-failed", "optimise ended without evaluating a point")
         return Result(cost.solution, {"evaluations": cost.evaluations})
 
     @abstractmethod

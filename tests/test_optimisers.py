@@ -19,7 +19,7 @@ import coartic
 from coartic import CoarticError, MotionModel, UndeclaredError, corrective_trial, execute, load_task
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
-from coartic.method import BudgetError, Information, MethodError, Session
+from coartic.method import BudgetError, Information, MethodError, Session, run_method
 from coartic.motion.solution import movements_of
 from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
 from tests.support.strategies import shipped_optima, tiny_task
@@ -423,6 +423,30 @@ def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     again(again.x0)
     with pytest.raises(ValueError, match="budget is 0; it must be a whole number from 1"):
         coartic.objective(FOUR, budget=0)
+    few = "budget is 15; to choose among the hand sequences .* takes 16 trials: give more, or say"
+    with pytest.raises(ValueError, match=few):
+        coartic.objective(FOUR, budget=15)
+    with pytest.raises(ValueError, match="budget is 3; .* takes .* trials"):
+        coartic.problems("two-armed/v1", count=1, budget=3)
+    assert coartic.objective(FOUR, "RLRR", budget=5).trials_left == 4
+    assert coartic.objective(FOUR, budget=16).trials_left == 0
+
+
+class Idle(coartic.Optimiser):
+    name, title, citation = "test/idle", "Idle", "None."
+
+    def optimise(self, objective, rng):
+        pass
+
+
+def test_an_optimiser_that_evaluates_nothing_has_no_solution():
+    """But where the hands take all trials, it could not."""
+    for trials in (2, 10):
+        with pytest.raises(MethodError, match="optimise ended without evaluating a point"):
+            run_method(Idle(Idle.Parameters(trials=trials)), "ascending")
+    result, session = run_method(Idle(Idle.Parameters(trials=16)), FOUR)
+    assert session.trials_made == 16
+    assert execute(FOUR, result.solution).reward == max(session.rewards)
 
 
 def test_instances_of_a_family():

@@ -20,6 +20,9 @@ MOST_TRIALS = 10_000_000
 MOST_SECONDS = 1_000_000
 """Most seconds of a run: eleven days; the system's clocks of waiting end at twice that."""
 MOST_SEED = 2**63 - 1
+"""Largest seed of a suite."""
+MOST_RUN_SEED = 2**128 - 1
+"""Largest seed of a run: some are hashes."""
 MOST_BYTES = 10_000_000
 """Most bytes of a file of tasks, suites or methods: a hundred times the largest one shipped."""
 WIDTHS = (1e-9, 100.0)

@@ -330,7 +330,8 @@ COLUMNS = tuple(
          "most memory of the process so far, MiB"),
         ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
         ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
-        ("used", "TEXT NOT NULL", "outcome.used", "declared information that the method used; `a generator of its own` if a method that is "
+        ("used", "TEXT NOT NULL", "outcome.used",
+         "declared information that the method used; `a generator of its own` if a method that is "
          "declared not to be stochastic makes a generator of random numbers"),
         ("result", "TEXT NOT NULL", "result",
          "hash of the outcome; runs with the same value are identical"),
