@@ -115,7 +115,7 @@ def test_what_a_session_shows_cannot_be_written(methods):
 
 
 OUTSIDE = {
-    **{"objective": 6, "learn": 9, "execute": 1, "hands": 1, "path": 2},
+    **{"objective": 6, "learn": 9, "execute": 1, "hands": 1, "path": 2, "session": 4},
     **{"environment": 1, "environments in a thread": 5},
 }
 """Trials that each way around a session makes."""

@@ -10,7 +10,7 @@ from scipy._lib._util import check_random_state
 
 import coartic
 from coartic import load_task
-from coartic.method import Information, Method, Parameters, Result
+from coartic.method import Information, Method, Parameters, Result, Session
 from coartic.motion.solution import Movement, movements_of
 
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
@@ -165,6 +165,10 @@ class Outsider(Good):
             coartic.objective(task, "RRR").many([[0.0] * 18] * 5)
         elif self.parameters.means == "learn":
             coartic.learn(task, "EC1", seed=0, trials=9)
+        elif self.parameters.means == "session":
+            own = Session(task, 0, Information)
+            own.trial(by_correction(session, ["right"] * 3))
+            own.trials("RRR", np.zeros((3, 3, own.dof)))
         elif self.parameters.means == "hands":
             coartic.corrective_trial(task, "RRR")
         elif self.parameters.means == "path":
