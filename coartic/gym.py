@@ -500,11 +500,21 @@ def acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
         see = normal.normalize_obs if normal else np.asarray
         return lambda seen: policy.predict(see(seen), deterministic=True)[0]
     if callable(policy):
-        return policy  # type: ignore[no-any-return]
+        return lambda seen: without_state(policy(seen))
     raise TypeError(
         f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
         "with predict, or a Method"
     )
+
+
+def without_state(actions: Any) -> ArrayLike:
+    """Return actions. Raises TypeError for the pair that an agent's ``predict`` returns."""
+    if isinstance(actions, tuple):
+        raise TypeError(
+            f"the policy returned a tuple of {len(actions)}; needed are the actions alone, which "
+            "are the first entry of what an agent's predict returns"
+        )
+    return actions  # type: ignore[no-any-return]
 
 
 def rollout(

@@ -488,6 +488,8 @@ def test_what_cannot_be_scored():
         coartic.gym.score(gymnasium.make("CartPole-v1"))
     with pytest.raises(TypeError, match="policy is 0; it must be a function of observations"):
         coartic.gym.score(TWO, 0)
+    with pytest.raises(TypeError, match="returned a tuple of 2; needed are the actions alone"):
+        coartic.gym.score(TWO, lambda seen: (np.zeros((len(seen), 10)), None))
 
 
 def test_robots_for_stable_baselines():

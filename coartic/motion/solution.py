@@ -13,6 +13,7 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -392,6 +393,12 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
+        for name, kind in (("goal", Real), ("hand", str), ("kind", str)):
+            if not isinstance(value := getattr(movement, name), kind):
+                raise SolutionError(
+                    f"task {task.name!r}: {name} of a movement is {brief_value(value)}; it must be "
+                    f"{'a number' if kind is Real else 'a text'}"
+                )
         if not plan or plan[-1][0].goal != movement.goal:
             plan.append([])
         of_goal = plan[-1]
