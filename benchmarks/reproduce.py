@@ -131,10 +131,16 @@ def doubts_of(run: Run) -> Iterator[str]:
             f"{name} gives another result on {task} with the same seed after another run "
             f"({change}): it keeps something, or draws from a generator without a seed; {advice}"
         )
-    for change in [] if run.cell.method.stochastic else compare_runs(run, other)[:1]:
+    changes = compare_runs(run, other)
+    if changes and not run.cell.method.stochastic:
         yield (
             f"{name} is declared not to be stochastic, but another seed gives another result on "
-            f"{task} ({change}); {advice}"
+            f"{task} ({changes[0]}); {advice}"
+        )
+    if run.cell.method.stochastic and not changes:
+        yield (
+            f"{name} gives the same result on {task} with another seed, so its runs are one: take "
+            "random numbers from session.rng, or declare stochastic = False"
         )
 
 

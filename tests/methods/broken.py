@@ -30,6 +30,7 @@ class Good(Method):
     title = "Keeps every law"
     citation = "None (2026)."
     information = CORRECTIVE
+    stochastic = False
 
     def solve(self, session):
         return Result(by_correction(session))
@@ -197,7 +198,6 @@ class Lucky(Good):
     """Draws, though it says that no seed matters."""
 
     name = "test/lucky"
-    stochastic = False
 
     def solve(self, session):
         return Result(by_correction(session), {"drawn": session.rng.random()})
@@ -211,7 +211,6 @@ class OwnGenerator(Good):
     """Has a lucky seed, though it says that no seed matters."""
 
     name = "test/own-generator"
-    stochastic = False
     Parameters = OwnGeneratorParameters
 
     def solve(self, session):
@@ -254,6 +253,23 @@ class NoTarget(Good):
         by_correction(session)
         targets = np.full((session.goals_count, session.dof), np.nan)
         return Result(movements_of("R" * session.goals_count, targets))
+
+
+class Draws(Good):
+    """Draws as it should."""
+
+    name = "test/draws"
+    stochastic = True
+
+    def solve(self, session):
+        return Result(by_correction(session), {"drawn": session.rng.random()})
+
+
+class Undrawn(Good):
+    """Is declared stochastic, but no seed changes it."""
+
+    name = "test/undrawn"
+    stochastic = True
 
 
 class Quits(Good):
