@@ -1,5 +1,6 @@
 """The command line as a user meets it."""
 
+import importlib
 import os
 import signal
 import subprocess
@@ -291,6 +292,17 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
     for command in ("check", "list"):
         assert "out is a results folder: coartic report out" in coartic(command, "out")[2]
         assert "add --method-file my_search.py" in coartic(command, "my-search")[2]
+
+
+@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize("name", ["class", "json", "2fast", "my-search"])
+def test_a_new_method_file_can_be_imported(coartic, name, tmp_path, monkeypatch):
+    """Under its own name, which is none of Python's."""
+    monkeypatch.chdir(tmp_path)
+    assert coartic("new", name)[0] == 0
+    (path,) = tmp_path.glob("*.py")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert importlib.import_module(path.stem).Mine.name == name
 
 
 def test_help_has_a_short_name(coartic):

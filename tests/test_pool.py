@@ -229,6 +229,7 @@ def test_words_of_an_earlier_run_are_not_those_of_a_crash(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test finds the processes in /proc")
+@pytest.mark.filterwarnings("ignore:.* gives the same result")  # with any seed
 @pytest.mark.parametrize("whom", ["worker", "server"])
 def test_what_somebody_kills_is_repeated(tmp_path, whom):
     """A process at work, or the server that forks them."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import keyword
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -116,5 +118,8 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
 
 
 def file_name(method: str) -> str:
-    """Return the name of the file that ``coartic new`` writes for a method."""
-    return re.sub(r"\W", "_", method) + ".py"
+    """Return the name of the file that ``coartic new`` writes for a method: a name that Python can
+    import, and none of Python's own modules."""
+    stem = re.sub(r"\W", "_", method)
+    unusable = keyword.iskeyword(stem) or stem in sys.stdlib_module_names or stem[:1].isdigit()
+    return f"{'my_' * unusable}{stem}.py"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from functools import wraps
@@ -34,6 +35,15 @@ _PLAINER = {
     r"(valid )?dictionary( or (an )?instance of \w+)?": "table",
 }
 """Wordings of pydantic, and what they say to a person."""
+_NUMBERS = (
+    *("q0", "base", "left", "right", "left_links", "right_links"),
+    *("left_shoulder", "right_shoulder", "base_size", "links", "x", "y"),
+)
+_LISTS = {
+    **dict.fromkeys(_NUMBERS, " of numbers"),
+    **{"hands": ", such as ['right']", "locked_base": ", such as ['y']"},
+}
+"""Advice on a text in the place of a list, by key."""
 
 
 def in_sentences(kind: type[T]) -> type[T]:
@@ -125,7 +135,12 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
         case "list_type" | "tuple_type" if key == "goals":
             message = "should be a list of points, such as [[3.0, 2.0]]"
         case "list_type" | "tuple_type" if isinstance(detail["input"], str):
-            message = f"should be a list, such as [{detail['input']!r}]"
+            example = _LISTS.get(key.rpartition(".")[2], f", such as [{detail['input']!r}]")
+            message = f"should be a list{example}"
+        case "less_than_equal" | "greater_than_equal" if isinstance(
+            detail["input"], float
+        ) and math.isnan(detail["input"]):
+            message = "should be a finite number"
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
     for wording, plainer in _PLAINER.items():
