@@ -1,6 +1,7 @@
 """One short run of each stochastic method, with the numbers that it has.
 
-They were computed once, by version 3.0.0. A change of a method's code that changes no test of its
+They were computed once, by version 3.0.0; the rows of random search and of the informed learner,
+which changed after it, by version 4.0.0. A change of a method's code that changes no test of its
 own changes them.
 """
 
@@ -20,11 +21,11 @@ RUNS = {
     "dual-process/EC1-subtask": (-365, "RRRR", 2_000, 775_757),
     "dual-process/EC4-uncorrected": (-357, "RRRR", 2_000, 406_895),
     "dual-process/EC4-subtask": (-358, "RRRR", 2_000, 826_555),
-    "dual-process/EC1-informed": (-345, "RRRR", 2_000, 707_273),
-    "dual-process/EC4-informed": (-321, "RLRR", 2_000, 763_137),
+    "dual-process/EC1-informed": (-350, "RRRR", 2_000, 749_342),
+    "dual-process/EC4-informed": (-337, "RLLR", 2_000, 771_899),
     "dual-process/custom": (-357, "RRRR", 2_000, 821_009),
-    "random-search": (-357, "RRRR", 2_000, 808_796),
-    "random-search/hands": (-351, "RLRR", 2_000, 983_097),
+    "random-search": (-357, "RRRR", 2_000, 772_395),
+    "random-search/hands": (-354, "RLRR", 2_000, 947_662),
     "hill-climbing": (-354, "RRRR", 2_000, 818_525),
     "cma-es/bandit": (-315, "RLRR", 2_000, 774_098),
     "cma-es/goal-by-goal": (-349, "RRRR", 2_000, 764_277),
