@@ -11,6 +11,30 @@ from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_BYTES
 from coartic.internal.text import LONGEST_LINE, plain
 
+FOREIGN = (
+    ".urdf",
+    ".xml",
+    ".osim",
+    ".mot",
+    ".sto",
+    ".trc",
+    ".c3d",
+    ".mat",
+    ".xlsx",
+    ".xls",
+    ".ods",
+)
+"""Endings of files of robots and recordings that other programs write."""
+
+
+def refuse_foreign(
+    path: str | Path, wanted: str, *, error: type[CoarticError] = CoarticError
+) -> None:
+    """Raises ``error`` for a file of another program; ``wanted`` says what is read and where it is
+    explained."""
+    if (ending := Path(path).suffix.lower()) in FOREIGN:
+        raise error(f"{plain(str(path), LONGEST_LINE)}: coartic reads no {ending} file; {wanted}")
+
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
     """The content of a TOML file. Raises ``error`` for one that cannot be used."""
