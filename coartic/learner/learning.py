@@ -6,13 +6,14 @@ import math
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
-from coartic.internal.limits import MOST_TRIALS, brief_value, check_limits
+from coartic.internal.limits import MOST_RUNS, MOST_TRIALS, brief_value, check_limits
 from coartic.internal.threads import threads_for
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
@@ -165,7 +166,9 @@ def learn_many(
     check_limits("trials", trials, 1, MOST_TRIALS)
     if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):
         raise TypeError(f"seeds is {brief_value(seeds)}; it must be a list of whole numbers")
-    ordered: Sequence[int] = list(seeds)
+    ordered: Sequence[int] = list(islice(seeds, MOST_RUNS + 1))
+    if len(ordered) > MOST_RUNS:
+        raise ValueError(f"there are more than {MOST_RUNS:_} seeds")
     for seed in ordered:
         check_limits("seed", seed, 0, _MOST_SEED)
     check_model(model, radius=task.radius)

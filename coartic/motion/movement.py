@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.internal.limits import real_array
+from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
@@ -637,7 +637,10 @@ def configuration(robot: Robot, q: Any) -> Array:
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     """Return the centre of a goal. Raises ValueError if it is not finite or beyond
     ``LARGEST_ENTRY``."""
-    x, y = float(centre[0]), float(centre[1])
+    place = real_array("goal", centre)
+    if place.shape != (2,):
+        raise ValueError(f"goal is {brief_value(centre)}; it must be two numbers, x and y")
+    x, y = place.tolist()
     if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
         raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
     if not 0.0 <= radius <= LARGEST_ENTRY:

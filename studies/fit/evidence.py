@@ -11,8 +11,7 @@ B: residuals are N(0, σ² s² + τ² B Bᵀ).
 from typing import NamedTuple
 
 import numpy as np
-from hits import HANDS
-from models import landings, starts, tables_before
+from models import HANDS, landings, starts, tables_before
 from scipy import linalg, sparse
 
 DRIFTS = (0.0, 0.03, 0.1, 0.3, 1.0)

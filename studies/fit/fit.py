@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from evidence import NODES, evidence_in
-from hits import read_hits, trials_of
-from models import condition_for, plan_for, tables_before
+from models import condition_for, plan_for, tables_before, trials_of
 from scipy import optimize, stats
 
 from coartic import CONDITIONS, CoarticError, load_task
+from coartic.analysis import read_hits
 
 MODELS = {
     "best": "keep the best",
@@ -157,7 +157,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
     Parameters
     ----------
     frame : DataFrame
-        Rows of :func:`hits.read_hits`.
+        Rows of :func:`coartic.analysis.read_hits`.
     task : Task
         The task that was practised.
     condition : ExplorationCondition, optional

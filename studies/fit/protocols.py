@@ -24,15 +24,14 @@ import numpy as np
 import pandas as pd
 from evidence import DRIFTS
 from fit import MODELS, fit_subject
-from hits import HANDS, trials_of
-from models import condition_for, explored_by, plan_for, projection
+from models import HANDS, condition_for, explored_by, plan_for, projection, trials_of
 
 from coartic import initial_hands, load_task
 from coartic.motion.trial import reach_goals
 
 
 def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, plan=None):
-    """Return the hits of N simulated people, a frame in the format of :func:`hits.read_hits`.
+    """Return the hits of N simulated people, as :func:`coartic.analysis.read_hits` does.
 
     Parameters
     ----------

@@ -106,42 +106,6 @@ def test_lost_trials_and_hits_are_counted(people):
         FIT.fit(first, TASK, condition=CONDITIONS["EC1"])
 
 
-WRONG = {
-    "no column left_2": lambda t: t.drop(columns="left_2"),
-    "line 4: hand is 'both'": lambda t: t.assign(hand=t.hand.where(t.index != 2, "both")),
-    "line 3: goal is 9": lambda t: t.assign(goal=t.goal.where(t.index != 1, 9)),
-    "line 2: trial is 0.5;": lambda t: t.assign(trial=t.trial.where(t.index != 0, 0.5)),
-    "line 3: ticks is 0": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, 0)),
-    "line 2: ticks is 7.5": lambda t: t.assign(ticks=t.ticks.where(t.index != 0, 7.5)),
-    "has no hit": lambda t: t[:0],
-    "line 2: ticks is nan": lambda t: t.assign(ticks=t.ticks.where(t.index != 0)),
-    "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
-    "a line above": lambda t: pd.concat([t, t]),
-}
-
-
-@pytest.mark.parametrize("sentence", WRONG)
-def test_reader_says_what_is_wrong_and_where(people, tmp_path, sentence):
-    WRONG[sentence](people).to_csv(tmp_path / "people.csv", index=False)
-    with pytest.raises(CoarticError, match=sentence):
-        FIT.read_hits(tmp_path / "people.csv", TASK)
-
-
-def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
-    path = tmp_path / "people.csv"
-    timed = people.rename(columns={"ticks": "duration"})
-    timed.assign(duration=timed.duration / 100).to_csv(path, index=False)
-    assert FIT.read_hits(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
-    since_start = people.groupby(["subject", "trial"]).ticks.cumsum()
-    people.assign(ticks=since_start).to_csv(path, index=False)
-    with pytest.warns(UserWarning, match="from the hit before"):
-        FIT.read_hits(path, TASK)
-    angles = [name for name in people if name[-1].isdigit()]
-    people.assign(**np.degrees(people[angles] / 10)).to_csv(path, index=False)
-    with pytest.warns(UserWarning, match="Are the angles in rad"):
-        FIT.read_hits(path, TASK)
-
-
 def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
     example, pages = FOLDER / "example.csv", FOLDER.parents[1] / "docs" / "howto"
     monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", str(example)])
