@@ -13,8 +13,17 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from evidence import NODES, evidence_in
-from models import condition_for, plan_for, tables_before, trials_of
+from check import gain_statistic, misfits, residuals_of, statistics_of
+from evidence import DRIFTS, NODES, SHORT, evidence_in
+from models import (
+    HANDS,
+    condition_for,
+    explored_by,
+    plan_for,
+    starts,
+    tables_before,
+    trials_of,
+)
 from scipy import optimize, stats
 
 from coartic import CONDITIONS, CoarticError, load_task
@@ -29,6 +38,9 @@ MODELS = {
     "planner": "a noisy planner, replayed",
 }
 LEARNERS = ("best", "informed", "drawn")
+HERE = Path(__file__).parent
+STILL = 1e-6
+"""Spread of postures, or of ticks as a share, below which trials are equal."""
 CLEAR = 6.0
 """Difference in BIC from which a model is preferred ("strong" in Kass & Raftery 1995)."""
 SIMULATED = 8
@@ -106,14 +118,14 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
     ``sigma``, ``epsilon`` and ``kappa`` are of *keep the best, informed*, with ``_low`` and
     ``_high``; ``bic_`` and the name of a model.
     """
-    row, plan = {}, plan or plan_for(task)
+    row, plan, fitted = {}, plan or plan_for(task), {}
     for model in MODELS:
         if model not in LEARNERS[1:]:  # which have the same tables
             rule = "memoryless" if model == "planner" else model
             planned = plan if model == "planner" else None
             evidence = evidence_in(task, condition, trials, rule, planned)
         count = int(evidence.sizes.sum()) + len(evidence.follows)
-        free, total = 1, 0.0
+        free, total, epsilon, kappa = 1, 0.0, 0.0, 0.0
         if len(condition.hands) > 1:
             epsilon, total = maximum(evidence.hands, 0.0, 1.0)
             free += 1
@@ -139,9 +151,29 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
                     return of.drawn(np.exp(log_sigma), noise)
                 return of.log_likelihood(np.exp(log_sigma), 0.0, noise)
 
-            _, best = maximum(postures, middle - 3.0, middle + 1.5)
+            log_sigma, best = maximum(postures, middle - 3.0, middle + 1.5)
+            kappa = float(np.mean(DRIFTS)) if model == "drawn" else 0.0
         row[f"bic_{model}"] = free * np.log(count) - 2 * (total + best)
-    return row
+        fitted[model] = evidence, np.exp(log_sigma), epsilon, kappa
+    model, others = judge(row)
+    statistics = {}
+    for name in (model, *others):  # one of those that BIC cannot distinguish may fit
+        each = checked(task, condition, trials, name, fitted[name], noise, plan)
+        statistics = statistics or each
+        if not misfits(each):
+            statistics = each
+            break
+    row |= {f"check_{name}": value for name, value in statistics.items()}
+    return row | {"misfit": "; ".join(misfits(statistics))}
+
+
+def checked(task, condition, trials, model, fitted, noise, plan):
+    """Return the statistics of :mod:`check` for a fitted model."""
+    evidence, sigma, epsilon, kappa = fitted
+    z, elsewhere = residuals_of(evidence, sigma, kappa, noise, model == "drawn")
+    drift = kappa if model == "informed" else 0.0
+    gain = gain_statistic(task, condition, trials, model, sigma, epsilon, drift, plan)
+    return statistics_of(evidence, trials, z, elsewhere) | {"gain": gain}
 
 
 def judge(row):
@@ -174,6 +206,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
         better than all before; ``model`` and ``others`` (:func:`judge`).
     """
     condition, rows = condition or condition_for(task), []
+    refuse_without_null_space(task, condition)
     if other := {*frame.hand} - {*condition.hands}:
         raise CoarticError(f"{condition.id} does not use the {other.pop()} hand, the data do")
     plan = plan_for(task)
@@ -186,8 +219,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
             "missing": int((len(task.goals) - hits[hits > 0]).sum()),
             "improved": int((np.diff(np.maximum.accumulate(rewards)) > 0).sum()),
         }  # fmt: skip
-        if not (tables_before(task, condition, trials, "best").stored >= 0).any():
-            why = "no hit follows a complete trial; needed are two trials, the first with all goals"
+        if why := why_not(task, condition, trials):
             warnings.warn(f"subject {subject} is left out: {why}", stacklevel=2)
             continue
         row |= fit_subject(task, condition, trials, noise=noise, plan=plan)
@@ -196,9 +228,49 @@ def fit(frame, task, *, condition=None, noise=0.0):
     return pd.DataFrame(rows)
 
 
+def refuse_without_null_space(task, condition):
+    """Raise CoarticError for a task in which each goal leaves a hand one posture."""
+    for hand, explored in zip(HANDS, explored_by(task, condition).sum(axis=1), strict=True):
+        if hand in condition.hands and explored <= 2:
+            raise CoarticError(
+                f"in task {task.name!r} {explored} coordinates move for the {hand} hand, and 2 of "
+                "them place it: it has no null space, in which practice would show. Needed are 3 "
+                "or more: free the base, or record the wrist"
+            )
+
+
+def why_not(task, condition, trials):
+    """Return why trials of a subject cannot be fitted; None if they can."""
+    rows = tables_before(task, condition, trials, "best")
+    if not (rows.stored >= 0).any():
+        return "no hit follows a complete trial; needed are two trials, the first with all goals"
+    q = trials.postures[trials.hands >= 0]
+    goal = np.nonzero(trials.hands >= 0)[1]
+    spreads = [q[goal == each].std(axis=0).max() for each in np.unique(goal)]
+    if max(spreads) < STILL:
+        return "postures are equal in all trials, so they show no exploration"
+    rewards = trials.rewards[np.isfinite(trials.rewards)]
+    if np.ptp(rewards) < STILL * abs(rewards.mean()):
+        return (
+            f"all complete trials take {-rewards.mean():g} ticks, as by a metronome: none is "
+            "better, so they do not show what is kept"
+        )
+    hits = trials.postures[rows.trial, rows.goal]
+    way = np.linalg.norm(hits - starts(task, trials, rows), axis=1)
+    if not ((rows.stored >= 0) & (way > SHORT)).any():
+        return f"no movement after a complete trial is longer than {SHORT} in joint space"
+    return None
+
+
 def sentence(row):
     """Return what a row of :func:`fit` says, in words."""
     alike = [row.model, *row.others.split()]
+    if row.misfit:
+        return (
+            f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
+            f"{row.missing}): none of the six models explains these trials ({row.misfit}). The "
+            f"nearest is {MODELS[row.model]}. No parameters are given."
+        )
     text = (
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
         f"{row.missing}): "
@@ -221,12 +293,28 @@ def sentence(row):
         doubts = ["A trial with lost hits may have been the best"] * bool(row.lost + row.missing)
         doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
         doubt = f" {'. '.join(doubts)}: intervals can be too narrow, and the model wrong."
-        return f"{text}. {', '.join(numbers)}.{doubt if doubts else ''}"
+        held = (
+            " Such profile intervals held the true σ and κ of {:.0f} and {:.0f} % of {:d} "
+            "simulated people{}.".format(*coverage(row))
+        )
+        return f"{text}. {', '.join(numbers)}.{held}{doubt if doubts else ''}"
     return (
         f"{text}these trials cannot distinguish {'; '.join(MODELS[name] for name in alike)} "
         f"(differences in BIC below {CLEAR:g}), so no parameters are given. Trials better than all "
         f"before: {row.improved}."
     )
+
+
+def coverage(row):
+    """Return the measured coverage of intervals of σ and κ, %, the number of people, and what their
+    data had, for the stored case that is nearest to a row of :func:`fit`."""
+    data = "noisy" if row.noise else "lossy" if row.lost + row.missing else "complete"
+    table = pd.read_csv(HERE / "results.csv").query("group == 'paper' and data == @data")
+    nearest = table.iloc[np.abs(np.log(table.trials / row.trials)).argmin()]
+    words = {"noisy": " with motor noise that is given", "lossy": " who lost 10 % of their trials",
+             "complete": ""}  # fmt: skip
+    held = 100 * nearest.sigma_cover, 100 * nearest.kappa_cover
+    return *held, int(nearest.informed), f"{words[data]} after {nearest.trials} trials"
 
 
 def main():
@@ -254,6 +342,9 @@ def main():
     except CoarticError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None
+    if not len(table):
+        print("error: no subject can be fitted", file=sys.stderr)
+        raise SystemExit(2)
     for _, row in table.iterrows():
         print(sentence(row))
     if given.out:
