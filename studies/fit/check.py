@@ -1,4 +1,5 @@
-"""The absolute check: could the model of least BIC have made these trials at all?
+"""Checks before a fit, whether trials show anything, and after it, the absolute one: could the
+model of least BIC have made these trials at all?
 
 Under the true model, standardised residuals of postures are independent, N(0, 1), and equal early
 and late; explored hands are as frequent early as late; and simulated people of the fitted model
@@ -7,8 +8,11 @@ limits' rates of false alarms.
 """
 
 import numpy as np
-from evidence import DRIFTS, ELSEWHERE
+from evidence import DRIFTS, ELSEWHERE, SHORT
+from models import HANDS, explored_by, starts, tables_before
 from simulate import simulate
+
+from coartic import CoarticError
 
 LIMITS = {
     "echo": (3.3, "residuals of successive trials are alike"),
@@ -20,6 +24,8 @@ LIMITS = {
     "gain": (5.0, "simulated people of this model gain other numbers of ticks"),
 }
 """Statistics with the limit of each, and what is wrong beyond it."""
+STILL = 1e-6
+"""Spread of postures, or of ticks as a share, below which trials are equal."""
 SIMULATED = 8
 """Number of people who are simulated for the gain."""
 
@@ -96,3 +102,37 @@ def gain_statistic(task, condition, trials, model, sigma, epsilon, kappa, plan):
 def misfits(statistics):
     """Return what does not fit, in words."""
     return [words for name, (limit, words) in LIMITS.items() if abs(statistics[name]) > limit]
+
+
+def refuse_without_null_space(task, condition):
+    """Raise CoarticError for a task in which each goal leaves a hand one posture."""
+    for hand, explored in zip(HANDS, explored_by(task, condition).sum(axis=1), strict=True):
+        if hand in condition.hands and explored <= 2:
+            raise CoarticError(
+                f"in task {task.name!r} {explored} coordinates move for the {hand} hand, and 2 of "
+                "them place it: it has no null space, in which practice would show. Needed are 3 "
+                "or more: free the base, or record the wrist"
+            )
+
+
+def why_not(task, condition, trials):
+    """Return why trials of a subject cannot be fitted; None if they can."""
+    rows = tables_before(task, condition, trials, "best")
+    if not (rows.stored >= 0).any():
+        return "no hit follows a complete trial; needed are two trials, the first with all goals"
+    q = trials.postures[trials.hands >= 0]
+    goal = np.nonzero(trials.hands >= 0)[1]
+    spreads = [q[goal == each].std(axis=0).max() for each in np.unique(goal)]
+    if max(spreads) < STILL:
+        return "postures are equal in all trials, so they show no exploration"
+    rewards = trials.rewards[np.isfinite(trials.rewards)]
+    if np.ptp(rewards) < STILL * abs(rewards.mean()):
+        return (
+            f"all complete trials take {-rewards.mean():g} ticks, as by a metronome: none is "
+            "better, so they do not show what is kept"
+        )
+    hits = trials.postures[rows.trial, rows.goal]
+    way = np.linalg.norm(hits - starts(task, trials, rows), axis=1)
+    if not ((rows.stored >= 0) & (way > SHORT)).any():
+        return f"no movement after a complete trial is longer than {SHORT} in joint space"
+    return None

@@ -13,15 +13,18 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from check import gain_statistic, misfits, residuals_of, statistics_of
-from evidence import DRIFTS, NODES, SHORT, evidence_in
+from check import (
+    gain_statistic,
+    misfits,
+    refuse_without_null_space,
+    residuals_of,
+    statistics_of,
+    why_not,
+)
+from evidence import DRIFTS, NODES, evidence_in
 from models import (
-    HANDS,
     condition_for,
-    explored_by,
     plan_for,
-    starts,
-    tables_before,
     trials_of,
 )
 from scipy import optimize, stats
@@ -39,8 +42,6 @@ MODELS = {
 }
 LEARNERS = ("best", "informed", "drawn")
 HERE = Path(__file__).parent
-STILL = 1e-6
-"""Spread of postures, or of ticks as a share, below which trials are equal."""
 CLEAR = 6.0
 """Difference in BIC from which a model is preferred ("strong" in Kass & Raftery 1995)."""
 SIMULATED = 8
@@ -228,40 +229,6 @@ def fit(frame, task, *, condition=None, noise=0.0):
     return pd.DataFrame(rows)
 
 
-def refuse_without_null_space(task, condition):
-    """Raise CoarticError for a task in which each goal leaves a hand one posture."""
-    for hand, explored in zip(HANDS, explored_by(task, condition).sum(axis=1), strict=True):
-        if hand in condition.hands and explored <= 2:
-            raise CoarticError(
-                f"in task {task.name!r} {explored} coordinates move for the {hand} hand, and 2 of "
-                "them place it: it has no null space, in which practice would show. Needed are 3 "
-                "or more: free the base, or record the wrist"
-            )
-
-
-def why_not(task, condition, trials):
-    """Return why trials of a subject cannot be fitted; None if they can."""
-    rows = tables_before(task, condition, trials, "best")
-    if not (rows.stored >= 0).any():
-        return "no hit follows a complete trial; needed are two trials, the first with all goals"
-    q = trials.postures[trials.hands >= 0]
-    goal = np.nonzero(trials.hands >= 0)[1]
-    spreads = [q[goal == each].std(axis=0).max() for each in np.unique(goal)]
-    if max(spreads) < STILL:
-        return "postures are equal in all trials, so they show no exploration"
-    rewards = trials.rewards[np.isfinite(trials.rewards)]
-    if np.ptp(rewards) < STILL * abs(rewards.mean()):
-        return (
-            f"all complete trials take {-rewards.mean():g} ticks, as by a metronome: none is "
-            "better, so they do not show what is kept"
-        )
-    hits = trials.postures[rows.trial, rows.goal]
-    way = np.linalg.norm(hits - starts(task, trials, rows), axis=1)
-    if not ((rows.stored >= 0) & (way > SHORT)).any():
-        return f"no movement after a complete trial is longer than {SHORT} in joint space"
-    return None
-
-
 def sentence(row):
     """Return what a row of :func:`fit` says, in words."""
     alike = [row.model, *row.others.split()]
@@ -270,6 +237,8 @@ def sentence(row):
             f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
             f"{row.missing}): none of the six models explains these trials ({row.misfit}). The "
             f"nearest is {MODELS[row.model]}. No parameters are given."
+            + " With motor noise or lost trials this answer is often wrong."
+            * bool(row.noise or row.lost + row.missing)
         )
     text = (
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
