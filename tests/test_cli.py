@@ -484,3 +484,11 @@ def test_a_task_of_any_radius_passes_every_door(coartic, tmp_path, radius):
     env = TaskEnv(task)
     env.reset(seed=0)
     assert env.step(env.action_space.sample())[1] < 0
+
+
+@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize("command", ["run comparison --tasks", "check", "draw", "play", "list"])
+def test_files_of_other_programs_are_refused_in_every_command(coartic, command):
+    code, _, error = coartic(*command.split(), "arm.urdf")
+    assert code == 2
+    assert "arm.urdf: coartic reads no .urdf file; a task is a TOML file" in error

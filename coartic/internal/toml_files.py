@@ -9,22 +9,7 @@ from typing import Any
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_BYTES
-from coartic.internal.text import LONGEST_LINE, plain
-
-FOREIGN = (
-    ".urdf",
-    ".xml",
-    ".osim",
-    ".mot",
-    ".sto",
-    ".trc",
-    ".c3d",
-    ".mat",
-    ".xlsx",
-    ".xls",
-    ".ods",
-)
-"""Endings of files of robots and recordings that other programs write."""
+from coartic.internal.text import FOREIGN, LONGEST_LINE, plain
 
 
 def refuse_foreign(
