@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
 from coartic import Execution, Movement, Task
+from coartic.analysis.hits import checked_hits
 from coartic.analysis.optima import gap_share
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import running_times
@@ -25,6 +26,7 @@ from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
+from coartic.internal.text import counted
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
@@ -396,8 +398,9 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     task : Task
         The task of the trials.
     hits : DataFrame
-        A row for each hit: ``subject``, ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the
-        posture, a column for each of ``task.robot.joint_names``, length unit and rad.
+        A row for each hit, as :func:`coartic.analysis.read_hits` returns it: ``subject``,
+        ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the posture, a column for each of
+        ``task.robot.joint_names``, length unit and rad. Angles are unwrapped in the same way.
 
     Returns
     -------
@@ -407,17 +410,20 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text or infinite numbers.
+        The frame has no trial with all goals, or is wrong as a file of ``read_hits`` can be.
     """
+    if not isinstance(hits, pd.DataFrame):
+        raise CoarticError(f"needed is a pandas.DataFrame, not a {type(hits).__name__}")
+    names = [f"row {brief_value(row)}" for row in hits.index.tolist()]
     joints, runs = [*task.robot.joint_names], {}
-    numbers = ("trial", "goal", "ticks", *joints)
-    columns = checked(hits, numbers=numbers, names=("subject", "hand"))
+    columns = checked_hits(hits, task, "the frame", names)
     for (subject, trial), rows in columns.groupby(["subject", "trial"], sort=False):
-        ordered = rows.sort_values("goal")
-        if ordered.goal.tolist() == [*range(1, len(task.goals) + 1)]:
-            postures, ticks = ordered[joints].to_numpy(), ordered.ticks.round().astype(int).tolist()
-            each = zip(ordered.hand, postures, ticks, strict=True)
+        if len(rows) == len(task.goals):
+            postures, ticks = rows[joints].to_numpy(), rows.ticks.round().astype(int).tolist()
+            each = zip(rows.hand, postures, ticks, strict=True)
             movements = tuple(Movement(g, hand, "learned", q, n)
                               for g, (hand, q, n) in enumerate(each, 1))  # fmt: skip
             runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
+    if not runs:
+        raise CoarticError(f"in no trial are all {counted(len(task.goals), 'goal')} hit")
     return Solutions(task, "recorded", tuple(runs.values()), tuple(runs))

@@ -47,7 +47,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
 }
 SCHEMA = "18345eb06ce51758"  # of format 5: see schema
 # Whatever a file says, it is checked in bounded time and memory.
-MOST_GOALS, LONGEST_TEXT = 100, 100_000  # of a task, and of what is stored of it in characters
+MOST_GOALS, LONGEST_TEXT = 256, 100_000  # of a task, and of what is stored of it in characters
 MOST_TRIALS, MOST_TICKS, MOST_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run, movement
 UNCHECKED = (
     "Times, dates, reasons, counts of what was spent, proven bounds, and where and with what it "

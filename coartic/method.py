@@ -377,7 +377,7 @@ class Session:
             hand,
             self._task.goals[goal - 1],
             locked_base=self._task.locked_base,
-            model=self.model,
+            model=self.model.for_radius(self._task.radius),
         )
         self._meter.add(
             corrective_iterations=correction.iterations,

@@ -4,6 +4,7 @@ import ast
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -232,3 +233,21 @@ def test_a_task_of_ones_own_needs_goals_alone(tmp_path):
     path = tmp_path / "shelf.toml"
     path.write_text("goals = [[3.0, 2.0], [4.5, 2.0]]\n", encoding="utf-8")
     assert load_task(path) == Task(name="shelf", goals=goals, q0=np.zeros(10))
+
+
+@pytest.mark.parametrize("name", ["arm.urdf", "run.MOT", "marks.trc", "marks.c3d", "hits.xlsx"])
+@pytest.mark.parametrize("kind", [str, Path])
+def test_files_of_other_programs_are_refused_by_their_kind(name, kind):
+    words = f"{name}: coartic reads no {Path(name).suffix.lower()} file; a task is a TOML file"
+    with pytest.raises(TaskError, match=words):
+        load_task(kind(name))
+
+
+@pytest.mark.parametrize("count", [100, 256, 257])
+def test_a_task_has_at_most_256_goals(count):
+    goals = [(4 + math.sin(k), 1 + math.cos(k)) for k in range(count)]
+    if count > 256:
+        with pytest.raises(ValueError, match="at most 256"):
+            Task(goals=goals)
+    else:
+        assert corrective_trial(Task(goals=goals, hands=["right"]), "R" * count).completed

@@ -200,7 +200,9 @@ def test_an_edit_is_found(true_folder, tmp_path, words):
 
 
 def test_a_movement_of_endless_steps_is_made_as_far_as_its_ticks():
-    task = checker.stored_task(tiny_task().model_dump_json(), json.dumps(PAPER._asdict()))
+    task = checker.stored_task(
+        tiny_task().model_dump_json(), json.dumps(PAPER.for_radius()._asdict())
+    )
     task.model.step = 1e-12
     far = np.full(10, 1e4)
     for kind, waypoints in (("learned", []), ("path", [far])):
@@ -245,7 +247,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
     """Exactly, with a goal whose rim runs through a point of the movement, or a bit beside it; also
     where there is no way to go."""
     robot, on_path = task.robot, kind == "path"
-    model = PAPER._replace(step=step * max(scale, 1.0))
+    model = PAPER.for_radius()._replace(step=step * max(scale, 1.0))
     q, middle, target = np.random.default_rng(seed).uniform(-scale, scale, (3, robot.dof))
     target = q if aim[0] == 0.0 and not on_path else target
     judge = checker.stored_task(task.model_dump_json(), json.dumps(model._asdict()))

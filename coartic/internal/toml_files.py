@@ -9,7 +9,16 @@ from typing import Any
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_BYTES
-from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.text import FOREIGN, LONGEST_LINE, plain
+
+
+def refuse_foreign(
+    path: str | Path, wanted: str, *, error: type[CoarticError] = CoarticError
+) -> None:
+    """Raises ``error`` for a file of another program; ``wanted`` says what is read and where it is
+    explained."""
+    if (ending := Path(path).suffix.lower()) in FOREIGN:
+        raise error(f"{plain(str(path), LONGEST_LINE)}: coartic reads no {ending} file; {wanted}")
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:

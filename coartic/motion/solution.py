@@ -311,7 +311,8 @@ def movements_in(
 def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
     """Execute a plan that has paths, one movement after the other."""
     count_trials(1)
-    task, model, q = compiled.task, compiled.model, compiled.starts[0]
+    task, q = compiled.task, compiled.starts[0]
+    model = compiled.model.for_radius(task.radius)
     made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
         hand, before = movements[0].hand, len(made)

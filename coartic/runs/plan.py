@@ -62,7 +62,7 @@ class Cell:
                 "task": self.definition,
                 "method": self.method.name,
                 "parameters": self.parameters,
-                "model": PAPER._asdict(),
+                "model": PAPER.for_radius(self.task.radius)._asdict(),
                 "trial_budget": self.trial_budget,
             }
         )

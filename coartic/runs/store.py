@@ -452,7 +452,7 @@ def cell_row(cell: Cell) -> dict[str, Any]:
         "origin": method.origin,
         "parameters": cell.parameters,
         "setting": cell.setting,
-        "model": PAPER._asdict(),
+        "model": PAPER.for_radius(cell.task.radius)._asdict(),
         "trial_budget": cell.trial_budget,
     }
 

@@ -25,7 +25,7 @@ from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import Line, counted, did_you_mean, short_repr
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, error_saying, explain_file
-from coartic.model import PAPER, MotionModel, check_model
+from coartic.model import PAPER, PAPER_RADIUS, MotionModel, check_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
@@ -33,7 +33,7 @@ INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all"
 LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "paper"
 
-MOST_GOALS = 100
+MOST_GOALS = 256
 LONGEST_NAME = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Form of names of tasks and suites, which become names of files and parts of commands."""
@@ -135,7 +135,7 @@ class Task(FileData):
     """Hands the robot has."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
     """Goal centres x_g in the order in which they are to be hit, length unit."""
-    radius: Length = 0.1
+    radius: Length = PAPER_RADIUS
     """θ^g: radius of every goal, length unit."""
     locked_base: Annotated[tuple[Literal["x", "y"], ...], Field(max_length=2)] = ()
     """Base coordinates that cannot move."""
@@ -357,7 +357,8 @@ def check_task(task: Task, model: MotionModel = PAPER) -> Task:
         check_model(model, radius=task.radius)
     except ValueError as error:
         raise TaskError(f"task {task.name!r}: {error}") from None
-    problem = out_of_reach(task, model.correction_tolerance)
+    _, tolerance = model.tolerances(task.radius)
+    problem = out_of_reach(task, tolerance)
     if problem is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
     return task
