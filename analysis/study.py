@@ -147,8 +147,9 @@ def load(folder: str | Path) -> Study:
         runs = store.runs()
         if len(runs) < size_of(plan):
             raise CoarticError(
-                f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted. "
-                "Repeat the `coartic run` command, which does what is missing."
+                f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted, "
+                "or has a part of the runs. Repeat the `coartic run` command, which does what is "
+                "missing, or --include all parts in another folder."
             )
         return Study(folder, plan, store.made_with(), runs)
 

@@ -45,6 +45,11 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
     stored, and if two folders have different results of a run. Then nothing is copied but shipped
     results.
     """
+    if any(job.numbers[0] for job in plan):
+        raise CoarticError(
+            "a range of runs is a part of an array: include the folders of all parts afterwards, "
+            "with the number of all runs"
+        )
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
         for name in map(str, folders):

@@ -12,7 +12,7 @@ import typer
 
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.limits import check_limits
+from coartic.internal.limits import check_limits, number_or_range
 from coartic.internal.text import did_you_mean, unknown
 
 if TYPE_CHECKING:
@@ -56,6 +56,21 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
         return value
 
     return typer.Option(option, parser=read, metavar=unit, help=what)
+
+
+def runs_read(text: str) -> int | range:
+    """Return the number of runs that an option names, or the range of runs, such as ``50..99``.
+
+    Raises CoarticError for any other text.
+    """
+    ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", text)
+    value: Any = range(int(ends[1]), int(ends[2]) + 1) if ends else text
+    with suppress(ValueError):
+        value = int(text)
+    try:
+        return number_or_range("--runs", value, "50..99")
+    except ValueError as error:
+        raise CoarticError(str(error)) from None
 
 
 def names_in(text: str | None) -> list[str]:

@@ -153,7 +153,7 @@ class Store:
                 latest = (as_text(row["defaults"]), row["setting"], row["origin"], cell)
                 query = "UPDATE cells SET defaults = ?, setting = ?, origin = ? WHERE id = ?"
                 self._db.execute(query, latest)
-                asked = {"position": position, "cell": cell, "runs": len(job.numbers)}
+                asked = {"position": position, "cell": cell, "runs": job.numbers[-1] + 1}
                 self._insert("plan", asked)
             robots = [job.cell.task.robot for job in plan]
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
