@@ -57,7 +57,11 @@ class Again(Does):
 """
 HONEST = -319  # what these movements are worth
 HANDLED = {
-    "hangs": ("time.sleep(999)", "timeout", "wall time limit of 1.4 s exceeded"),
+    "hangs": ("time.sleep(999)", "crashed", "wall time limit of 1.4 s exceeded twice: it waited"),
+    "hangs_once": ("if not os.path.exists(__file__ + '.slept'):\n"
+                   "            open(__file__ + '.slept', 'w').close()\n"
+                   "            time.sleep(999)\n"
+                   "        return Result(corrected(session))", "ok", ""),
     "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 0.5 s exceeded"),
     "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
                        "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
@@ -142,10 +146,10 @@ def folder(tmp_path_factory):
     def make(folder):
         folder.mkdir()
         does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-        hangs, *others = [cell_on(task, does, what=name) for name in HANDLED]
+        hangs, once, *others = [cell_on(task, does, what=name) for name in HANDLED]
         others += [cell_on(task, again), cell_on(task, KNOWN["corrective-alone/given"])]
         for name, cells, timeout_s, limit_s in (
-            ("hangs", [hangs], 0.5, 0.3),
+            ("hangs", [hangs, once], 0.5, 0.3),
             ("others", others, 600.0, 0.5),
         ):
             run_and_write(
