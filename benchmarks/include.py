@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -58,7 +59,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
                 continue
             if folder_named(name).resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot include itself: choose another --out")
-            if not folder_named(name).exists():
+            if not os.path.lexists(folder_named(name)):
                 message = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 raise CoarticError(message)
             sources[name] = stack.enter_context(open_store(folder_named(name)))

@@ -64,8 +64,8 @@ class Local:
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
     time is repeated once, and then its runs are kept as crashed, which the next command performs
-    again. The time in which coartic's kernels are compiled does not count. ``verbose`` shows what methods print and log, and
-    their tracebacks.
+    again. The time in which coartic's kernels are compiled does not count. ``verbose`` shows
+    what methods print and log, and their tracebacks.
     """
 
     def __init__(self, jobs: int = -1, *, timeout_s: float = 60.0, verbose: bool = False) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -120,7 +121,7 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
             meant += methods_named(id_named(name, ids), registered)
         except CoarticError:
             check_kind(name)  # a thing of another kind has its own sentence
-            if Path(file := file_name(name)).is_file():
+            if os.path.isfile(file := file_name(name)):
                 words = f"method {name!r} is not known: add --method-file {file}"
                 raise CoarticError(f"{words}, if it is defined there") from None
             every = [*ids, *filter(None, ids.values())]

@@ -7,6 +7,7 @@ profile intervals.
 """
 
 import argparse
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -245,8 +246,9 @@ def main():
     try:
         if not given.noise >= 0:
             raise CoarticError(f"--noise is {given.noise:g}; needed is 0 or more")
-        if given.out and not Path(given.out).parent.is_dir():
-            raise CoarticError(f"--out {given.out}: there is no such folder")
+        out = Path(given.out or "")
+        if given.out and (out.is_dir() or not os.access(out.parent, os.W_OK)):
+            raise CoarticError(f"--out {out}: name a file, in a folder that may be written")
         task = load_task(given.task)
         frame = read_hits(given.csv, task, ticks_per_unit=given.ticks_per_unit)
         condition = CONDITIONS[given.condition] if given.condition else None
