@@ -15,6 +15,7 @@ once: the machine may have slept.
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import math
 import multiprocessing
@@ -55,6 +56,7 @@ _REPEATED = (None, -9, 255, _UNKEPT)  # exit codes (late, killed, lost server): 
 _IDLE_S = 60.0  # longest wait of a process for jobs
 _END_S = 1.0  # time for a killed process to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
+MORE_FILES = "after `ulimit -n 1024`, which allows more open files"
 _BEGUN, _SAID = "begun", "said"  # files among the answers of a process
 
 
@@ -150,9 +152,10 @@ class Workers:
                     waiting.extendleft(part for part in (rest[alone:], rest[:alone]) if part)
         except OSError as error:
             place = f" ({error.filename})" if error.filename else ""
+            what = f"worker processes have no place for answers: {error.strerror or error}{place}"
+            how = MORE_FILES if error.errno == errno.EMFILE else "with a TMPDIR that has room"
             raise CoarticError(
-                f"worker processes have no place for answers: {error.strerror or error}{place}. "
-                "Finished runs are kept: repeat the command, with a TMPDIR that has room"
+                f"{what}. Finished runs are kept: repeat the command, {how}"
             ) from None
         finally:
             for worker in workers:
@@ -367,6 +370,11 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 def start_process(process: Any) -> None:
     """Start a process of :data:`CONTEXT` with one thread for BLAS, without running the main program
     again in it. Raises OSError or EOFError if the process does not start."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        text = "the working folder was removed; change to another folder"
+        raise FileNotFoundError(errno.ENOENT, text) from None
     # Without PYTHONSAFEPATH Python imports from the working folder first, whoever wrote it.
     safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     main = sys.modules["__main__"]
