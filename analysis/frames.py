@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
 from coartic import Execution, Movement, Task
+from coartic.analysis.method_frame import joined_learners
 from coartic.analysis.optima import gap_share
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import running_times
@@ -242,10 +244,11 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
-        solved runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same
-        tasks (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of
-        solved ``tasks``, of ``runs`` and of ``failed`` runs. A method that did not solve every task
-        of the frame has no gap and is last. With ``corrective_best`` also the ``share`` of the
+        runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
+        (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
+        that it solved in every run, of ``missing`` tasks, of ``runs`` and of ``failed`` runs. A
+        method with missing tasks has no gap and is last. The paper's learner over tasks for one arm
+        and for two has a row of its own, ``"dual-process (EC1, EC4)"``. With ``corrective_best`` also the ``share`` of the
         possible gain (:func:`shares`) with ``share_low`` and ``share_high``, a mean over the tasks
         on which something can be gained, and ``without_gain``, the number of other tasks.
 
@@ -261,16 +264,19 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     ...     {"method": ["mine", "mine", "yours"], "task": "ascending",
     ...      "reward": [-300, -296, -310], "best_known": -292}
     ... )
-    >>> ranking(frame)[["gap", "runs", "failed"]].round(3)
-              gap  runs  failed
+    >>> ranking(frame)[["gap", "missing", "failed"]].round(3)
+              gap  missing  failed
     method
-    mine    0.021     2       0
-    yours   0.062     1       0
+    mine    0.021        0       0
+    yours   0.062        0       0
     """
     frame = scored(frame)
     every, rows = {*frame.task[frame.best_known.notna()]}, []
-    for _, of_method in frame.groupby("method", sort=False):
-        solved = of_method[of_method.gap.notna()]
+    by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
+    for of_method in by_method.values():
+        known = of_method[of_method.best_known.notna()]
+        has_failed = known.gap.isna().groupby(known.task).transform("any")
+        solved = known[~has_failed]
         by_task = dict([*solved.groupby("task").gap])
         solved_all = by_task and by_task.keys() == every
         row = (task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap")
@@ -281,11 +287,23 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         rows.append({
             **row,
             "tasks": len(by_task),
+            "missing": len(every) - len(by_task),
             "runs": len(of_method),
             "failed": int(of_method.reward.isna().sum()),
         })  # fmt: skip
-    methods = pd.Index(frame.method.unique(), name="method", tupleize_cols=False)
+    methods = pd.Index([*by_method], name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
+
+
+def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
+    """Return the rows of each method, and those of the learner over tasks for one arm and for two
+    (:func:`.joined_learners`)."""
+    tasks = {method: {*rows.task} for method, rows in by_method.items()}
+    joined = {
+        label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
+        for label, (one, two) in joined_learners(tasks)
+    }
+    return joined | by_method
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
