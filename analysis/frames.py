@@ -248,9 +248,10 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
         that it solved in every run, of ``missing`` tasks, of ``runs`` and of ``failed`` runs. A
         method with missing tasks has no gap and is last. The paper's learner over tasks for one arm
-        and for two has a row of its own, ``"dual-process (EC1, EC4)"``. With ``corrective_best`` also the ``share`` of the
-        possible gain (:func:`shares`) with ``share_low`` and ``share_high``, a mean over the tasks
-        on which something can be gained, and ``without_gain``, the number of other tasks.
+        and for two has a row of its own, ``"dual-process (EC1, EC4)"``. With ``corrective_best``
+        also the ``share`` of the possible gain (:func:`shares`) with ``share_low`` and
+        ``share_high``, a mean over the tasks on which something can be gained, and
+        ``without_gain``, the number of other tasks.
 
     Raises
     ------

@@ -6,6 +6,7 @@ study; :func:`cached` keeps the results of a function for each study.
 
 from __future__ import annotations
 
+import html
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -38,7 +39,8 @@ from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, label_of, size_of
 from coartic.runs.record import execute_all
-from coartic.runs.store import explain_errors, open_store
+from coartic.runs.shipped import open_results
+from coartic.runs.store import explain_errors
 from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 
@@ -137,12 +139,13 @@ def cached(
 
 
 def load(folder: str | Path) -> Study:
-    """Read a results folder.
+    """Read a results folder, or by the name ``"shipped"`` the shipped results of suite
+    ``comparison``.
 
     Raises CoarticError if the folder is no results folder, or lacks runs of its suite.
     """
     folder = folder_named(folder)
-    with open_store(folder) as store:
+    with open_results(folder) as store:
         plan = store.plan()
         runs = store.runs()
         if len(runs) < size_of(plan):
@@ -170,6 +173,15 @@ class Study:
     def __repr__(self) -> str:
         runs = counted(len(self.runs), "run")
         return f"Study of {self.folder}: {runs} of suite {self.suite}"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: a row for each method with its numbers of runs."""
+        solved = self.runs.status == "ok"
+        runs = self.runs[["method", "setting", "task"]].assign(solved=solved)
+        counts = runs.groupby(["method", "setting"], sort=False).agg(
+            tasks=("task", "nunique"), runs=("solved", "size"), solved=("solved", "sum")
+        )
+        return f"<p>{html.escape(repr(self))}</p>{counts.reset_index().to_html(index=False)}"
 
     @property
     def suite(self) -> str:
@@ -286,12 +298,12 @@ class Study:
     @cached_property
     def solutions(self) -> pd.DataFrame:
         """A row for each movement of the solutions."""
-        with open_store(self.folder) as store:
+        with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run that made trials, with its rewards, NaN for failed trials."""
-        with open_store(self.folder) as store:
+        with open_results(self.folder) as store:
             yield from store.rewards()
 
     @cached
@@ -406,7 +418,7 @@ class Study:
     @cached
     def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` of executed runs, by run id."""
-        with open_store(self.folder) as store:
+        with open_results(self.folder) as store:
             return store.movements(part, self.tasks, MOST_EXECUTED)
 
 

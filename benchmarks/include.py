@@ -20,12 +20,12 @@ from pathlib import Path
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.shipped import SHIPPED, open_shipped
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.record import PREFIXES, Run
+from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, open_store, writing
 
 _SCORED = (

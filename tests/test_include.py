@@ -16,10 +16,11 @@ from coartic import CoarticError, load_task
 from coartic.analysis.sections import TABLES
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
-from coartic.benchmarks import shipped, template
+from coartic.benchmarks import template
 from coartic.benchmarks.include import include_folders
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.runner import perform
+from coartic.runs import shipped
 from coartic.runs.plan import size_of
 from coartic.runs.store import RUNS_FILE, open_store, writing
 from tests.support.suites import (
@@ -265,7 +266,7 @@ def test_shipped_results(monkeypatch, tmp_path):
             assert store.run(learned.iloc[0]).is_downsampled
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped, but of comparison, "):
         shipped.open_shipped("quick")
-    copy = shutil.copytree(Path(shipped.__file__).with_name("shipped"), tmp_path / "copy")
+    copy = shutil.copytree(shipped.SHIPPED_FOLDER, tmp_path / "copy")
     monkeypatch.setattr(shipped, "SHIPPED_FOLDER", copy)
     (copy / "families.sqlite.xz").write_bytes(lzma.compress(b"something else"))
     with pytest.raises(CoarticError, match="not as it was shipped"):

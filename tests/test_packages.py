@@ -12,7 +12,7 @@ import zipfile
 import pytest
 
 from coartic.benchmarks.registry import built_in
-from coartic.benchmarks.shipped import open_shipped, shipped_hashes
+from coartic.runs.shipped import open_shipped, shipped_hashes
 from tests.support.suites import ROOT
 
 pytestmark = pytest.mark.skipif(

@@ -38,8 +38,13 @@ class Plot:
     data: pd.DataFrame
     """Drawn numbers as a tidy frame, enough to draw the figure again."""
 
+    def _repr_html_(self) -> str:
+        """Return the picture that a notebook shows, with title and caption."""
+        words = html.escape(one_line(f"{self.title}. {self.caption}"))
+        return f"<figure>{for_page(self)}<figcaption>{words}</figcaption></figure>"
+
     def _repr_png_(self) -> bytes:
-        """Return the picture that a notebook shows."""
+        """Return the picture that programs show that show no HTML."""
         return picture(self.figure, ".png")
 
 
