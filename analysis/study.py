@@ -17,6 +17,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_hashable
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.method_frame import methods_of
@@ -32,6 +33,7 @@ from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
+from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.motion.trial import ranked_sequences
@@ -130,6 +132,8 @@ def cached(
     def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
         check_study(study)
         key = function, args, tuple(named.items())
+        if wrong := [each for each in (*args, *named.values()) if not is_hashable(each)]:
+            raise CoarticError(f"{function.__name__} takes names, not {brief_value(wrong[0])}")
         if key not in study._computed:
             study._computed[key] = function(study, *args, **named)
         result: Computed = study._computed[key]
@@ -287,6 +291,8 @@ class Study:
         A row for each sequence, the best first: ``hands``, ``reward`` (missing for a failure) and
         ``reason``. No rows if the task has too many sequences.
         """
+        if task not in self.tasks:
+            raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
         try:
             names = hand_sequences(self.tasks[task])
         except NotApplicableError:
@@ -384,7 +390,7 @@ class Study:
             By the index of :attr:`runs`; NaN for runs without the signature, and for runs after the
             first 500 of a method on a task.
         """
-        if name not in SIGNATURES:
+        if not is_hashable(name) or name not in SIGNATURES:
             raise CoarticError(unknown("signature", name, SIGNATURES))
         values = pd.Series(np.nan, self.runs.index, name=name)
         for key, cell in self.cells.items():

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from coartic.internal.limits import real_array
 from coartic.internal.text import short_repr
 from coartic.internal.validation import in_sentences
 
@@ -340,7 +341,7 @@ class Robot:
         return casadi.vertcat(xs[-1], ys[-1])
 
     def _configuration(self, q: ArrayLike) -> Array:
-        array = np.asarray(q, dtype=np.float64)
+        array = real_array("configuration", q)
         if array.ndim == 0 or array.shape[-1] != self.dof:
             raise ValueError(
                 f"configuration has shape {array.shape}; this robot needs (..., {self.dof})"

@@ -59,7 +59,9 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
     try:
         array = np.asarray(value)
     except ValueError:
-        raise ValueError(f"{name} has rows of different lengths") from None
+        raise ValueError(
+            f"{name} is {brief_value(value)}; needed are real numbers, in rows of one length"
+        ) from None
     if array.dtype.kind not in "uif":
         raise ValueError(f"{name} is {brief_value(value)}; needed are real numbers")
     return array.astype(np.float64, copy=False)

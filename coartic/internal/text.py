@@ -115,13 +115,13 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f"; did you mean {nearest[0]!r}?" if nearest else ""
 
 
-def unknown(kind: str, name: str, names: Iterable[str]) -> str:
+def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """A sentence on a name that is not among some names: the nearest of them, or all."""
     several = list(names)
     shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
     more = f" and {len(several) - shown} others" if len(several) > shown else ""
     known = f". Known: {', '.join(several[:shown])}{more}."
-    hint = did_you_mean(name, several) or known
+    hint = (did_you_mean(name, several) if isinstance(name, str) else "") or known
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 
 

@@ -34,6 +34,10 @@ _PLAINER = {
     r"(valid )?dictionary( or (an )?instance of \w+)?": "table",
 }
 """Wordings of pydantic, and what they say to a person."""
+_LISTS = {"hands": "['left', 'right']", "locked_base": "['y']"}
+"""Examples of lists of certain words."""
+_OF_TEXTS = ("tasks", "methods", "method_files", "family_files")
+"""Lists of any texts, for which a single text is an example."""
 
 
 def in_sentences(kind: type[T]) -> type[T]:
@@ -125,7 +129,9 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
         case "list_type" | "tuple_type" if key == "goals":
             message = "should be a list of points, such as [[3.0, 2.0]]"
         case "list_type" | "tuple_type" if isinstance(detail["input"], str):
-            message = f"should be a list, such as [{detail['input']!r}]"
+            name, text = key.rpartition(".")[2], detail["input"]
+            example = _LISTS.get(name, f"[{text!r}]" if name in _OF_TEXTS else "")
+            message = f"should be a list{', such as ' * bool(example)}{example}"
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
     for wording, plainer in _PLAINER.items():
