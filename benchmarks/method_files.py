@@ -152,7 +152,7 @@ def check_declaration(method: type[Method], origin: str) -> None:
     if not METHOD_NAME.fullmatch(method.name):
         raise CoarticError(
             f"{where}: the name {method.name!r} must begin with a letter or digit and have only "
-            "letters, digits, '.', '_', '+', '/' and '-'"
+            "letters, digits, '.', '_', '+', '/' and '-', such as 'my-search'"
         )
     information = getattr(method, "information", None)
     if not isinstance(information, frozenset | set) or not all(

@@ -317,6 +317,9 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     report = perform(planned(ONE, **FEW), tmp_path, executor=InProcess())
     assert (report.stale, report.present, report.done) == (9, 0, 9)
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
+    one = replace(report, stale=1)
+    assert "(leaving out 1 run made by a different version of the code)" in repr(one)
+    assert "leaving out" not in repr(replace(report, stale=0))
     same_results(load(tmp_path), undisturbed)
     with open_store(tmp_path) as store:
         assert len(store.ids()) == 18

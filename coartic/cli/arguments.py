@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import keyword
 import os
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -132,5 +134,8 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
 
 
 def file_name(method: str) -> str:
-    """Return the name of the file that ``coartic new`` writes for a method."""
-    return re.sub(r"\W", "_", method) + ".py"
+    """Return the name of the file that ``coartic new`` writes for a method: one that Python can
+    import, and that hides no module of Python's."""
+    stem = re.sub(r"\W", "_", method)
+    taken = {*keyword.kwlist, *sys.stdlib_module_names, "coartic", "numpy"}
+    return f"{stem if stem.isidentifier() and stem not in taken else f'my_{stem}'}.py"

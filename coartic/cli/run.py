@@ -364,7 +364,7 @@ def new(
     path = Path(given.file_name(name)) if out is None else out
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
-    mine = type("Mine", (template.Mine,), {"name": name})
+    mine = type(name, (template.Mine,), {"name": name})
     check_declaration(mine, "coartic new")
     add_methods(registry(with_code=False), [method_info(mine, "coartic new", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from functools import wraps
@@ -134,6 +135,8 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
             message = f"should be a list{', such as ' * bool(example)}{example}"
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
+    if isinstance(detail["input"], float) and math.isnan(detail["input"]):
+        message = "should be a number"
     for wording, plainer in _PLAINER.items():
         message = re.sub(wording, plainer, message)
     return f"{key} is {brief_value(detail['input'])}; it {message[:1].lower()}{message[1:]}"

@@ -230,6 +230,11 @@ def sentence(row):
     )
 
 
+def printable(text):
+    """Return text whose characters that do not print, such as escape codes, are shown as ``?``."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in str(text))
+
+
 def main():
     """Read a file, fit, and print a sentence for each subject."""
     parser = argparse.ArgumentParser(description="Fit the learner to the trials of people.")
@@ -242,7 +247,7 @@ def main():
     )
     parser.add_argument("--out", help="CSV file for all numbers")
     given = parser.parse_args()
-    warnings.showwarning = lambda text, *_: print(f"warning: {text}", file=sys.stderr)
+    warnings.showwarning = lambda text, *_: print(printable(f"warning: {text}"), file=sys.stderr)
     try:
         if not given.noise >= 0:
             raise CoarticError(f"--noise is {given.noise:g}; needed is 0 or more")
@@ -254,10 +259,10 @@ def main():
         condition = CONDITIONS[given.condition] if given.condition else None
         table = fit(frame, task, condition=condition, noise=given.noise)
     except CoarticError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(printable(f"error: {error}"), file=sys.stderr)
         raise SystemExit(2) from None
     for _, row in table.iterrows():
-        print(sentence(row))
+        print(printable(sentence(row)))
     if given.out:
         table.to_csv(given.out, index=False)
 
