@@ -136,7 +136,7 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
     if isinstance(detail["input"], float) and math.isnan(detail["input"]):
-        message = "should be a number"
+        message = "should be a finite number"
     for wording, plainer in _PLAINER.items():
         message = re.sub(wording, plainer, message)
     return f"{key} is {brief_value(detail['input'])}; it {message[:1].lower()}{message[1:]}"
