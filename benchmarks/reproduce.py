@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import zip_longest
@@ -33,6 +34,12 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
             f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c: "
             "column run_ids of a report's tables names the runs of each row."
         )
+    try:
+        os.scandir(folder).close()
+    except OSError as error:
+        raise CoarticError(
+            f"cannot read {folder}: {error.strerror}. Name a folder with --in."
+        ) from None
     folder_of: dict[str, Path] = {}
     for path in sorted(folder.rglob(RUNS_FILE)):
         with open_store(path.parent) as store:

@@ -244,6 +244,8 @@ def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
         job = plan[position]
+        if number not in job.numbers:
+            continue
         longer = had_s is not None and (job.time_limit_s is None or job.time_limit_s > had_s)
         failed = status == "crashed" or (status == "timeout" and longer)
         if not (job.cell.method.where and failed):

@@ -1,6 +1,5 @@
 """The command line as a user meets it."""
 
-import importlib
 import os
 import signal
 import subprocess
@@ -296,15 +295,16 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
         assert "add --method-file my_search.py" in coartic(command, "my-search")[2]
 
 
-@pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize("name", ["class", "json", "2fast", "my-search"])
-def test_a_new_method_file_can_be_imported(coartic, name, tmp_path, monkeypatch):
-    """Under its own name, which is none of Python's."""
+@pytest.mark.parametrize("name", ["class", "random", "3d/search", "numpy", "my-search"])
+def test_a_new_file_can_be_imported_and_hides_no_module(coartic, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     assert coartic("new", name)[0] == 0
-    (path,) = tmp_path.glob("*.py")
-    monkeypatch.syspath_prepend(tmp_path)
-    assert importlib.import_module(path.stem).Mine.name == name
+    (file,) = tmp_path.iterdir()
+    assert file.stem.isidentifier()
+    assert file.stem not in {*sys.stdlib_module_names, "numpy"}
+    compile(f"import {file.stem}", "", "exec")
+    code, _, error = coartic("new", "My Search")
+    assert (code, "Mine" in error, "such as 'my-search'" in error) == (2, False, True)
 
 
 def test_help_has_a_short_name(coartic):

@@ -342,7 +342,7 @@ def test_what_is_no_point_is_refused_with_its_own_shape():
         for call in (cost, cost.many):
             with pytest.raises(ValueError, match="needed are real numbers"):
                 call(wrong)
-    with pytest.raises(ValueError, match="rows of different lengths"):
+    with pytest.raises(ValueError, match="in rows of one length"):
         cost.many([[1, 2], [3]])
     assert cost.evaluations == 0
 

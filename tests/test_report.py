@@ -110,6 +110,15 @@ def test_text_from_files_is_escaped():
     assert r"\textbackslash{}input\textbraceleft{}x\textbraceright{}" in latex
 
 
+def test_what_pdflatex_cannot_print_is_for_xelatex(traced):
+    frame = TABLES["ranking"](traced)
+    assert "XeLaTeX" not in render.latex_table(TABLES["ranking"], frame, "κ → 1, γ₁ ≥ ½")
+    text = render.latex_table(TABLES["ranking"], frame, "手 and κ")
+    assert text.startswith("% needs XeLaTeX or LuaLaTeX")
+    assert '\\symbol{"624B} and $\\kappa$' in text
+    assert text.isascii() or all(ord(c) < 0x300 for c in text)
+
+
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
 def test_no_text_is_a_formula_of_a_spreadsheet(text):
     """Numbers stay numbers."""
@@ -196,7 +205,8 @@ def test_few_runs_say_so(tmp_path):
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
 def test_tables_compile(tables_by_name, tmp_path):
-    notes = ["The optimum of Two-armed 1 † is not proven."]
+    greek = "".join(map(chr, (*range(0x391, 0x3A2), *range(0x3A3, 0x3CF))))
+    notes = ["The optimum of Two-armed 1 † is not proven.", f"{greek} κ₂ → ⇒ ≤ ≈ ∈ … — ‘x’ ε² É"]
     tables = [name for name in render.IN_LATEX if len(tables_by_name[name])]
     assert {"ranking", "signatures", "runtimes", "tasks"} <= {*tables}
     texts = [render.latex_table(TABLES[n], tables_by_name[n], n, notes) for n in tables]

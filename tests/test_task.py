@@ -99,7 +99,10 @@ def test_a_task_is_saved_as_toml(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"hands": "right"}, "Task: hands is 'right'; it should be a list, such as ['right']"),
+        (
+            {"hands": "right"},
+            "Task: hands is 'right'; it should be a list, such as ['left', 'right']",
+        ),
         ({"goals": [(3, "2")]}, "Task: goals[0][1] is '2'; it should be a number"),
         ({"goal": 3}, "Task: goal is an unknown key; did you mean 'goals'?"),
         ({"robot": {"right_links": [0]}}, "robot.right_links[0] is 0; it should be greater than 0"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import stat
 import tomllib
 from pathlib import Path
@@ -44,6 +46,8 @@ def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) ->
     except (OSError, ValueError) as failure:  # ValueError: a NUL in the name
         reason = getattr(failure, "strerror", None) or failure
         raise error(f"{shown}: cannot be read: {reason}") from None
+    if not os.access(path, os.R_OK):
+        raise error(f"{shown}: cannot be read: {os.strerror(errno.EACCES)}")
     if not stat.S_ISREG(found.st_mode):
         kind = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
         raise error(f"{shown}: cannot be read: it is {kind}, not a file")

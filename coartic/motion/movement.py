@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.internal.limits import brief_value, real_array
+from coartic.internal.limits import brief_value, check_limits, real_array
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
@@ -317,7 +317,7 @@ def move(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    robot.arm(hand)  # refuses what is no hand
+    check_arm(robot, hand)
     batch = batch_for(robot, 1)
     run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = configuration(robot, q)
@@ -528,7 +528,7 @@ def correct(
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
-    robot.arm(hand)  # refuses what is no hand
+    check_arm(robot, hand)
     batch = batch_for(robot, 1)
     run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = run["target"][figures] = configuration(robot, q)
@@ -634,6 +634,13 @@ def configuration(robot: Robot, q: Any) -> Array:
     return array
 
 
+def check_arm(robot: Any, hand: Any) -> None:
+    """Raise TypeError for an object that is no robot, and ValueError for one that is no hand."""
+    if not isinstance(robot, Robot):
+        raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
+    robot.arm(hand)
+
+
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     """Return the centre of a goal. Raises ValueError if it is not finite or beyond
     ``LARGEST_ENTRY``."""
@@ -643,6 +650,5 @@ def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     x, y = place.tolist()
     if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
         raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
-    if not 0.0 <= radius <= LARGEST_ENTRY:
-        raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST_ENTRY:g}")
+    check_limits("radius", radius, 0.0, LARGEST_ENTRY)
     return x, y

@@ -13,7 +13,7 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
+from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
@@ -394,11 +394,11 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
-        for name, kind in (("goal", Real), ("hand", str), ("kind", str)):
+        for name, kind in (("goal", Integral), ("hand", str), ("kind", str)):
             if not isinstance(value := getattr(movement, name), kind):
                 raise SolutionError(
                     f"task {task.name!r}: {name} of a movement is {brief_value(value)}; it must be "
-                    f"{'a number' if kind is Real else 'a text'}"
+                    f"{'a whole number' if kind is Integral else 'a text'}"
                 )
         if not plan or plan[-1][0].goal != movement.goal:
             plan.append([])
@@ -420,15 +420,15 @@ def check_movement(task: Task, movement: Movement) -> Movement:
     """The movement, if it has what its kind needs and leads to configurations that the task allows;
     a path with its target. Raises SolutionError or ValueError."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
-    if movement.hand not in task.hands:
-        raise SolutionError(
-            f"the robot has no {movement.hand} hand; it has {' and '.join(map(repr, task.hands))}"
-        )
-    if kind not in KINDS:
-        raise SolutionError(f"unknown kind {kind!r}; known: {KINDS}")
+    if not isinstance(movement.hand, str) or movement.hand not in task.hands:
+        known = " and ".join(map(repr, task.hands))
+        hand = brief_value(movement.hand).strip("'")
+        raise SolutionError(f"the robot has no {hand} hand; it has {known}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise SolutionError(f"unknown kind {brief_value(kind)}; known: {KINDS}")
     if kind == "path":
-        if waypoints is None or len(waypoints) == 0:
-            raise SolutionError("a path needs waypoints")
+        if waypoints is None or not isinstance(waypoints, Iterable) or len([*waypoints]) == 0:
+            raise SolutionError("a path needs waypoints, a list of configurations")
         path = np.array([check_point(task, point) for point in waypoints], dtype=np.float64)
         if target is not None and not np.array_equal(target, waypoints[-1]):
             raise SolutionError("a path's target is its last waypoint")
@@ -508,17 +508,17 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     ValueError
         The hands are no text of L and R, or there is not a row for each.
     """
-    targets = real_array("targets", targets)
-    if targets.ndim != 2 or len(targets) != len(hands):
+    chosen, targets = hands_of(hands), real_array("targets", targets)
+    if targets.ndim != 2 or len(targets) != len(chosen):
         raise ValueError(
             f"targets have shape {targets.shape}; needed is a row for each of the "
-            f"{len(hands)} hands in {brief_value(hands)}"
+            f"{len(chosen)} hands in {brief_value(hands)}"
         )
     return tuple(
         Movement(number, hand, "corrective")
         if np.isnan(target).all()
         else Movement(number, hand, "learned", target)
-        for number, (hand, target) in enumerate(zip(hands_of(hands), targets, strict=True), 1)
+        for number, (hand, target) in enumerate(zip(chosen, targets, strict=True), 1)
     )
 
 

@@ -7,6 +7,7 @@ the key and what would be right.
 
 from __future__ import annotations
 
+import html
 import json
 import math
 import re
@@ -297,6 +298,37 @@ class Task(FileData):
             counted(len(self.goals), "goal"),
             hands=self.hands,
             initial_hands=self.initial_hands,
+        )
+
+    def _repr_html_(self) -> str:
+        """Return the picture that a notebook shows: base, arms and numbered goals at the start."""
+        arms = [self.robot.joint_positions(self.q0, hand) for hand in HANDS]
+        lines = [(arms[0], "grey"), (arms[1], "currentColor")]
+        corners = self.robot.base_outline(self.q0)
+        lines.append((np.concatenate([corners, corners[:1]]), "currentColor"))
+        around = np.concatenate([self.goal_array, *(points for points, _ in lines)])
+        (left, low), (right, high) = around.min(axis=0) - 0.5, around.max(axis=0) + 0.5
+
+        def places(points: Array) -> str:
+            return " ".join(f"{x:.3f},{high - y:.3f}" for x, y in points - [left, 0.0])
+
+        marks = [
+            f'<polyline points="{places(points)}" fill="none" stroke="{colour}" '
+            'stroke-width="0.06"/>'
+            for points, colour in lines
+        ]
+        for number, goal in enumerate(self.goal_array, 1):
+            (x, y), radius = places(goal[None]).split(","), self.radius
+            marks.append(
+                f'<circle cx="{x}" cy="{y}" r="{radius:g}" fill="none" stroke="#009e73" '
+                f'stroke-width="0.04"/><text x="{x}" y="{y}" dy="-0.2" font-size="0.35" '
+                f'text-anchor="middle" fill="currentColor">{number}</text>'
+            )
+        words = html.escape(repr(self))
+        return (
+            f'<figure><svg viewBox="0 0 {right - left:.3f} {high - low:.3f}" width="420" '
+            f'role="img" aria-label="{words}">{"".join(marks)}</svg>'
+            f"<figcaption>{words}</figcaption></figure>"
         )
 
 

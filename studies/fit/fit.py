@@ -7,6 +7,7 @@ profile intervals.
 """
 
 import argparse
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -286,6 +287,11 @@ def coverage(row):
     return *held, int(nearest.informed), f"{words[data]} after {nearest.trials} trials"
 
 
+def printable(text):
+    """Return text whose characters that do not print, such as escape codes, are shown as ``?``."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in str(text))
+
+
 def main():
     """Read a file, fit, and print a sentence for each subject."""
     parser = argparse.ArgumentParser(description="Fit the learner to the trials of people.")
@@ -298,24 +304,25 @@ def main():
     )
     parser.add_argument("--out", help="CSV file for all numbers")
     given = parser.parse_args()
-    warnings.showwarning = lambda text, *_: print(f"warning: {text}", file=sys.stderr)
+    warnings.showwarning = lambda text, *_: print(printable(f"warning: {text}"), file=sys.stderr)
     try:
         if not given.noise >= 0:
             raise CoarticError(f"--noise is {given.noise:g}; needed is 0 or more")
-        if given.out and not Path(given.out).parent.is_dir():
-            raise CoarticError(f"--out {given.out}: there is no such folder")
+        out = Path(given.out or "")
+        if given.out and (out.is_dir() or not os.access(out.parent, os.W_OK)):
+            raise CoarticError(f"--out {out}: name a file, in a folder that may be written")
         task = load_task(given.task)
         frame = read_hits(given.csv, task, ticks_per_unit=given.ticks_per_unit)
         condition = CONDITIONS[given.condition] if given.condition else None
         table = fit(frame, task, condition=condition, noise=given.noise)
     except CoarticError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(printable(f"error: {error}"), file=sys.stderr)
         raise SystemExit(2) from None
     if not len(table):
         print("error: no subject can be fitted", file=sys.stderr)
         raise SystemExit(2)
     for _, row in table.iterrows():
-        print(sentence(row))
+        print(printable(sentence(row)))
     if given.out:
         table.to_csv(given.out, index=False)
 
