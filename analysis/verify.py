@@ -46,7 +46,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "replay": ("replay_reward", "replay_hands"),
 }
 SCHEMA = "01ba2a1326692168"  # of format 5: see schema
-NAMES = (  # of tables, then of views
+OURS = (  # of tables, then of views
     *("suite", "plan", "cells", "environments", "results", "movements", "waypoints", "learning"),
     *("asked", "solved", "runs", "solutions", "paths"),
 )
@@ -286,8 +286,8 @@ def check_all(db: sqlite3.Connection) -> Report:
 def schema(db: sqlite3.Connection) -> list[list[str]]:
     """Tables and views of coartic, without columns of joints, and all triggers."""
     query = f"""SELECT type, name, tbl_name, sql FROM sqlite_master
-        WHERE type = 'trigger' OR name IN ({", ".join("?" for _ in NAMES)}) ORDER BY type, name"""
-    rows = db.execute(query, NAMES)
+        WHERE type = 'trigger' OR name IN ({", ".join("?" for _ in OURS)}) ORDER BY type, name"""
+    rows = db.execute(query, OURS)
     joint = re.compile(r", (base_[xy]|(left|right)_[0-9]+) REAL")
     of = {"movements": joint, "waypoints": joint}
     return [

@@ -77,7 +77,7 @@ def test_the_commonest_reasons_are_said(traced):
     reported = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
     assert (reported["failed"], reported["reasons"]) == (
         10,
-        ["4 × often", "3 × thrice", "2 × twice"],
+        ["4 × often", "3 × thrice", "2 × twice", "1 for other reasons"],
     )
 
 
