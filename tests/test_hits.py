@@ -223,5 +223,5 @@ def test_a_goal_is_two_finite_numbers(goal):
 
 @pytest.mark.parametrize("seeds", [range(10**9), count()])
 def test_the_number_of_seeds_has_a_limit(seeds):
-    with pytest.raises(ValueError, match="more than 1_000_000 seeds"):
+    with pytest.raises(ValueError, match="seeds has more than 1_000_000 entries"):
         learn_many(TASK, "EC4", seeds=seeds, trials=1)
