@@ -28,6 +28,7 @@ _MODULES = {
     "number": "analysis.words",
     "other_tasks": "analysis.statistics.instances",
     "ranking": "analysis.frames",
+    "read_hits": "analysis.hits",
     "shares": "analysis.frames",
     "solutions_of": "analysis.frames",
     "runtimes": "analysis.sections.costs",

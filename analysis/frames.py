@@ -9,8 +9,9 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,8 @@ from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
 from coartic import Execution, Movement, Task
+from coartic.analysis.hits import checked_hits
+from coartic.analysis.method_frame import joined_learners
 from coartic.analysis.optima import gap_share
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import running_times
@@ -25,9 +28,11 @@ from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
+from coartic.internal.text import counted
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
+_LARGEST_GAP = 10
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
 
@@ -41,17 +46,21 @@ def checked(
 ) -> pd.DataFrame:
     """Return columns of a user's frame, with ``numbers`` as float64 and NaN for missing numbers.
 
-    Raises CoarticError for an object that is no frame, a missing column, no rows, a missing name,
-    and for ``numbers`` that are text or infinite.
+    The index loses its names, which could be those of columns. Raises CoarticError for an object
+    that is no frame, a missing column, a column that is there twice, no rows, a missing name, and
+    for ``numbers`` that are text or infinite.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
     wanted = [*dict.fromkeys((*names, *others, *numbers))]
     if missing := [name for name in wanted if name not in frame.columns]:
         raise CoarticError(f"the frame has no column {', '.join(missing)}")
+    if several := [name for name in wanted if [*frame.columns].count(name) > 1]:
+        raise CoarticError(f"the frame has column {several[0]} twice: leave one of them out")
     if not len(frame):
         raise CoarticError("the frame has no rows")
     columns = frame[wanted].copy()
+    columns.index = columns.index.set_names([None] * columns.index.nlevels)
     not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
     for name in names:
         refuse_rows(columns, name, columns[name].isna(), not_na)
@@ -65,6 +74,21 @@ def checked(
         columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
         refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
     return columns
+
+
+def names_given(what: str, names: str | Sequence[str]) -> list[str]:
+    """Return the columns that an argument names, also a single one by a text.
+
+    Raises CoarticError for an argument that is no list of columns, or names one twice.
+    """
+    if isinstance(names, str):
+        return [names]
+    if not isinstance(names, Iterable):
+        raise CoarticError(f"{what} is {brief_value(names)}: needed are names of columns")
+    listed = list(names)
+    if len(set(map(str, listed))) < len(listed):
+        raise CoarticError(f"{what} is {brief_value(names)}: it names a column twice")
+    return listed
 
 
 def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
@@ -107,16 +131,18 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     number. ``more``: other columns of numbers. Raises CoarticError as :func:`checked` and
     :func:`with_gaps` do, and for a task with several best known rewards.
     """
-    has_zero = isinstance(frame, pd.DataFrame) and ZERO in frame.columns
-    numbers = (*SCORES, *[ZERO] * has_zero, *more)
-    columns = with_gaps(checked(frame, names=("method", "task"), numbers=numbers))
+    there = [*getattr(frame, "columns", ())]
+    numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
+    setting = ["setting"] * ("setting" in there)
+    columns = with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=setting))
     number, tasks = pd.factorize(columns.task)
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
-    several = columns.best_known.groupby(task).transform("nunique") > 1
-    refuse_rows(columns, "task", several, "the task has several best_known; needed is one")
+    for name in {"best_known", ZERO} & {*columns}:
+        several = columns[name].groupby(task).transform("nunique") > 1
+        refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
     names = columns.method.to_numpy(object)
-    if "setting" in frame.columns:
-        settings = frame.setting.astype(object).where(frame.setting.notna(), "").astype(str)
+    if setting:
+        settings = columns.setting.astype(object).where(columns.setting.notna(), "").astype(str)
         several = settings.groupby(pd.factorize(names)[0]).transform("nunique") > 1
         labels = np.array([*map(label_of, map(str, names), settings)], dtype=object)
         names = np.where(several, labels, names)
@@ -150,7 +176,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     >>> gaps(frame).round(3).tolist()
     [0.038, 0.0]
     """
-    return with_gaps(checked(frame, numbers=SCORES)).gap
+    return with_gaps(checked(frame, numbers=SCORES)).gap.set_axis(frame.index)
 
 
 def shares(frame: pd.DataFrame) -> pd.Series:
@@ -182,19 +208,21 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     >>> shares(frame).round(2).tolist()
     [0.0, 0.7]
     """
-    return with_gaps(checked(frame, numbers=(*SCORES, ZERO))).share
+    return with_gaps(checked(frame, numbers=(*SCORES, ZERO))).share.set_axis(frame.index)
 
 
-def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
+def means(
+    frame: pd.DataFrame, by: str | Sequence[str], columns: str | Sequence[str]
+) -> pd.DataFrame:
     """Return the means of groups of rows, with their 95 % intervals.
 
     Parameters
     ----------
     frame : DataFrame
         A row for each task, or each run.
-    by : sequence of str
+    by : str or sequence of str
         Columns whose values make groups; NaN is a value, too.
-    columns : sequence of str
+    columns : str or sequence of str
         Columns of numbers; NaN does not count.
 
     Returns
@@ -217,8 +245,13 @@ def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.
     0  0     3  0.3      0.2      0.37
     1  1     3  0.1      0.1      0.10
     """
+    by, columns = names_given("by", by), names_given("columns", columns)
+    if not by:
+        raise CoarticError("by is empty: needed are names of columns")
+    if both := [name for name in columns if name in by]:
+        raise CoarticError(f"column {both[0]} is in by and in columns: needed is one of both")
     values, rows = checked(frame, numbers=columns, others=by), []
-    for key, group in values.groupby([*by], sort=False, dropna=False, observed=True):
+    for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
         for name in columns:
             there = group[name].dropna().to_numpy(dtype=np.float64)
@@ -278,12 +311,14 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
-        solved runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same
-        tasks (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of
-        solved ``tasks``, of ``runs`` and of ``failed`` runs. A method that did not solve every task
-        of the frame has no gap and is last. With ``corrective_best`` also the ``share`` of the
-        possible gain (:func:`shares`) with ``share_low`` and ``share_high``, a mean over the tasks
-        on which something can be gained, and ``without_gain``, the number of other tasks.
+        runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
+        (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
+        that it solved in every run, of ``missing`` tasks, of ``runs`` and of ``failed`` runs. A
+        method with missing tasks has no gap and is last. The paper's learner over tasks for one arm
+        and for two has a row of its own, ``"dual-process (EC1, EC4)"``. With ``corrective_best``
+        also the ``share`` of the possible gain (:func:`shares`) with ``share_low`` and
+        ``share_high``, a mean over the tasks on which something can be gained, and
+        ``without_gain``, the number of other tasks.
 
     Raises
     ------
@@ -297,16 +332,19 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     ...     {"method": ["mine", "mine", "yours"], "task": "ascending",
     ...      "reward": [-300, -296, -310], "best_known": -292}
     ... )
-    >>> ranking(frame)[["gap", "runs", "failed"]].round(3)
-              gap  runs  failed
+    >>> ranking(frame)[["gap", "missing", "failed"]].round(3)
+              gap  missing  failed
     method
-    mine    0.021     2       0
-    yours   0.062     1       0
+    mine    0.021        0       0
+    yours   0.062        0       0
     """
     frame = scored(frame)
     every, rows = {*frame.task[frame.best_known.notna()]}, []
-    for _, of_method in frame.groupby("method", sort=False):
-        solved = of_method[of_method.gap.notna()]
+    by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
+    for of_method in by_method.values():
+        known = of_method[of_method.best_known.notna()]
+        has_failed = known.gap.isna().groupby(known.task).transform("any")
+        solved = known[~has_failed]
         by_task = dict([*solved.groupby("task").gap])
         solved_all = by_task and by_task.keys() == every
         row = (task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap")
@@ -317,11 +355,23 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         rows.append({
             **row,
             "tasks": len(by_task),
+            "missing": len(every) - len(by_task),
             "runs": len(of_method),
             "failed": int(of_method.reward.isna().sum()),
         })  # fmt: skip
-    methods = pd.Index(frame.method.unique(), name="method", tupleize_cols=False)
+    methods = pd.Index([*by_method], name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
+
+
+def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
+    """Return the rows of each method, and those of the learner over tasks for one arm and for two
+    (:func:`.joined_learners`)."""
+    tasks = {method: {*rows.task} for method, rows in by_method.items()}
+    joined = {
+        label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
+        for label, (one, two) in joined_learners(tasks)
+    }
+    return joined | by_method
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
@@ -367,9 +417,10 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     reach = np.empty(0)
     with suppress(TypeError, ValueError):  # no numbers
         reach = np.asarray(targets, dtype=np.float64)
-    if reach.ndim != 1 or not reach.size or not (reach >= 0).all():
+    if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach < _LARGEST_GAP)).all():
         raise CoarticError(
-            f"targets are {brief_value(targets)}: needed are gaps, such as [0.1, 0.05, 0.01]"
+            f"targets are {brief_value(targets)}: needed are gaps, shares of the best known reward "
+            f"from 0 to {_LARGEST_GAP} (not per cent), such as [0.1, 0.05, 0.01]"
         )
     if not frame.best_known.notna().any():
         raise CoarticError("the frame has no best_known reward, so no targets")
@@ -396,8 +447,9 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     task : Task
         The task of the trials.
     hits : DataFrame
-        A row for each hit: ``subject``, ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the
-        posture, a column for each of ``task.robot.joint_names``, length unit and rad.
+        A row for each hit, as :func:`coartic.analysis.read_hits` returns it: ``subject``,
+        ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the posture, a column for each of
+        ``task.robot.joint_names``, length unit and rad. Angles are unwrapped in the same way.
 
     Returns
     -------
@@ -407,17 +459,20 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text or infinite numbers.
+        The frame has no trial with all goals, or is wrong as a file of ``read_hits`` can be.
     """
+    if not isinstance(hits, pd.DataFrame):
+        raise CoarticError(f"needed is a pandas.DataFrame, not a {type(hits).__name__}")
+    names = [f"row {brief_value(row)}" for row in hits.index.tolist()]
     joints, runs = [*task.robot.joint_names], {}
-    numbers = ("trial", "goal", "ticks", *joints)
-    columns = checked(hits, numbers=numbers, names=("subject", "hand"))
+    columns = checked_hits(hits, task, "the frame", names)
     for (subject, trial), rows in columns.groupby(["subject", "trial"], sort=False):
-        ordered = rows.sort_values("goal")
-        if ordered.goal.tolist() == [*range(1, len(task.goals) + 1)]:
-            postures, ticks = ordered[joints].to_numpy(), ordered.ticks.round().astype(int).tolist()
-            each = zip(ordered.hand, postures, ticks, strict=True)
+        if len(rows) == len(task.goals):
+            postures, ticks = rows[joints].to_numpy(), rows.ticks.round().astype(int).tolist()
+            each = zip(rows.hand, postures, ticks, strict=True)
             movements = tuple(Movement(g, hand, "learned", q, n)
                               for g, (hand, q, n) in enumerate(each, 1))  # fmt: skip
             runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
+    if not runs:
+        raise CoarticError(f"in no trial are all {counted(len(task.goals), 'goal')} hit")
     return Solutions(task, "recorded", tuple(runs.values()), tuple(runs))

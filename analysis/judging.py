@@ -21,6 +21,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.words import capital, estimate, p_value
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
+from coartic.internal.limits import real_array
 from coartic.internal.text import unknown
 
 RESAMPLES_OF_CLAIMS = 99_999
@@ -121,7 +122,7 @@ def mean_beyond(
     """
     if side not in get_args(Side):
         raise CoarticError(unknown("side", str(side), get_args(Side)))
-    there = np.asarray(values, dtype=np.float64)
+    there = real_array("values", values)
     there = there[~np.isnan(there)]
     if len(there) < FEWEST:
         return Finding(None, f"fewer than {FEWEST} random tasks can be judged")

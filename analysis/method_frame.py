@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -107,16 +107,26 @@ def group_of(cells: Iterable[CellRuns]) -> str:
 def joined_conditions(
     cells: Mapping[str, Sequence[CellRuns]], rows: Mapping[str, dict[str, Any]]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield label and row of the learner over one-armed and two-armed tasks together: under EC1,
-    and on tasks for two arms under a condition that draws hands at random."""
+    """Yield label and row of the learner over one-armed and two-armed tasks together."""
+    tasks = {label: {cell.task for cell in of_label} for label, of_label in cells.items()}
+    for label, (one, two) in joined_learners(tasks):
+        conditions = label.partition(" ")[2].replace("-informed", "")
+        row = {"parts": (one, two), "title": f"{rows[two]['algorithm']} {conditions}"}
+        yield label, rows[two] | row
+
+
+def joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield the label of the learner over one-armed and two-armed tasks together, with the methods
+    that it joins: EC1, and on tasks for two arms a condition that draws hands at random.
+
+    ``tasks`` has the tasks on which each method ran.
+    """
     drawing = [x for x in LEARNERS if CONDITIONS[CONDITION_OF[x]].hand_exploration == "random"]
     for one, two in (*((EC1, label) for label in drawing), INFORMED_LEARNERS):
-        one_armed, two_armed = ({cell.task for cell in cells.get(each, ())} for each in (one, two))
+        one_armed, two_armed = (tasks.get(each, set()) for each in (one, two))
         if two_armed and one_armed - two_armed:
             both = f"{CONDITION_OF[one]}, {CONDITION_OF[two]}"
-            algorithm = rows[two]["algorithm"]
-            row = {"parts": (one, two), "title": f"{algorithm} ({both.replace('-informed', '')})"}
-            yield f"{METHOD_PREFIX.rstrip('/')} ({both})", rows[two] | row
+            yield f"{METHOD_PREFIX.rstrip('/')} ({both})", (one, two)
 
 
 def looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:

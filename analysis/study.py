@@ -6,6 +6,7 @@ study; :func:`cached` keeps the results of a function for each study.
 
 from __future__ import annotations
 
+import html
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +17,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_hashable
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.method_frame import methods_of
@@ -31,6 +33,7 @@ from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
+from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.motion.trial import ranked_sequences
@@ -38,7 +41,8 @@ from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, label_of, size_of
 from coartic.runs.record import execute_all
-from coartic.runs.store import explain_errors, open_store
+from coartic.runs.shipped import open_results
+from coartic.runs.store import explain_errors
 from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 
@@ -128,6 +132,8 @@ def cached(
     def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
         check_study(study)
         key = function, args, tuple(named.items())
+        if wrong := [each for each in (*args, *named.values()) if not is_hashable(each)]:
+            raise CoarticError(f"{function.__name__} takes names, not {brief_value(wrong[0])}")
         if key not in study._computed:
             study._computed[key] = function(study, *args, **named)
         result: Computed = study._computed[key]
@@ -137,18 +143,20 @@ def cached(
 
 
 def load(folder: str | Path) -> Study:
-    """Read a results folder.
+    """Read a results folder, or by the name ``"shipped"`` the shipped results of suite
+    ``comparison``.
 
     Raises CoarticError if the folder is no results folder, or lacks runs of its suite.
     """
     folder = folder_named(folder)
-    with open_store(folder) as store:
+    with open_results(folder) as store:
         plan = store.plan()
         runs = store.runs()
         if len(runs) < size_of(plan):
             raise CoarticError(
-                f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted. "
-                "Repeat the `coartic run` command, which does what is missing."
+                f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted, "
+                "or has a part of the runs. Repeat the `coartic run` command, which does what is "
+                "missing, or --include all parts in another folder."
             )
         return Study(folder, plan, store.made_with(), runs)
 
@@ -169,6 +177,15 @@ class Study:
     def __repr__(self) -> str:
         runs = counted(len(self.runs), "run")
         return f"Study of {self.folder}: {runs} of suite {self.suite}"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: a row for each method with its numbers of runs."""
+        solved = self.runs.status == "ok"
+        runs = self.runs[["method", "setting", "task"]].assign(solved=solved)
+        counts = runs.groupby(["method", "setting"], sort=False).agg(
+            tasks=("task", "nunique"), runs=("solved", "size"), solved=("solved", "sum")
+        )
+        return f"<p>{html.escape(repr(self))}</p>{counts.reset_index().to_html(index=False)}"
 
     @property
     def suite(self) -> str:
@@ -282,6 +299,8 @@ class Study:
         A row for each sequence, the best first: ``hands``, ``reward`` (missing for a failure) and
         ``reason``. No rows if the task has too many sequences.
         """
+        if task not in self.tasks:
+            raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
         try:
             names = hand_sequences(self.tasks[task])
         except NotApplicableError:
@@ -293,12 +312,12 @@ class Study:
     @cached_property
     def solutions(self) -> pd.DataFrame:
         """A row for each movement of the solutions."""
-        with open_store(self.folder) as store:
+        with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run that made trials, with its rewards, NaN for failed trials."""
-        with open_store(self.folder) as store:
+        with open_results(self.folder) as store:
             yield from store.rewards()
 
     @cached
@@ -379,7 +398,7 @@ class Study:
             By the index of :attr:`runs`; NaN for runs without the signature, and for runs after the
             first 500 of a method on a task.
         """
-        if name not in SIGNATURES:
+        if not is_hashable(name) or name not in SIGNATURES:
             raise CoarticError(unknown("signature", name, SIGNATURES))
         values = pd.Series(np.nan, self.runs.index, name=name)
         for key, cell in self.cells.items():
@@ -409,7 +428,7 @@ class Study:
     @cached
     def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` of executed runs, by run id."""
-        with open_store(self.folder) as store:
+        with open_results(self.folder) as store:
             return store.movements(part, self.tasks, MOST_EXECUTED)
 
 

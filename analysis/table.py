@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import inspect
 import math
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
@@ -58,6 +60,13 @@ class Table:
     def __call__(self, study: Study) -> pd.DataFrame:
         """Return the table of a study, with :func:`shown_names` as its ``attrs``."""
         return rows_of(study, self)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: what the table has, and its columns with headings."""
+        rows = [(column.name + column.ending, column.header) for column in self.columns]
+        columns = pd.DataFrame(rows, columns=["column", "heading"]).to_html(index=False)
+        words = inspect.getdoc(self.rows) or ""
+        return f"<p>Table {self.id}, a function of a study. {html.escape(words)}</p>{columns}"
 
     def column(self, name: str) -> Column:
         """Return the column to which a name in the CSV file belongs."""

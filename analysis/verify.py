@@ -45,14 +45,18 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
-SCHEMA = "18345eb06ce51758"  # of format 5: see schema
+SCHEMA = "01ba2a1326692168"  # of format 5: see schema
+OURS = (  # of tables, then of views
+    *("suite", "plan", "cells", "environments", "results", "movements", "waypoints", "learning"),
+    *("asked", "solved", "runs", "solutions", "paths"),
+)
 # Whatever a file says, it is checked in bounded time and memory.
-MOST_GOALS, LONGEST_TEXT = 100, 100_000  # of a task, and of what is stored of it in characters
+MOST_GOALS, LONGEST_TEXT = 256, 100_000  # of a task, and of what is stored of it in characters
 MOST_TRIALS, MOST_TICKS, MOST_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run, movement
 UNCHECKED = (
     "Times, dates, reasons, counts of what was spent, proven bounds, and where and with what it "
     "was run are taken as stored; so is what methods declare, and what the suite was called.",
-    "That tasks are those of the paper or of a family, and that all runs of a suite are there.",
+    "That tasks are those of the paper or of a family, and that the plan is that of the suite.",
     "No method is run: `coartic verify --again N` sees whether it finds these solutions again.",
 )
 
@@ -240,7 +244,7 @@ def check_all(db: sqlite3.Connection) -> Report:
         foreign = "Tables or views are not as coartic makes them, so that they may say anything."
         return Report(0, 0, [foreign], ["The runs."])
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
-    wrong += [*check_cells(db)]
+    wrong += [*check_cells(db), *check_plan(db)]
     runs = movements = unsolved = spent = 0
     rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
     query = """SELECT results.id AS number, * FROM results
@@ -274,12 +278,16 @@ def check_all(db: sqlite3.Connection) -> Report:
         words = f"is better than bound {bound} of run {proof}"
         wrong += [f"Run {run} {words}." for reward, run in rewards[same] if reward > bound]
     empty = [f"Runs without a solution: {unsolved}."] if unsolved else []
-    return Report(runs, movements, wrong, [*UNCHECKED, *empty])
+    (asked,) = db.execute("SELECT count(*) FROM asked").fetchone()
+    others = [f"If the plan should ask for {runs - asked} other runs, which no report shows."]
+    return Report(runs, movements, wrong, [*UNCHECKED, *empty, *others * (runs > asked)])
 
 
 def schema(db: sqlite3.Connection) -> list[list[str]]:
-    """Tables, views, indexes and triggers of the file, without columns of joints."""
-    rows = db.execute("SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name")
+    """Tables and views of coartic, without columns of joints, and all triggers."""
+    query = f"""SELECT type, name, tbl_name, sql FROM sqlite_master
+        WHERE type = 'trigger' OR name IN ({", ".join("?" for _ in OURS)}) ORDER BY type, name"""
+    rows = db.execute(query, OURS)
     joint = re.compile(r", (base_[xy]|(left|right)_[0-9]+) REAL")
     of = {"movements": joint, "waypoints": joint}
     return [
@@ -319,6 +327,19 @@ def check_cells(db: sqlite3.Connection) -> Iterator[str]:
     query = """SELECT task FROM plan JOIN cells ON cells.id = cell
         GROUP BY task HAVING count(DISTINCT definition) > 1"""
     yield from (f"Two tasks are called {name}." for (name,) in db.execute(query))
+
+
+def check_plan(db: sqlite3.Connection) -> Iterator[str]:
+    """What the folder lacks of its plan, a sentence each."""
+    (suites,) = db.execute("SELECT count(*) FROM suite").fetchone()
+    if suites != 1:
+        yield f"Table suite has {suites} rows, not one: no report can be made."
+    for (position,) in db.execute("SELECT position FROM plan WHERE runs < 1"):
+        yield f"Row {position} of table plan asks for no runs of its cell."
+    (planned,) = db.execute("SELECT coalesce(sum(runs), 0) FROM plan").fetchone()
+    (there,) = db.execute("SELECT count(*) FROM asked").fetchone()
+    if there != planned:
+        yield f"The plan asks for {planned} runs, of which the folder has {there}."
 
 
 def hash_of(content: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -14,20 +15,35 @@ if TYPE_CHECKING:
     from coartic import Task
     from coartic.estimates import Estimate
 
+_LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
 NONE = "–"
 """Text of a missing value."""
 MOST_NAMED = 3
 """Most methods, or tasks, that a sentence names."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 RECONSTRUCTED = "† The paper does not publish the goals of this task; ours are a reconstruction."
+_SIGNS = "αβγδεζηθικλμνξπρςστυφχψωΓΔΘΛΞΠΣΥΦΨΩ←↑→↓↔↕⇐⇑⇒⇓⇔↦≤≥≠≈≡∼∝∈∉∂∇√∑∏∫⋅∧∨∩∪⊂⊆∀∃⊥∥∠≪≫∘⊗⊕ℓ‡"
+_NAMES = """
+    alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho varsigma sigma
+    tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega
+    leftarrow uparrow rightarrow downarrow leftrightarrow updownarrow Leftarrow Uparrow Rightarrow
+    Downarrow Leftrightarrow mapsto leq geq neq approx equiv sim propto in notin partial nabla surd
+    sum prod int cdot wedge vee cap cup subset subseteq forall exists perp parallel angle ll gg circ
+    otimes oplus ell ddagger
+"""
 _LATEX = str.maketrans(
     {
         **{sign: f"\\{sign}" for sign in "&%$#_"},
         **{"~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "\\": "\\textbackslash{}"},
         **{"{": "\\textbraceleft{}", "}": "\\textbraceright{}"},  # BibTeX counts braces
         **{"†": "$\\dagger$", "−": "$-$", "–": "--", "∞": "$\\infty$", "±": "$\\pm$"},
-        **{"Δ": "$\\Delta$", "σ": "$\\sigma$", "ε": "$\\epsilon$", "↳": "", NARROW_SPACE: "\\,"},
+        **{"↳": "", NARROW_SPACE: "\\,", "…": "\\ldots{}", "—": "---", "‘": "`", "’": "'"},
         **{"“": "``", "”": "''", "<": "$<$", ">": "$>$", "×": "$\\times$"},
+        **{sign: f"$\\{name}$" for sign, name in zip(_SIGNS, _NAMES.split(), strict=True)},
+        **{
+            sign: f"${letter}$"
+            for sign, letter in zip("οΑΒΕΖΗΙΚΜΝΟΡΤΧ", "oABEZHIKMNOPTX", strict=True)
+        },
     }
 )
 
@@ -182,5 +198,17 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 
 
 def latex(text: object) -> str:
-    """Return text with the characters escaped that are special in LaTeX and BibTeX."""
-    return one_line(str(text)).translate(_LATEX)
+    """Return text with the characters escaped that are special in LaTeX and BibTeX.
+
+    Greek letters, arrows and signs become commands. Of other alphabets, such as Chinese, characters
+    become ``\\symbol``, which XeLaTeX and LuaLaTeX print.
+    """
+
+    def escaped(c: str) -> str:
+        parts = unicodedata.normalize("NFKD", c).translate(_LATEX)  # without accents
+        parts = "".join(part for part in parts if not unicodedata.combining(part))
+        is_plain = all(part <= _LAST_LATIN for part in parts)
+        return parts if is_plain else "".join(f'\\symbol{{"{ord(each):04X}}}' for each in c)
+
+    text = unicodedata.normalize("NFC", one_line(str(text))).translate(_LATEX)
+    return "".join(c if c <= _LAST_LATIN else escaped(c) for c in text)

@@ -92,7 +92,8 @@ class Controller(ABC):
         """
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
-        short = beyond_reach(self.task, hand, self.task.goals[goal], model.correction_tolerance)
+        _, tolerance = model.tolerances(radius)
+        short = beyond_reach(self.task, hand, self.task.goals[goal], tolerance)
         if short > radius:
             raise StuckError(
                 f"{name} ends {short:.3g} short of it with the base "

@@ -145,7 +145,8 @@ class PosturePlanner:
         self.robot = task.robot
         self.goals = session.goals
         # ‖F(q) − x_g‖ of a target at most θ^g − θ^a: the movement hits before it arrives.
-        self.tolerance = session.radius - session.model.arrival_tolerance
+        arrival, _ = session.model.tolerances(session.radius)
+        self.tolerance = session.radius - arrival
         self.base_and_arm = {hand: np.zeros(session.dof, bool) for hand in session.hands}
         for hand, mask in self.base_and_arm.items():
             mask[:BASE_DOF] = mask[session.joints(hand)] = True

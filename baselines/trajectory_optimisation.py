@@ -106,7 +106,7 @@ class TrajectoryOptimisation(Method):
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
         # A target so near to a goal's centre is sure to hit; rounded to whole control ticks, a plan
         # goes through the rims.
-        inside = task.radius - session.model.arrival_tolerance
+        inside = task.radius - session.model.tolerances(task.radius)[0]
         radius = task.radius if self.cost == "path-length" else inside
         plans, failed, parameters = list[PathPlan](), dict[str, str](), self.parameters
         with session.solving():

@@ -23,8 +23,10 @@ from coartic import (
 )
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
+from coartic.benchmarks.worker import OWN_GENERATOR
 from coartic.internal.text import counted
 from coartic.method import METERED
+from coartic.motion.solution import goals_without_target, hint_of
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of
 from coartic.runs.record import Outcome, Run
@@ -33,6 +35,10 @@ from coartic.tasks.task import check_task
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0
 BUDGET = 7  # trial budget of the runs that check law ``limits``
+NO_SEED = (
+    "\nanother seed gives the same result as well: random numbers come from session.rng or "
+    "session.seed; without any, stochastic = False saves runs"
+)
 _UNDECLARED = ("does not declare", "own compiled", "outside its session")  # words of reasons
 
 
@@ -103,12 +109,34 @@ def laws_of_runs(
 
     first = dict(of_kind("first"))
     rewards = ", ".join(f"{task} {runs['first', task].solution.reward}" for task in first)
+    solutions = {task: runs["first", task].solution.movements for task in first}
+    alone = {task: goals_without_target(movements) for task, movements in solutions.items()}
+    asked = "".join(
+        f"\non {task}, only the corrective process moves to goals {', '.join(map(str, goals))}, "
+        "which have no target: is this meant?"
+        for task, goals in alone.items()
+        if goals
+    )
+    hints = ((task, hint_of(movements)) for task, movements in solutions.items())
     yield law(
         "solution",
-        (f"on {task}: {each.status}: {each.reason}" for task, each in first.items() if each.reason),
-        f"executed and scored on {rewards}{checked_with}",
+        chain(
+            (f"on {task}: {each.status}: {each.reason}" for task, each in first.items()
+             if each.reason),
+            (f"on {task}: {hint}" for task, hint in hints if hint),
+        ),
+        f"executed and scored on {rewards}{checked_with}{asked}",
+    )  # fmt: skip
+    by_seed = chain(
+        (
+            f"declared not to be stochastic, but on {task} it makes {OWN_GENERATOR}: take random "
+            "numbers from session.rng, and declare it stochastic"
+            for task, each in first.items()
+            if OWN_GENERATOR in each.used
+        ),
+        changes("other seed", "declared not to be stochastic, but another seed on {}"),
     )
-    by_seed = changes("other seed", "declared not to be stochastic, but another seed on {}")
+    differs = next(changes("other seed", "{}"), None)
     yield law(
         "determinism",
         chain(
@@ -117,7 +145,7 @@ def laws_of_runs(
             () if info.stochastic else by_seed,
         ),
         f"the same result under {'the same' if info.stochastic else 'any'} seed, in one process "
-        "and in another",
+        "and in another" + ("" if differs or not info.stochastic else NO_SEED),
     )
     yield law(
         "no hidden state",
@@ -134,7 +162,7 @@ def laws_of_runs(
         ),
         f"keeps to a budget of {BUDGET} trials",
     )
-    used = {name for each in first.values() for name in each.used}
+    used = {name for each in first.values() for name in each.used} - {OWN_GENERATOR}
     unused = {item.value for item in METERED if item.value in info.information} - used
     undeclared = (
         f"on {task}: {each.reason}"

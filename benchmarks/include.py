@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -19,12 +20,12 @@ from pathlib import Path
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.shipped import SHIPPED, open_shipped
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.record import PREFIXES, Run
+from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, open_store, writing
 
 _SCORED = (
@@ -45,6 +46,11 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
     stored, and if two folders have different results of a run. Then nothing is copied but shipped
     results.
     """
+    if any(job.numbers[0] for job in plan):
+        raise CoarticError(
+            "a range of runs is a part of an array: include the folders of all parts afterwards, "
+            "with the number of all runs"
+        )
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
         for name in map(str, folders):
@@ -53,7 +59,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
                 continue
             if folder_named(name).resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot include itself: choose another --out")
-            if not folder_named(name).exists():
+            if not os.path.lexists(folder_named(name)):
                 message = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 raise CoarticError(message)
             sources[name] = stack.enter_context(open_store(folder_named(name)))

@@ -7,10 +7,12 @@ process that runs suites.
 from __future__ import annotations
 
 import atexit
+import errno
 import inspect
 import json
 import multiprocessing
 import re
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -18,7 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from coartic.benchmarks.code_identity import code_of
-from coartic.benchmarks.pool import CONTEXT, start_process
+from coartic.benchmarks.pool import CONTEXT, MORE_FILES, start_process
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
 from coartic.internal.threads import begin_worker, end_group
@@ -36,13 +38,16 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     The function raises CoarticError if the process gives no answer. The process, with all processes
     that it starts, ends with this process.
     """
-    pipe, theirs = multiprocessing.Pipe()
-    process = CONTEXT.Process(target=answer_questions, args=(theirs, str(path), shown), daemon=True)
     try:
+        pipe, theirs = multiprocessing.Pipe()
+        answers = theirs, str(path), shown
+        process = CONTEXT.Process(target=answer_questions, args=answers, daemon=True)
         start_process(process)
-    except (OSError, EOFError) as error:  # its server was killed
-        words = f"{shown}: cannot be imported: no process for it begins"
-        raise CoarticError(f"{words} ({error_line(error)}). Repeat the command") from None
+    except (OSError, EOFError) as error:  # EOFError: its server was killed
+        why = getattr(error, "strerror", None) or error_line(error)
+        how = f" {MORE_FILES}" * (getattr(error, "errno", 0) == errno.EMFILE)
+        words = f"{shown} is not read: no process for it begins ({why})"
+        raise CoarticError(f"{words}. Repeat the command{how}") from None
     atexit.register(end_group, process.pid)
     theirs.close()
 
@@ -55,7 +60,14 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
             said = json.loads(pipe.recv_bytes(_LONGEST_ANSWER))
         except (OSError, EOFError):
             process.join(1.0)
-            how = f"its process ended with exit code {process.exitcode}"
+            code = process.exitcode
+            if code is None or code < 0 or code == 255:  # 255: its server was killed
+                name = signal.Signals(-code).name if code and code < 0 else "a signal"
+                raise CoarticError(
+                    f"{shown} is not read: {name} ended the process that reads it, from outside or "
+                    "by the file itself. Repeat the command"
+                ) from None
+            how = f"its process ended with exit code {code}"
             raise CoarticError(f"{shown}: cannot be imported: {how}") from None
         if "error" in said:
             raise CoarticError(plain(str(said["error"])))
@@ -140,7 +152,7 @@ def check_declaration(method: type[Method], origin: str) -> None:
     if not METHOD_NAME.fullmatch(method.name):
         raise CoarticError(
             f"{where}: the name {method.name!r} must begin with a letter or digit and have only "
-            "letters, digits, '.', '_', '+', '/' and '-'"
+            "letters, digits, '.', '_', '+', '/' and '-', such as 'my-search'"
         )
     information = getattr(method, "information", None)
     if not isinstance(information, frozenset | set) or not all(

@@ -14,12 +14,18 @@ from pydantic import BeforeValidator, Field, PlainValidator, ValidationError
 from coartic import CoarticError, Task, builtin_tasks, load_task
 from coartic.benchmarks.registry import Registry, methods_named, registry
 from coartic.benchmarks.suites import WILDCARD, Suite, TaskNamed, check_kind, load_suite, tasks_of
-from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.internal.limits import (
+    MOST_CELLS,
+    MOST_SECONDS,
+    MOST_SEED,
+    MOST_TRIALS,
+    number_or_range,
+)
 from coartic.internal.text import unknown
 from coartic.internal.validation import FileData, error_saying, explain_inline
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, trials_in
-from coartic.tasks.families import instance_of, named_by, own_families
+from coartic.tasks.families import instance_of, named_by, own_families, read_family
 from coartic.tasks.task import address_of, check_task
 
 
@@ -28,6 +34,14 @@ def task_or_name(value: Any) -> Task | str:
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise error_saying(f"{value!r} is no task; it should be a name, a path or a task")
+
+
+def runs_asked(value: Any) -> int | range | None:
+    """Return a number of runs, a range of runs, or None."""
+    try:
+        return None if value is None else number_or_range("runs", value, "range(50, 100)")
+    except ValueError as error:
+        raise error_saying(str(error)) from None
 
 
 JobOf = Callable[..., Job]
@@ -48,11 +62,13 @@ class Request(FileData):
     """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite.
     A method that the suite does not have is run on every task of the suite that it applies to."""
     method_files: _Files = ()
-    """Files with your own methods."""
+    """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
+    all methods of the file run, together with the others."""
     family_files: _Files = ()
     """Files with your own families."""
-    runs: Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True), _plain] | None = None
-    """Runs of each cell; by default the number of the suite."""
+    runs: Annotated[Any, PlainValidator(runs_asked)] = None
+    """Number of runs of each cell; by default the number of the suite. A range such as
+    ``range(50, 100)`` is a part of the runs, for a job of an array."""
     trials: Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True), _plain] | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
     suite."""
@@ -104,9 +120,11 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     """Return the jobs that a request asks for.
 
     Raises CoarticError for unknown names, for a task whose name is taken, for parameters that a
-    method does not take, for more than :data:`MOST_CELLS` cells, and if nothing is left to run.
+    method does not take, for more than :data:`MOST_CELLS` cells, and for a name or an option
+    without effect.
     """
-    methods = [registered[m] for name in request.methods for m in methods_named(name, registered)]
+    asked = {name: methods_named(name, registered) for name in request.methods}
+    asked |= {name: [name] for name in unnamed_methods(suite, [*asked.values()], registered)}
     names, own, task_named = asked_tasks(suite, request)
     job = partial(job_of, suite, request)
     of_suite = suite_jobs(suite, registered, own, task_named, job)
@@ -116,21 +134,65 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
             f"suite {suite.name!r} asks for more than {MOST_CELLS:_} combinations "
             "(tasks x moves x methods x grid)"
         )
+    ids = dict.fromkeys(itertools.chain(*asked.values()))
+    if not request.methods:
+        ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
+    methods = [registered[name] for name in ids]
     jobs += extra_jobs(jobs, own, methods, job)
-    there = dict.fromkeys([*(each.cell.task.name for each in jobs), *own])
+    there = {each.cell.task.name: each.cell.task for each in jobs} | own
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
         words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
         raise CoarticError("\n".join(words))
-    methods = methods or [*{each.cell.method.name: each.cell.method for each in jobs}.values()]
-    ids = {method.name for method in methods}
     jobs = [each for each in jobs if not names or each.cell.task.name in names]
     chosen = [each for each in jobs if each.cell.method.name in ids]
     busy = {each.cell.task.name for each in chosen}
-    if not busy.issuperset(own) or not chosen:
-        idle = [task for task in own.values() if task.name not in busy]
+    if idle := [there[name] for name in names if name not in busy]:
         raise CoarticError(why_nothing_runs(suite, idle, methods, jobs))
-    return distinct_jobs(chosen)
+    running = {each.cell.method.name for each in chosen}
+    for wanted in asked.values() or [[*ids]]:
+        if running.isdisjoint(wanted):
+            idle_methods = [registered[name] for name in wanted]
+            raise CoarticError(why_nothing_runs(suite, [], idle_methods, jobs))
+    check_effects(request, chosen)
+    return distinct_jobs([each for each in chosen if each.numbers])
+
+
+def unnamed_methods(
+    suite: Suite, asked: Iterable[Sequence[str]], registered: Registry
+) -> list[str]:
+    """Return the ids of the methods of those files of which neither the suite nor ``asked``, ids
+    that a request names, has a method."""
+    named = {
+        method
+        for block in suite.blocks
+        for name in block.methods
+        for method in methods_named(name, registered)
+    }.union(*asked)
+    files = {registered[method].where for method in named}
+    return [
+        name
+        for name, info in registered.items()
+        if info.where.endswith(".py") and info.where not in files
+    ]
+
+
+def check_effects(request: Request, jobs: Sequence[Job]) -> None:
+    """Raise CoarticError for an option of a request that has no effect on its jobs."""
+    methods = {job.cell.method.name: job.cell.method for job in jobs}
+    if request.trials and not any("trials" in each.defaults for each in methods.values()):
+        raise CoarticError(f"trials has no effect: no parameter of {', '.join(methods)} is trials")
+    if request.runs not in (None, 1) and not any(each.stochastic for each in methods.values()):
+        raise CoarticError(
+            f"runs has no effect: no run of {', '.join(methods)} depends on a seed, so one is made"
+        )
+    for path in request.family_files:
+        family = read_family(path).name
+        if not any(job.cell.task.name.startswith(f"{family}/") for job in jobs):
+            raise CoarticError(
+                f"{path} has no effect: no instance of {family} is among the tasks. Name some, "
+                f"such as {family}/i000..i009"
+            )
 
 
 def asked_tasks(
@@ -201,17 +263,17 @@ def suite_jobs(
 def extra_jobs(
     jobs: Sequence[Job], own: Mapping[str, Task], methods: Sequence[MethodInfo], job: JobOf
 ) -> Iterator[Job]:
-    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: its methods that the
-    suite does not have on the tasks of the suite, and the tasks that it brings with its methods, or
-    with all methods of the suite."""
+    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
+    does not have on the tasks of the suite, and all methods on the tasks that the request
+    brings."""
     cells = [each.cell for each in jobs]
-    of_suite = {cell.method.name: cell.method for cell in cells}
+    of_suite = {cell.method.name for cell in cells}
     tasks = {cell.task.name: cell.task for cell in cells if cell.task.name not in own}
     there = {(cell.task.name, cell.label) for cell in cells}
     new = [method for method in methods if method.name not in of_suite]
     for task, method in (
         *itertools.product(tasks.values(), new),
-        *itertools.product(own.values(), methods or of_suite.values()),
+        *itertools.product(own.values(), methods),
     ):
         if (task.name, method.name) not in there and method.why_not(task) is None:
             yield job(task, method)
@@ -226,10 +288,15 @@ def job_of(
     runs: int | None = None,
 ) -> Job:
     """Return the job of a method with parameters on a task. Numbers of the request go before
-    ``runs``, the number of a block, and before the numbers of the suite."""
-    trials = request.trials or suite.trials
-    cell = cell_of(task, method, parameters or {}, trials, request.trial_budget)
-    numbers = range((request.runs or runs or suite.runs) if method.stochastic else 1)
+    ``runs``, the number of a block, before ``parameters``, and before the numbers of the suite. Of
+    a range of runs, a method that is not stochastic has run 0, if it is in the range."""
+    trials, parameters = request.trials or suite.trials, {**(parameters or {})}
+    if request.trials:
+        parameters.pop("trials", None)
+    cell = cell_of(task, method, parameters, trials, request.trial_budget)
+    asked = request.runs or runs or suite.runs
+    numbers = asked if isinstance(asked, range) else range(asked)
+    numbers = numbers if method.stochastic else range(numbers.start, 1)
     limit_s = request.time_limit_s or suite.time_limit_s
     return Job(cell, request.seed, numbers, limit_s, suite.name)
 
@@ -238,7 +305,7 @@ def why_nothing_runs(
     suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], jobs: Sequence[Job]
 ) -> str:
     """Return a sentence that says why methods have nothing to run: on the first task of ``idle``,
-    the tasks of the request without a job, or else on the tasks of ``jobs``."""
+    tasks that a request names and that have no job, or else on the tasks of ``jobs``."""
     tasks = idle[:1] or list({job.cell.task.name: job.cell.task for job in jobs}.values())
     reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)
     there_is = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "nothing there"

@@ -8,12 +8,14 @@ group. If the common folder is removed or full, answers are lost, and the suite 
 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
 used up its limit: other work on the machine changes no result. The CPU time of processes that a
-method starts is not counted. A job that waits forever is ended later, by wall time.
+method starts is not counted. A job that waits forever is ended later, by wall time, and repeated
+once: the machine may have slept.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import math
 import multiprocessing
@@ -50,10 +52,11 @@ _LAST_LINES = 3  # last lines of a dead process's output in a reason
 _PRINTED = 4000  # bytes of the output that are read
 _STARTS = 5  # processes in a row that end before their first job: then the suite ends
 _UNKEPT = 74  # exit code of a process that could not write its answer
-_REPEATED = (-9, 255, _UNKEPT)  # exit codes (killed, lost server) that repeat a job once
+_REPEATED = (None, -9, 255, _UNKEPT)  # exit codes (late, killed, lost server): repeat a job once
 _IDLE_S = 60.0  # longest wait of a process for jobs
 _END_S = 1.0  # time for a killed process to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
+MORE_FILES = "after `ulimit -n 1024`, which allows more open files"
 _BEGUN, _SAID = "begun", "said"  # files among the answers of a process
 
 
@@ -61,8 +64,10 @@ class Local:
     """An executor: processes on this machine, ``jobs`` at once, by default one a core.
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
-    times that in wall time plus ``timeout_s``. ``verbose`` shows what methods print and log, and
-    their tracebacks.
+    times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
+    time is repeated once, and then its runs are kept as crashed, which the next command performs
+    again. The time in which coartic's kernels are compiled does not count. ``verbose`` shows
+    what methods print and log, and their tracebacks.
     """
 
     def __init__(self, jobs: int = -1, *, timeout_s: float = 60.0, verbose: bool = False) -> None:
@@ -147,9 +152,10 @@ class Workers:
                     waiting.extendleft(part for part in (rest[alone:], rest[:alone]) if part)
         except OSError as error:
             place = f" ({error.filename})" if error.filename else ""
+            what = f"worker processes have no place for answers: {error.strerror or error}{place}"
+            how = MORE_FILES if error.errno == errno.EMFILE else "with a TMPDIR that has room"
             raise CoarticError(
-                f"worker processes have no place for answers: {error.strerror or error}{place}. "
-                "Finished runs are kept: repeat the command, with a TMPDIR that has room"
+                f"{what}. Finished runs are kept: repeat the command, {how}"
             ) from None
         finally:
             for worker in workers:
@@ -253,8 +259,8 @@ class Worker:
         """Return the outcomes of the current job of a process that has ended or is late."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None:
-            reason = f"wall time limit of {self.wall_limit_s:g} s exceeded"
-            return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
+            reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
+            return fail(job, "crashed", reason, wall_s=self.wall_limit_s)
         if exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME:
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
@@ -364,6 +370,11 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 def start_process(process: Any) -> None:
     """Start a process of :data:`CONTEXT` with one thread for BLAS, without running the main program
     again in it. Raises OSError or EOFError if the process does not start."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        text = "the working folder was removed; change to another folder"
+        raise FileNotFoundError(errno.ENOENT, text) from None
     # Without PYTHONSAFEPATH Python imports from the working folder first, whoever wrote it.
     safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     main = sys.modules["__main__"]

@@ -22,26 +22,13 @@ from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, plain, unknown
 from coartic.internal.toml_files import check_file
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
+from coartic.method import MODULES
 from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
 
 RESERVED = (METHOD_PREFIX, "optimum/")
 """Beginnings of ids that have a meaning in every table; they are reserved for built-in methods."""
 NAMES = ("CMA-ES", "learner", "optimum")
 """Names of built-in methods that an id of another method must not repeat."""
-MODULES = (
-    "coartic.learner.method",
-    "coartic.baselines.corrective_alone",
-    "coartic.baselines.random_search",
-    "coartic.baselines.hill_climbing",
-    "coartic.baselines.cma_es",
-    "coartic.baselines.nullspace_qp",
-    "coartic.baselines.posture_qp",
-    "coartic.baselines.posture_based",
-    "coartic.baselines.trajectory_optimisation",
-    "coartic.baselines.receding_horizon",
-    "coartic.baselines.optimum",
-)
-"""Modules of the built-in methods, each with a list ``METHODS``."""
 
 
 Registry = Mapping[str, MethodInfo]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import zip_longest
@@ -10,10 +11,12 @@ from pathlib import Path
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.scoring import score
+from coartic.benchmarks.worker import OWN_GENERATOR
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import plain, unknown
 from coartic.method import Meter
+from coartic.motion.solution import hint_of
 from coartic.runs.plan import Job
 from coartic.runs.record import PARTS, Run, execute_all
 from coartic.runs.store import RUNS_FILE, open_store
@@ -31,6 +34,12 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
             f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c: "
             "column run_ids of a report's tables names the runs of each row."
         )
+    try:
+        os.scandir(folder).close()
+    except OSError as error:
+        raise CoarticError(
+            f"cannot read {folder}: {error.strerror}. Name a folder with --in."
+        ) from None
     folder_of: dict[str, Path] = {}
     for path in sorted(folder.rglob(RUNS_FILE)):
         with open_store(path.parent) as store:
@@ -111,6 +120,35 @@ def perform_some_again(
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]
     for run in chosen:
         yield run.id, compare_runs(run, perform_again(run, registered))
+
+
+def doubts_of(run: Run) -> Iterator[str]:
+    """Yield what is doubtful about a method, in words, from one of its runs, which is made again
+    after a run with another seed, in a new process."""
+    name, task = run.cell.method.name, run.cell.task.name
+    advice = f"see: coartic check {name}"
+    if hint := hint_of(run.solution.movements):
+        yield f"{name} on {task}: {hint}"
+    if OWN_GENERATOR in run.outcome.used:
+        yield f"{name} is declared not to be stochastic, but makes {OWN_GENERATOR}; {advice}"
+    jobs = [replace(run.job, numbers=(number,)) for number in (run.number + 1, run.number)]
+    other, again = perform_in_order(jobs)
+    for change in compare_runs(run, again)[:1]:
+        yield (
+            f"{name} gives another result on {task} with the same seed after another run "
+            f"({change}): it keeps something, or draws from a generator without a seed; {advice}"
+        )
+    changes = compare_runs(run, other)
+    if changes and not run.cell.method.stochastic:
+        yield (
+            f"{name} is declared not to be stochastic, but another seed gives another result on "
+            f"{task} ({changes[0]}); {advice}"
+        )
+    if run.cell.method.stochastic and not changes:
+        yield (
+            f"{name} gives the same result on {task} with another seed, so its runs are one: take "
+            "random numbers from session.rng, or declare stochastic = False"
+        )
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:

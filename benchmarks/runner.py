@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import command, current_environment, now
+from coartic.benchmarks.reproduce import doubts_of
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
@@ -167,7 +170,9 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    An interruption keeps finished runs; the next call performs the missing runs.
+    An interruption keeps finished runs; the next call performs the missing runs. Of each method of
+    a file, a run is made again after a run with another seed; if the results differ, or targets
+    may be meant in degrees, it warns.
 
     Parameters
     ----------
@@ -207,7 +212,7 @@ def perform(
             progress.waiting[job.cell.method.name] += len(job.numbers)
         progress.workers = executor.workers
         watch(progress, None)
-        jobs = divided(missing, executor.workers)
+        jobs, first = divided(missing, executor.workers), dict[str, Run]()
         while jobs:
             alone: list[Job] = []
             with closing(executor.perform(jobs)) as answers:  # ends workers after an error here
@@ -218,9 +223,13 @@ def perform(
                         runs = [run for run in runs if run.outcome.status in _SURE]
                     store.write(runs)
                     for run in runs:
+                        if run.outcome.status == "ok" and not run.cell.method.is_ours:
+                            first.setdefault(run.cell.method.name, run)
                         progress.finish(run)
                         watch(progress, run.cell)
             jobs = alone
+        for doubt in chain.from_iterable(map(doubts_of, first.values())):
+            warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
 
@@ -235,6 +244,8 @@ def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
         job = plan[position]
+        if number not in job.numbers:
+            continue
         longer = had_s is not None and (job.time_limit_s is None or job.time_limit_s > had_s)
         failed = status == "crashed" or (status == "timeout" and longer)
         if not (job.cell.method.where and failed):

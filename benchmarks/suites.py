@@ -133,7 +133,7 @@ def kind_of(name: str) -> str:
     if name.endswith(".py"):
         return "method file"
     if not name.endswith(".toml"):
-        return "results folder" if (Path(name) / RUNS_FILE).is_file() else ""
+        return "results folder" if os.path.isfile(Path(name) / RUNS_FILE) else ""
     content = read_toml(Path(name))
     keys = {"blocks": "suite", "region": "family", "goals": "task"}  # a key that only this kind has
     return next((kind for key, kind in keys.items() if key in content), "")

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import json
 import logging
+import random
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +22,7 @@ from pydantic import TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
+from coartic.internal.limits import real_array
 from coartic.internal.text import error_line
 from coartic.method import (
     Information,
@@ -45,8 +48,8 @@ def plain_movement(movement: Movement) -> Movement:
         int(movement.goal),
         str(movement.hand),  # type: ignore[arg-type]
         str(movement.kind),  # type: ignore[arg-type]
-        None if target is None else np.array(target, dtype=np.float64),
-        waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
+        None if target is None else real_array("a target", target),
+        waypoints=None if waypoints is None else real_array("a path", waypoints),
     )
 
 
@@ -107,6 +110,50 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
 
+OWN_GENERATOR = "a generator of its own"
+"""Among what a run used: its method, which is declared not to be stochastic, made a generator of
+random numbers, or seeded one. Generators of NumPy and of Python's own module are seen."""
+_MAKERS = (
+    *((np.random, name) for name in ("default_rng", "RandomState", "seed")),
+    *((random, name) for name in ("Random", "seed")),
+)
+_generators = list[str]()
+"""Names of the makers that the present run has called."""
+
+
+@contextmanager
+def seeing_generators(sees: bool) -> Iterator[None]:
+    """Note the generators of random numbers that are made in this block, if ``sees``."""
+    _generators.clear()
+    with ExitStack() as stack:
+        for module, name in _MAKERS if sees else ():
+            maker = getattr(module, name)
+            stack.callback(setattr, module, name, maker)
+            setattr(module, name, noting(maker))
+        yield
+
+
+def noting(maker: Any) -> Any:
+    """Return a function or class that does what a maker of generators does, and notes its calls."""
+
+    def note(*args: Any, **options: Any) -> Any:
+        _generators.append(maker.__name__)
+        return maker(*args, **options)
+
+    class Noting(type):
+        """Type of a class that notes when it is called, and has the instances of the maker."""
+
+        def __call__(cls, *args: Any, **options: Any) -> Any:
+            _generators.append(maker.__name__)
+            return super().__call__(*args, **options)
+
+        def __instancecheck__(cls, thing: Any) -> bool:
+            is_maker = cls.__bases__ == (maker,)
+            return isinstance(thing, maker) if is_maker else super().__instancecheck__(thing)
+
+    return Noting(maker.__name__, (maker,), {}) if isinstance(maker, type) else note
+
+
 def perform_job(job: Job) -> list[Outcome]:
     """Perform a job. An error of the method is an outcome."""
     cell, name = job.cell, job.cell.method.name
@@ -128,18 +175,19 @@ def perform_job(job: Job) -> list[Outcome]:
     _seen.add(name)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
     try:
-        method = cell.method.configure(cell.parameters)
-        results: Sequence[Any]
-        if (reason_not := method.why_not(outline_of(cell.task))) is not None:
-            raise MethodError("infeasible", str(reason_not))
-        if len(sessions) == 1:
-            results = [method.solve(sessions[0])]
-        else:
-            results = method.solve_together(sessions)
+        with seeing_generators(not (cell.method.is_ours or cell.method.stochastic)):
+            method = cell.method.configure(cell.parameters)
+            results: Sequence[Any]
+            if (reason_not := method.why_not(outline_of(cell.task))) is not None:
+                raise MethodError("infeasible", str(reason_not))
+            if len(sessions) == 1:
+                results = [method.solve(sessions[0])]
+            else:
+                results = method.solve_together(sessions)
         made = trials_outside() - made
         if made and not cell.method.is_ours:
             text = f"the method made {made} trials outside its session, which are not counted"
-            raise UndeclaredError(f"{text}: by coartic.objective, learn or execute")
+            raise UndeclaredError(f"{text}: by coartic.objective, learn, execute or an environment")
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -157,7 +205,10 @@ def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) 
     """Return the outcome of a run from the result of its method, or from the error that the method
     raised."""
     spent: dict[str, Any] = {
-        "used": tuple(sorted(item.value for item in session.used)),
+        "used": (
+            *sorted(item.value for item in session.used),
+            *[OWN_GENERATOR][: len(_generators)],
+        ),
         "meter": session.meter,
         "rewards": session.rewards,
         "times": times,

@@ -24,7 +24,7 @@ MARKERS: dict[Hand, dict[str, Any]] = {
     "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": WHITE},
     "right": {"marker": "o", "markersize": 2.6},
 }
-_CROWDED = 0.6  # length unit: a goal that near above another has its number
+_CROWDED = 0.6  # times the robot's scale: a goal that near above another has its number
 
 
 def draw_robot(
@@ -90,7 +90,8 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
     """Write the number of every goal above it, or below where another goal is close above."""
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
-    close = (np.abs(right) < _CROWDED / 2) & (up > 0) & (up < _CROWDED)
+    crowded = _CROWDED * task.robot.scale
+    close = (np.abs(right) < crowded / 2) & (up > 0) & (up < crowded)
     for index, ((x, y), below) in enumerate(zip(task.goals, close.any(axis=1), strict=True), 1):
         side = -1 if below else 1
         axes.annotate(
@@ -105,8 +106,9 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
 def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
     """Lower left and upper right corner of a box with the goals and the robot, length unit.
 
-    ``configurations`` are the robot's, shape ``(n, dof)``.
+    ``configurations`` are the robot's, shape ``(n, dof)``; ``margin`` is for arms of length 4.
     """
+    margin *= task.robot.scale
     points = [
         task.goal_array + np.array([0, 2 * task.radius]),
         task.robot.base_outline(configurations),

@@ -23,6 +23,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from coartic.internal.limits import refuse_mask
 from coartic.robot import Array
 
 CONFIDENCE = 0.95
@@ -71,10 +72,12 @@ class Estimate:
 
 
 def vector(values: ArrayLike) -> Array:
-    """A sample as a vector (n,). Raises ValueError where it is empty or holds NaN or infinity.
+    """A sample as a vector (n,). Raises ValueError where it is empty or holds NaN, infinity or
+    masked values.
 
     Runs without a solution have no reward: the caller decides what becomes of them.
     """
+    refuse_mask("a sample", values)
     sample = np.asarray(values, dtype=np.float64)
     if sample.ndim != 1 or sample.size == 0 or not np.isfinite(sample).all():
         raise ValueError("a sample is a vector of at least one value, all of them finite")

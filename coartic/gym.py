@@ -22,18 +22,18 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
-from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 from numpy.typing import ArrayLike, NDArray
 
-from coartic.errors import NotApplicableError
+from coartic.errors import CoarticError, NotApplicableError
 from coartic.estimates import Estimate, mean
 from coartic.gym_kernel import VectorState, observe, step_robots
-from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
+from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import unknown
 from coartic.method import Method, MethodError, run_method
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import robot_parameters
 from coartic.motion.solution import execute, initial_reward
+from coartic.motion.trial import count_trials
 from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 
 REACH = 0.5
 """Half the width of the box of targets, length unit (base) and rad (angles)."""
+ADDED = ("OrderEnforcing", "PassiveEnvChecker", "Monitor", "VecMonitor")
+"""Wrappers that the libraries add by themselves; they change neither observations nor actions."""
 RowIndex = NDArray[np.int64] | slice
 
 
@@ -221,16 +223,18 @@ class TaskVectorEnv(Recorded, VectorEnv):
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
         of these rows.
 
-        Raises ValueError for actions of another shape, or with NaN.
+        Raises ValueError for actions of another shape, or that are not finite.
         """
         chosen, shape = real_array("actions", actions), self.state.actions[rows].shape
         if chosen.shape != shape:
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
+        if not np.isfinite(chosen).all():
+            row = int(np.argmin(np.isfinite(chosen).all(axis=1)))
+            which = f" of robot {np.arange(self.num_envs)[rows][row]}" if self.num_envs > 1 else ""
+            raise ValueError(f"the action{which} is not finite; it must be numbers")
         self.state.actions[rows] = chosen
-        refused = step_robots(*self.state)
-        if refused >= 0:
-            which = f" of robot {refused}" if self.num_envs > 1 else ""
-            raise ValueError(f"the action{which} has NaN; it must be numbers")
+        count_trials(int(np.count_nonzero(self.state.going & (self.state.goal == 0))))
+        step_robots(*self.state)
 
     def infos(self) -> dict[str, Any]:
         """Names of tasks, and whether all goals are hit."""
@@ -323,7 +327,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         state = self.robots.state
         if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
-        self.robots.move(np.asarray(action)[None])
+        self.robots.move(real_array("action", action)[None])
         return state.seen[0].copy(), state.rewards.item(), not state.going[0], False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -362,7 +366,7 @@ def whole_seed(seed: Any) -> int | None:
     """A seed as Gymnasium takes it. Raises ValueError for anything else."""
     if seed is None:
         return None
-    check_limits("seed", seed, 0, 2**128 - 1)
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
     return int(seed)
 
 
@@ -388,8 +392,13 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     ------
     ValueError, TypeError
         The id is none of coartic's, or an option is wrong.
+    CoarticError
+        Stable-Baselines3 is not installed.
     """
-    from coartic.sb3 import RobotEnvs
+    try:
+        from coartic.sb3 import RobotEnvs
+    except ImportError:
+        raise CoarticError("coartic.gym.sb3 needs: pip install 'coartic[rl]'") from None
 
     return RobotEnvs(TaskVectorEnv(num_envs, **known_env(env) | options))
 
@@ -423,7 +432,9 @@ def score(
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
-        benchmark, such as a planner, that solves each task. A mapping has several, by their names.
+        benchmark, such as a planner, that solves each task. For an agent that was trained in
+        ``VecNormalize``, observations are normalised as there. A mapping has several, by their
+        names.
     episodes : int
         Trials of random actions on each task.
     seed : int
@@ -436,15 +447,17 @@ def score(
     DataFrame
         A row for each policy, for uniformly random actions, for the corrective process alone with
         the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
-        over tasks, ticks; ``gap`` to the best known reward, per cent, with its 95 % interval
+        over tasks, ticks; ``gap`` to the best known reward, a share of it, with its 95 % interval
         ``gap_low`` to ``gap_high`` (BCa bootstrap) over tasks, or of one task over trials;
-        ``completed``, the share of trials that hit all goals. The others are left out of the means.
-        NaN where nothing is known, or too few trials for an interval.
+        ``completed``, the share of trials that hit all goals: where it is below 1, reward and gap
+        are NaN. NaN also where nothing is known, or too few trials for an interval.
+        ``attrs["units"]`` has the units.
 
     Raises
     ------
     ValueError, TypeError
-        The environment is none of coartic's, an option is wrong, or the policy is no policy.
+        The environment is none of coartic's or has a wrapper, an option is wrong, or the policy is
+        no policy, or an agent that was trained in another wrapper.
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
     given = (known_env(env) if isinstance(env, str) else options_of(env)) | options
@@ -475,16 +488,33 @@ def column(rewards: Iterable[float | None]) -> Array:
 
 
 def acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a policy as a function of observations. Raises TypeError for anything that is no
-    policy."""
+    """Return a policy as a function of observations, which an agent that was trained in
+    ``VecNormalize`` sees as there. Raises TypeError for anything that is no policy, and for an
+    agent that was trained in another wrapper."""
     if hasattr(policy, "predict"):
-        return lambda seen: policy.predict(seen, deterministic=True)[0]
+        normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
+        get_env = getattr(policy, "get_env", lambda: None)
+        env = without_wrappers(get_env(), "the agent's environment", normal)
+        for each in getattr(env, "envs", ()):
+            without_wrappers(each, "the agent's environment")
+        see = normal.normalize_obs if normal else np.asarray
+        return lambda seen: policy.predict(see(seen), deterministic=True)[0]
     if callable(policy):
-        return policy  # type: ignore[no-any-return]
+        return lambda seen: without_state(policy(seen))
     raise TypeError(
         f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
         "with predict, or a Method"
     )
+
+
+def without_state(actions: Any) -> ArrayLike:
+    """Return actions. Raises TypeError for the pair that an agent's ``predict`` returns."""
+    if isinstance(actions, tuple):
+        raise TypeError(
+            f"the policy returned a tuple of {len(actions)}; needed are the actions alone, which "
+            "are the first entry of what an agent's predict returns"
+        )
+    return actions  # type: ignore[no-any-return]
 
 
 def rollout(
@@ -510,17 +540,21 @@ def rollout(
 def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
     """Compare rewards of policies, shapes ``(K, trials)``, with the best known rewards, shape
     ``(K, 1)``, as :func:`score` returns them."""
-    rows = {}
+    rows, known = {}, np.isfinite(best[:, 0])
     for name, earned in {**rewards, "best known": best}.items():
-        gap = pd.DataFrame(100.0 * (best - earned) / np.abs(best))
-        values = (gap.iloc[0] if len(gap) == 1 else gap.mean(axis=1)).dropna()
+        gap = ((best - earned) / np.abs(best))[known]
+        values = gap.ravel() if len(best) == 1 else gap.mean(axis=1)
+        usable = len(values) > 0 and np.isfinite(values).all()
         rows[name] = {
-            "reward": pd.DataFrame(earned).mean(axis=1).mean(),
-            **(mean(values) if len(values) else Estimate(np.nan)).columns("gap"),
+            "reward": earned.mean(axis=1).mean(),
+            **(mean(values) if usable else Estimate(np.nan)).columns("gap"),
             "completed": float(np.isfinite(earned).mean()),
         }
     rows["best known"]["completed"] = np.nan
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("policy")
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("policy")
+    gaps = dict.fromkeys(["gap", "gap_low", "gap_high"], "share of the best known reward")
+    table.attrs["units"] = {"reward": "ticks", **gaps, "completed": "share of trials"}
+    return table
 
 
 def options_of(env: Any) -> dict[str, Any]:
@@ -529,16 +563,23 @@ def options_of(env: Any) -> dict[str, Any]:
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
-    while isinstance(env, gymnasium.Wrapper | VectorWrapper):
-        if not isinstance(env, OrderEnforcing | PassiveEnvChecker):  # which make adds
+    env = without_wrappers(env, "env")
+    options: dict[str, Any] = (env.robots if isinstance(env, TaskEnv) else env).options
+    return options
+
+
+def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
+    """The environment in wrappers of Gymnasium and of Stable-Baselines3. Raises TypeError for a
+    wrapper that is neither ``known`` nor added by these libraries themselves."""
+    while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
+        if env is not known and type(env).__name__ not in ADDED:
             raise TypeError(
-                f"env is wrapped in {type(env).__name__}, which score would leave out: give the "
+                f"{name} is wrapped in {type(env).__name__}, which score would leave out: give the "
                 "environment without wrappers (env.unwrapped), and a policy that does to "
                 "observations and actions what they do"
             )
-        env = env.env
-    options: dict[str, Any] = (env.robots if isinstance(env, TaskEnv) else env).options
-    return options
+        env = env.venv if hasattr(env, "venv") else env.env
+    return env
 
 
 def reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:

@@ -198,17 +198,10 @@ def observe(*fields: Any) -> None:
 
 
 @entry
-def step_robots(*fields: Any) -> int:
-    """Let all robots whose trial goes on reach for their next goal.
-
-    Returns -1; or, and then nothing is done, the number of a robot whose action has NaN.
-    """
+def step_robots(*fields: Any) -> None:
+    """Let all robots whose trial goes on reach for their next goal."""
     state = VectorState(*fields)
     last = len(state.task) - 1
-    for n in range(last + 1):
-        for figure in state.actions[n]:
-            if math.isnan(figure):
-                return n
     for kind in range(len(state.parameters)):  # robots of a kind are moved together
         count = 0
         for n in range(last + 1):
@@ -219,4 +212,3 @@ def step_robots(*fields: Any) -> int:
                 step_lot(count, state.parameters[kind], state)
                 count = 0
     observe(*state)
-    return -1

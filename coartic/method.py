@@ -9,6 +9,7 @@ solution itself.
 
 from __future__ import annotations
 
+import sys
 import time
 from abc import ABC, abstractmethod
 from array import array
@@ -17,6 +18,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from itertools import chain
 from threading import RLock
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -25,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
+from coartic.internal.limits import MOST_RUN_SEED, check_limits, real_array
 from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import Correction, correct
@@ -39,7 +42,6 @@ from coartic.motion.trial import (
     hand_codes,
     inside,
     make_trials,
-    note_trials,
     search_initial_hands,
     too_many_sequences,
     trials_of,
@@ -375,7 +377,7 @@ class Session:
             hand,
             self._task.goals[goal - 1],
             locked_base=self._task.locked_base,
-            model=self.model,
+            model=self.model.for_radius(self._task.radius),
         )
         self._meter.add(
             corrective_iterations=correction.iterations,
@@ -396,8 +398,8 @@ class Session:
         self.check_solution(solution)
         with self.lock:
             self._affordable(1)
-            note_trials(0 if self._of_run else 1)
-            (execution,) = execute_many(self._compiled, [solution])
+            with inside(self._of_run):
+                (execution,) = execute_many(self._compiled, [solution])
             if isinstance(execution, Exception):
                 raise execution
             self._count(
@@ -437,6 +439,7 @@ class Session:
         if np.isnan(given.min(initial=0.0)) and np.isnan(given).all(axis=2).any():
             self._use(Information.CORRECTIVE_PROCESS)
         codes = hand_codes(self._task, hands, len(given))
+        until = None if until is None else real_array("until", until)
         with self.lock:
             left = self._affordable(len(given))
             accounts = self.make_trials(codes[:left], given[:left], until=until)
@@ -476,8 +479,8 @@ class Session:
     ) -> Accounts:
         """Make trials that fit the task and the budget, as :meth:`trials` does, with hands of shape
         ``(N, G)``."""
-        note_trials(0 if self._of_run else len(targets))
-        accounts = make_trials(self._compiled, codes, targets[:, :, None])
+        with inside(self._of_run):
+            accounts = make_trials(self._compiled, codes, targets[:, :, None])
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]
             if better.any():
@@ -653,6 +656,22 @@ class Method(ABC):
         return results
 
 
+MODULES = (
+    "coartic.learner.method",
+    "coartic.baselines.corrective_alone",
+    "coartic.baselines.random_search",
+    "coartic.baselines.hill_climbing",
+    "coartic.baselines.cma_es",
+    "coartic.baselines.nullspace_qp",
+    "coartic.baselines.posture_qp",
+    "coartic.baselines.posture_based",
+    "coartic.baselines.trajectory_optimisation",
+    "coartic.baselines.receding_horizon",
+    "coartic.baselines.optimum",
+)
+"""Modules of the built-in methods, each with a list ``METHODS``."""
+
+
 def run_method(
     method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
 ) -> tuple[Result, Session]:
@@ -686,9 +705,13 @@ def run_method(
         It uses information that it does not declare.
     NotApplicableError
         It does not apply to the task.
+    ValueError
+        The seed is no whole number from 0.
     """
-    is_ours = type(method).__module__.startswith(("coartic.baselines.", "coartic.learner."))
-    session = Session(as_task(task), seed, method.information, model=model, trusted=is_ours)
+    built_in = [getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES]
+    is_ours = type(method) in chain.from_iterable(built_in)
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    session = Session(as_task(task), int(seed), method.information, model=model, trusted=is_ours)
     result = method.solve(session)
     session.check_solution(result.solution)
     return result, session

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from coartic.internal.limits import brief_value, check_limits
+
+PAPER_RADIUS = 0.1
+"""θ^g of the paper's tasks, length unit."""
 
 
 class MotionModel(NamedTuple):
@@ -19,20 +21,45 @@ class MotionModel(NamedTuple):
     """m: length of one movement step in joint space, in which a length unit of the base counts as
     much as a rad of a joint (published)."""
 
-    arrival_tolerance: float = 0.01
-    """θ^a: distance at which a hand has arrived, length unit (inferred; the
-    extracted text has 0.1, which does not give the published rewards)."""
+    arrival_tolerance: float | None = None
+    """θ^a: distance at which a hand has arrived, length unit; None for a tenth of the goals'
+    radius, 0.01 in the paper's tasks (inferred; the extracted text has 0.1, which does not give the
+    published rewards)."""
 
     gain: float = 0.05
     """α: step size of the corrective process, ``q += α Jᵀ e`` (published). For the base it has no
     unit; for the joints it is rad per squared length unit, which cancels the unit of ``Jᵀ e``."""
 
-    correction_tolerance: float = 0.01
-    """Distance to the goal's centre at which the corrective process ends, length
-    unit (inferred to be θ^a; the caption of Figure 2 has θ^g)."""
+    correction_tolerance: float | None = None
+    """Distance to the goal's centre at which the corrective process ends, length unit; None for a
+    tenth of the goals' radius (inferred to be θ^a; the caption of Figure 2 has θ^g)."""
 
     max_iterations: int = 20_000
     """Corrective iterations after which a trial has failed (our bound)."""
+
+    def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
+        """Return the model with tolerances that are numbers.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the goals, length unit; the default is the paper's.
+
+        Returns
+        -------
+        MotionModel
+            The constants; a tolerance of None is a tenth of the radius.
+        """
+        arrival, correction = self.tolerances(radius)
+        return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
+
+    def tolerances(self, radius: float) -> tuple[float, float]:
+        """Return the tolerances of arrival and correction for goals of a radius, length unit."""
+        tenth, arrival, correction = radius / 10, self.arrival_tolerance, self.correction_tolerance
+        return (
+            tenth if arrival is None else arrival,
+            tenth if correction is None else correction,
+        )
 
 
 PAPER = MotionModel()
@@ -41,7 +68,7 @@ _BOUNDS = {
     "arrival_tolerance": (0.0, 1e6),
     "gain": (1e-6, 1e6),
     "correction_tolerance": (1e-6, 1e6),
-    "max_iterations": (0, math.inf),
+    "max_iterations": (0, 10**9),
 }
 
 
@@ -55,10 +82,13 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")
     for name, (least, most) in _BOUNDS.items():
-        check_limits(f"model.{name}", getattr(model, name), least, most)
-    if radius is not None and model.correction_tolerance >= radius:
+        value = getattr(model, name)
+        if value is not None or not name.endswith("_tolerance"):
+            check_limits(f"model.{name}", value, least, most)
+    if radius is not None and (model.correction_tolerance or 0.0) >= radius:
         raise ValueError(
             f"model.correction_tolerance {model.correction_tolerance} is not below the goals' "
-            f"radius {radius}: the corrective process would end outside the goal"
+            f"radius {radius}, so the corrective process would end outside the goal; None is a "
+            "tenth of the radius"
         )
     return model

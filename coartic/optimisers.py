@@ -238,10 +238,18 @@ class Objective:
 
     def evaluations_to(self, targets: ArrayLike) -> Any:
         """Evaluations after which the cost was at or below targets: a float, or an array of the
-        shape of ``targets``, ticks; infinite for targets that are not reached so far."""
+        shape of ``targets``, ticks; infinite for targets that are not reached so far.
+
+        Raises ValueError for a target that is no cost, from 0 to ``FAILED``.
+        """
         wanted = real_array("targets", targets)
+        if not ((wanted >= 0) & (wanted <= FAILED)).all():
+            raise ValueError(
+                f"targets are {brief_value(wanted.tolist())}; each must be a cost, the ticks of a "
+                f"trial, from 0 to {FAILED:_}"
+            )
         evaluations, costs = np.array([*self._better, (np.inf, -np.inf)]).T
-        found = evaluations[np.searchsorted(-costs, -np.nan_to_num(wanted, nan=-np.inf))]
+        found = evaluations[np.searchsorted(-costs, -wanted)]
         return float(found) if wanted.ndim == 0 else found
 
     @property
@@ -392,8 +400,8 @@ class Objective:
         made = self._session.make_trials(codes, targets)
         np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self.best_cost:
-            lowest = np.minimum.accumulate(costs)
-            for n in np.flatnonzero(lowest < np.append(self.best_cost, lowest[:-1])).tolist():
+            before = np.minimum.accumulate(np.append(self.best_cost, costs))[:-1]
+            for n in np.flatnonzero(costs < before).tolist():
                 at = self.evaluations + n + 1
                 self._keep(float(costs[n]), at, points[n], codes, made, n)
         self.evaluations += len(points)
@@ -401,7 +409,8 @@ class Objective:
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
-        """Note the best trial so far."""
+        """Note the best trial so far, whose cost is below that of each one before it."""
+        assert cost < self.best_cost
         self.best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
         self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
@@ -434,11 +443,16 @@ class Objective:
         if np.isinf(points).any():
             raise ValueError("points have infinite entries; needed are finite ones")
 
+    @property
+    def trials_left(self) -> int:
+        """Number of trials left."""
+        return self._end - self._session.trials_made
+
     def _trials_left(self, wanted: int) -> int:
         """Return how many of the trials wanted are left. Raises BudgetError if none is."""
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
-        left = self._end - self._session.trials_made
+        left = self.trials_left
         if left <= 0 < wanted:
             raise BudgetError("all trials of the budget are made")
         return min(wanted, left)
@@ -481,7 +495,7 @@ def objective(
         The task cannot be used.
     ValueError
         Hands do not fit, the half width is not from 1e-9 to 100, or the budget is not from 1 to
-        10,000,000.
+        10,000,000, or less than the hand sequences to choose among.
     TypeError
         The model is none, or the task is neither a Task nor a text nor a path.
     MethodError
@@ -494,6 +508,11 @@ def objective(
     reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
     if hands is None and reason:
         raise MethodError("infeasible", f"{reason}; say which hands")
+    if hands is None and budget is not None and budget < (first := len(chosen.hands) ** goals):
+        raise ValueError(
+            f"budget is {budget}; to choose among the hand sequences of task {chosen.name!r} takes "
+            f"{counted(first, 'trial')}: give more, or say which hands"
+        )
     session = Session(chosen, 0, OPTIMISER_INFORMATION, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
 
@@ -577,6 +596,8 @@ class Optimiser(Method):
             raise MethodError("infeasible", "the trial budget leaves no trial to make") from None
         with session.solving(), suppress(BudgetError):
             self.optimise(cost, session.rng)
+        if cost.evaluations == 0 and cost.trials_left > 0:
+            raise MethodError("solver-failed", "optimise ended without evaluating a point")
         return Result(cost.solution, {"evaluations": cost.evaluations})
 
     @abstractmethod

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from coartic.internal.limits import real_array
 from coartic.internal.text import short_repr
 from coartic.internal.validation import in_sentences
 
@@ -115,7 +116,8 @@ class Robot:
     right_shoulder: tuple[Finite, Finite] = (0.5, 0.1)
     """Right shoulder."""
     base_size: tuple[Length, Length] = (1.0, 0.2)
-    """Width and height of the base, which matter for drawings only."""
+    """Width and height of the base, for drawings only. The default is for arms of length 4 and is
+    drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
 
     def __repr__(self) -> str:
         paper = type(self).__dataclass_fields__
@@ -125,6 +127,19 @@ class Robot:
             if getattr(self, name) != paper[name].default
         }
         return short_repr(self, left_links=self.left_links, right_links=self.right_links, **others)
+
+    @cached_property
+    def scale(self) -> float:
+        """Length of the shorter arm compared with the paper's, 4 length units: what is drawn in
+        length units is so much larger."""
+        return min(math.fsum(self.left_links), math.fsum(self.right_links)) / 4.0
+
+    @property
+    def drawn_base(self) -> tuple[float, float]:
+        """Width and height with which the base is drawn, length unit."""
+        width, height = self.base_size
+        is_default = self.base_size == type(self).__dataclass_fields__["base_size"].default
+        return (width * self.scale, height * self.scale) if is_default else (width, height)
 
     @cached_property
     def dof(self) -> int:
@@ -318,7 +333,7 @@ class Robot:
             ``q`` has another shape.
         """
         array = self._configuration(q)
-        half = np.array(self.base_size) / 2
+        half = np.array(self.drawn_base) / 2
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
         return array[..., None, :BASE_DOF] + corners
 
@@ -340,7 +355,7 @@ class Robot:
         return casadi.vertcat(xs[-1], ys[-1])
 
     def _configuration(self, q: ArrayLike) -> Array:
-        array = np.asarray(q, dtype=np.float64)
+        array = real_array("configuration", q)
         if array.ndim == 0 or array.shape[-1] != self.dof:
             raise ValueError(
                 f"configuration has shape {array.shape}; this robot needs (..., {self.dof})"

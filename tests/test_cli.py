@@ -11,16 +11,18 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
-from coartic import __version__, load_task
+from coartic import __version__, corrective_trial, learn, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
 from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, app, draw
 from coartic.cli.terminal import Display
+from coartic.gym import TaskEnv
 from coartic.runs.plan import run_seed
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session
+from tests.support.strategies import metres_task, tiny_task
 from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, cell_on, edit
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
@@ -293,6 +295,18 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
         assert "add --method-file my_search.py" in coartic(command, "my-search")[2]
 
 
+@pytest.mark.parametrize("name", ["class", "random", "3d/search", "numpy", "my-search"])
+def test_a_new_file_can_be_imported_and_hides_no_module(coartic, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    assert coartic("new", name)[0] == 0
+    (file,) = tmp_path.iterdir()
+    assert file.stem.isidentifier()
+    assert file.stem not in {*sys.stdlib_module_names, "numpy"}
+    compile(f"import {file.stem}", "", "exec")
+    code, _, error = coartic("new", "My Search")
+    assert (code, "Mine" in error, "such as 'my-search'" in error) == (2, False, True)
+
+
 def test_help_has_a_short_name(coartic):
     for command in ((), ("run",), ("report",)):
         assert coartic(*command, "-h") == coartic(*command, "--help") == coartic("help", *command)
@@ -456,3 +470,37 @@ def test_a_results_folder_is_no_suite_but_may_have_the_name_of_one(coartic, tmp_
     code, _, error = coartic("run", "again")
     assert code == 2
     assert "again is a results folder: coartic report again" in error
+
+
+@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize("radius", [1e-3, 0.01, 0.3, 1.0])
+def test_a_task_of_any_radius_passes_every_door(coartic, tmp_path, radius):
+    task, file = metres_task(radius, name="arm"), tmp_path / "arm.toml"
+    if radius > 0.2:  # elsewhere, all goals are hit at the start
+        task = tiny_task(name="arm", radius=radius, goals=[[1.0, 2.5], [-1.0, 3.0]])
+    task.save(file)
+    out, page = tmp_path / "runs", tmp_path / "play.html"
+    assert coartic("check", file)[0] == 0
+    assert coartic("draw", file, "--out", tmp_path / "arm.svg")[0] == 0
+    assert coartic("play", file, "--out", page, "--no-open")[0] == 0
+    run = ("run", "comparison", "--tasks", file, "--methods", "EC1,hill-climbing", "--runs", 1)
+    code, _, error = coartic(*run, "--trials", 5, "--out", out)
+    assert (code, "Traceback" in error) == (0, False), error
+    assert coartic("verify", out)[0] == 0
+    stored = load(out).runs
+    assert (stored.status == "ok").all()
+    assert (
+        learn(task, "EC1", seed=0, trials=5).rewards[0]
+        == corrective_trial(task, task.initial_hands).reward
+    )
+    env = TaskEnv(task)
+    env.reset(seed=0)
+    assert env.step(env.action_space.sample())[1] < 0
+
+
+@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize("command", ["run comparison --tasks", "check", "draw", "play", "list"])
+def test_files_of_other_programs_are_refused_in_every_command(coartic, command):
+    code, _, error = coartic(*command.split(), "arm.urdf")
+    assert code == 2
+    assert "arm.urdf: coartic reads no .urdf file; a task is a TOML file" in error

@@ -13,7 +13,7 @@ import pytest
 
 from coartic.benchmarks import syntax
 from coartic.benchmarks.code_identity import code_of, files_of
-from coartic.benchmarks.registry import MODULES
+from coartic.method import MODULES
 from coartic.motion.compile import PACKAGE
 
 FILES = {name.split(".")[-1]: Path(inspect.getfile(importlib.import_module(name)))

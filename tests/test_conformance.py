@@ -3,6 +3,7 @@
 import multiprocessing
 import re
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 
 import pytest
 
@@ -10,7 +11,7 @@ from coartic import load_task
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.worker import perform_job
+from coartic.benchmarks.worker import OWN_GENERATOR, perform_job
 from coartic.runs.plan import Job
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
@@ -113,14 +114,23 @@ def test_what_a_session_shows_cannot_be_written(methods):
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
 
 
-@pytest.mark.parametrize("means", ["objective", "learn", "execute"])
-def test_trials_outside_the_session_are_noticed(methods, means):
+OUTSIDE = {
+    **{"objective": 6, "learn": 9, "execute": 1, "hands": 1, "path": 2, "session": 4},
+    **{"environment": 1, "environments in a thread": 5},
+}
+"""Trials that each way around a session makes."""
+
+
+@pytest.mark.parametrize("means", OUTSIDE)
+def test_trials_outside_the_session_stop_a_run(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
+    if "environment" in means:
+        pytest.importorskip("gymnasium")
     cell = cell_on(load_task("ascending"), methods["test/outsider"], means=means)
     for _ in range(2):
         (outcome,) = perform_job(Job(cell, 0, (0,)))
         assert outcome.status == "crashed"
-        assert "trials outside its session" in outcome.reason
+        assert f"made {OUTSIDE[means]} trials outside its session" in outcome.reason
 
 
 CASES = [
@@ -136,6 +146,8 @@ CASES = [
     ("test/taker", "information", "reveal is for this project's own compiled methods"),
     ("test/freeloader", "information", "used 'corrective process', which it does not declare"),
     ("test/lucky", "determinism", "declared not to be stochastic, but another seed"),
+    ("test/own-generator", "determinism", "on ascending it makes a generator of its own"),
+    ("test/degrees", "solution", "goal 1: the target has the angle"),
     ("test/unhelpful", "failure", "ZeroDivisionError: no goal is that far"),
 ]
 
@@ -145,6 +157,28 @@ def test_each_law_can_be_broken(methods, name, law, finding):
     laws = {each.name: each for each in check_method(methods[name], tasks=FEW_TASKS)}
     assert not laws[law].passed
     assert finding in laws[law].finding
+
+
+def test_a_solution_without_targets_is_asked_about(methods):
+    """As a failed inverse kinematics leaves one; and a method that no seed changes."""
+    method = replace(methods["test/no-target"], stochastic=True)
+    laws = {law.name: law for law in check_method(method, tasks=FEW_TASKS)}
+    asked = "on ascending, only the corrective process moves to goals 1, 2, 3, which have no target"
+    assert asked in laws["solution"].finding
+    assert "another seed gives the same result as well" in laws["determinism"].finding
+
+
+@pytest.mark.parametrize("maker", ["RandomState", "Random", "subclass", "seed", "scipy"])
+def test_generators_of_a_method_that_draws_nothing_are_seen(methods, maker):
+    cell = cell_on(load_task("ascending"), methods["test/own-generator"], maker=maker)
+    (outcome,) = perform_job(Job(cell, 0, (0,)))
+    assert (outcome.status, outcome.used[-1]) == ("ok", OWN_GENERATOR)
+
+
+def test_generators_of_a_method_that_draws_are_its_own_affair(methods):
+    method = replace(methods["test/own-generator"], stochastic=True)
+    (outcome,) = perform_job(Job(cell_on(load_task("ascending"), method), 0, (0,)))
+    assert outcome.used == ("corrective process",)
 
 
 @pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)

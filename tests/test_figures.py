@@ -7,6 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from coartic import drawing, load_task
+from coartic.analysis.figures.plot import FORMATS, for_page, picture
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.learning import learning_curves
@@ -80,3 +81,11 @@ def test_names_and_looks_tell_methods_apart():
     assert brown == {"brown"}
     assert not brown & {color for color, _ in alone}
     assert both["mine"] != both["theirs"]
+
+
+@pytest.mark.parametrize("epoch", ["x", "", "1700000000"])
+def test_a_date_of_the_environment_changes_no_picture(traced, monkeypatch, epoch):
+    plot = FIGURES["learning-curves"](traced)
+    before = [picture(plot.figure, ending) for ending in FORMATS], for_page(plot)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+    assert ([picture(plot.figure, ending) for ending in FORMATS], for_page(plot)) == before

@@ -109,13 +109,84 @@ def test_what_is_no_frame_of_results_is_refused(compute, words):
         compute(pd.DataFrame({"best_known": [-292]}))
 
 
+@pytest.mark.parametrize("column", ["method", "task", "reward", "best_known", "setting", "run"])
+def test_a_column_that_is_there_twice_is_refused(column):
+    frame = small_frame(setting="")
+    twice = pd.concat([frame, frame[[column]]], axis=1)
+    for compute in (frames.ranking, lambda frame: frames.ecdf(frame, [0.1])):
+        if column != "run" or compute is not frames.ranking:
+            with pytest.raises(coartic.CoarticError, match=f"has column {column} twice"):
+                compute(twice)
+    with pytest.raises(coartic.CoarticError, match=f"has column {column} twice"):
+        frames.means(twice, [column], [])
+
+
+def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
+    """As set_index(drop=False) and merges make it."""
+    frame = small_frame(task=["t", "u"])
+    for names in ("method", ["method", "run"], "reward"):
+        named = frame.set_index(names, drop=False)
+        assert frames.gaps(named).tolist() == frames.gaps(frame).tolist()
+        pd.testing.assert_frame_equal(frames.ranking(named), frames.ranking(frame))
+        pd.testing.assert_frame_equal(frames.ecdf(named, [0.1]), frames.ecdf(frame, [0.1]))
+        means = frames.means(named, "method", "reward")
+        pd.testing.assert_frame_equal(means, frames.means(frame, ["method"], ["reward"]))
+    assert frames.gaps(frame.set_index("run")).index.name == "run"
+
+
+@pytest.mark.parametrize(
+    ("by", "columns", "words"),
+    [
+        ([], ["reward"], "by is empty: needed are names"),
+        (3, ["reward"], "by is 3: needed are names"),
+        (["method", "method"], ["reward"], "it names a column twice"),
+        (["reward"], ["reward"], "column reward is in by and in columns"),
+    ],
+)
+def test_columns_that_cannot_be_meant_are_refused(by, columns, words):
+    with pytest.raises(coartic.CoarticError, match=words):
+        frames.means(small_frame(), by, columns)
+
+
+def test_a_task_has_one_reward_of_the_corrective_process():
+    with pytest.raises(coartic.CoarticError, match="the task has several corrective_best"):
+        frames.ranking(small_frame(corrective_best=[-320, -330]))
+
+
+def test_a_method_that_failed_is_behind_those_that_solved_everything():
+    frame = small_frame(method=["flaky", "sure"])
+    flaky = frame[:1].assign(reward=np.nan)
+    ranked = frames.ranking(pd.concat([frame, flaky, flaky], ignore_index=True))
+    assert ranked.index.tolist() == ["sure", "flaky"]
+    assert ranked.missing.tolist() == [0, 1]
+    assert ranked.tasks.tolist() == [1, 0]
+    assert ranked.failed.tolist() == [0, 2]
+    assert ranked.gap.isna().tolist() == [False, True]
+
+
+def test_the_learner_over_all_tasks_has_a_row():
+    """EC1 on tasks for one arm, and on tasks for two a condition that draws hands at random."""
+    tasks = {"EC1": {"one": -300, "two": -310}, "EC4": {"two": -302}, "EC2": {"two": -400}}
+    frame = pd.DataFrame([
+        {"method": f"dual-process/{name}", "task": task, "reward": reward, "best_known": -292}
+        for name, of in tasks.items() for task, reward in of.items()
+    ])  # fmt: skip
+    ranked = frames.ranking(frame)
+    assert ranked.gap["dual-process (EC1, EC4)"] == pytest.approx((8 + 10) / 2 / 292)
+    assert ranked.missing.to_dict() == {
+        "dual-process (EC1, EC4)": 0, "dual-process/EC1": 0, "dual-process/EC4": 1,
+        "dual-process/EC2": 1,
+    }  # fmt: skip
+    assert "dual-process (EC1, EC4)" not in frames.ranking(frame[frame.task == "two"]).index
+
+
 def test_trials_targets_and_numbers_are_checked():
     for trials in ([0, 9], [np.nan, 9]):
         with pytest.raises(coartic.CoarticError, match=r"trials has (0.0|nan) in row 0"):
             frames.ecdf(small_frame(trials=trials), [0.1])
     with pytest.raises(coartic.CoarticError, match="run has nan in row 1"):
         frames.ecdf(small_frame(run=[0, None]), [0.1])
-    for targets in ([], 0.1, [-0.1], ["a"], [np.nan]):
+    for targets in ([], 0.1, [-0.1], ["a"], [np.nan], [np.inf], [50], [-300]):
         with pytest.raises(coartic.CoarticError, match="targets are"):
             frames.ecdf(small_frame(), targets)
     for values in (["x", "y"], [np.inf, 1]):

@@ -16,10 +16,11 @@ from coartic import CoarticError, load_task
 from coartic.analysis.sections import TABLES
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
-from coartic.benchmarks import shipped, template
+from coartic.benchmarks import template
 from coartic.benchmarks.include import include_folders
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.runner import perform
+from coartic.runs import shipped
 from coartic.runs.plan import size_of
 from coartic.runs.store import RUNS_FILE, open_store, writing
 from tests.support.suites import (
@@ -67,6 +68,29 @@ def test_parts_make_a_whole(parts, tmp_path):
     same_results(load(out), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
     assert check_runs(out).wrong == []
     assert [path.name for path in out.iterdir()] == [RUNS_FILE]
+
+
+def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
+    """Parts join to what one command makes; alone a part is no results folder."""
+    command = ("run", "paper", "--tasks", "ascending", "--trials", 20, "--methods", f"EC1,{ALONE}")
+    places = [tmp_path / each for each in ("first", "second", "whole", "once")]
+    for place, runs in zip(places, ("0..1", "2..3"), strict=False):
+        code, text, _ = coartic(*command, "--runs", runs, "--out", place)
+        assert code == 0, text
+    assert "with all other parts, joins them" in " ".join(text.split())
+    with pytest.raises(CoarticError, match="has 2 of 4 runs: it was interrupted, or has a part"):
+        load(places[1])
+    includes = ("--include", places[0], "--include", places[1])
+    code, _, error = coartic(*command, "--runs", "2..3", *includes, "--out", places[2])
+    assert (code, "include the folders of all parts afterwards" in error) == (2, True)
+    assert coartic(*command, *includes, "--runs", 4, "--out", places[2])[1].startswith(
+        "5 runs (5 reused) in "
+    )
+    assert coartic(*command, "--runs", 4, "--out", places[3])[0] == 0
+    same_results(load(places[2]), load(places[3]))
+    assert coartic(*command, "--runs", "0..3", "--out", places[1])[1].startswith(
+        "5 runs (2 reused)"
+    )
 
 
 def test_what_no_folder_has_is_performed(parts, tmp_path):
@@ -242,7 +266,7 @@ def test_shipped_results(monkeypatch, tmp_path):
             assert store.run(learned.iloc[0]).is_downsampled
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped, but of comparison, "):
         shipped.open_shipped("quick")
-    copy = shutil.copytree(Path(shipped.__file__).with_name("shipped"), tmp_path / "copy")
+    copy = shutil.copytree(shipped.SHIPPED_FOLDER, tmp_path / "copy")
     monkeypatch.setattr(shipped, "SHIPPED_FOLDER", copy)
     (copy / "families.sqlite.xz").write_bytes(lzma.compress(b"something else"))
     with pytest.raises(CoarticError, match="not as it was shipped"):

@@ -1,6 +1,7 @@
 """The learner against the paper's loop, the published results, and itself beside other runs."""
 
 import itertools
+import json
 import math
 import re
 from dataclasses import replace
@@ -16,6 +17,7 @@ from coartic import (
     CoarticError,
     ExplorationCondition,
     MotionModel,
+    Movement,
     NotApplicableError,
     SolutionError,
     execute,
@@ -516,3 +518,36 @@ def test_a_grid_counts_in_what_applies(tmp_path):
     suite.write_text(one_arm.replace("{GRID}", '{ base = ["EC1", "EC4"] }'))
     with pytest.raises(CoarticError, match="no left hand; put tasks and methods"):
         plan_suite(suite)
+
+
+@pytest.mark.parametrize(
+    "seeds", [np.arange(3), np.array([0, 1, 2], np.uint8), [np.int32(0), 1, 2]]
+)
+def test_seeds_of_numpy_are_shown_and_kept_as_numbers(seeds):
+    runs = learn_many("ascending", "EC1", seeds=seeds, trials=np.int64(3))
+    assert [(type(run.seed), run.seed) for run in runs] == [(int, 0), (int, 1), (int, 2)]
+    assert [run.counters.trials for run in runs] == json.loads(json.dumps([3, 3, 3]))
+    assert "seed=1," in repr(runs[1])
+    due = learn_many("ascending", "EC1", seeds=range(3), trials=3)
+    assert [run.rewards.tolist() for run in runs] == [run.rewards.tolist() for run in due]
+
+
+@pytest.mark.parametrize(
+    ("seeds", "trials", "most"),
+    [
+        (range(10**9), 1, "1_000_000"),
+        (itertools.count(), 10_000, "20_000"),
+        (range(21), 10_000_000, "20"),
+    ],
+)
+def test_more_runs_than_memory_holds_are_refused(seeds, trials, most):
+    with pytest.raises(ValueError, match=f"seeds has more than {most} entries"):
+        learn_many("ascending", "EC1", seeds=seeds, trials=trials)
+
+
+def test_a_first_solution_in_degrees_is_hinted_at():
+    start = [
+        Movement(goal, "right", "planned", [0, 0, 0, 0, 0, 0, 90, 0, 0, 0]) for goal in (1, 2, 3)
+    ]
+    with pytest.warns(UserWarning, match="has the angle 90; angles are in rad"):
+        learn("ascending", "EC1", seed=0, trials=1, start=start)

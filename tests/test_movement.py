@@ -216,7 +216,7 @@ def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     q[2:] += rng.choice([9.9e4, 5e4, 2.4e4]) * rng.choice([1, 1, -1])
     goal, slow = rng.uniform(-1, 1, 2), q.copy()
     fast = correct(robot, q, hand, tuple(goal))
-    model = PAPER
+    model = PAPER.for_radius()
     iterations = _by_steps(
         slow, robot.arm(hand), tuple(goal), model.gain, model.correction_tolerance,
         model.max_iterations, *np.empty((2, robot.most_links + 1)),
@@ -287,9 +287,19 @@ def test_a_long_arm_is_named_with_a_factor_that_helps(links, locked_base):
     assert corrective_trial(helped, "R").completed
 
 
-@pytest.mark.parametrize("links", [(3, 2, 1), (0.309, 0.333), (0.1, 0.11), (0.1,) * 10])
-def test_arms_of_others_that_are_not_too_long_are_corrected(links):
-    assert corrective_trial(arm_of(*links, radius=min(0.1, sum(links) / 20)), "R").completed
+@pytest.mark.parametrize("links", [(3, 2, 1), (0.309, 0.333), (0.1,) * 10])
+@pytest.mark.parametrize("radius", [None, 1e-3])
+def test_arms_of_others_that_are_not_too_long_are_corrected(links, radius):
+    radius = radius or min(0.1, sum(links) / 20)
+    assert corrective_trial(arm_of(*links, radius=radius), "R").completed
+
+
+def test_a_short_arm_is_named_with_a_factor_that_helps():
+    links, radius = (0.1, 0.11), 0.0105
+    reason = corrective_trial(arm_of(*links, radius=radius), "R").reason
+    factor = float(re.search(r"is 0.00281, and below 0.1 .* lengths by ([0-9]+),", reason)[1])
+    helped = arm_of(*links, scale=factor, radius=factor * radius)
+    assert corrective_trial(helped, "R").completed
 
 
 def test_a_straight_arm_that_points_at_its_goal_is_named():

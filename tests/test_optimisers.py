@@ -6,17 +6,20 @@ import pickle
 import re
 import runpy
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import optimize
 
 import coartic
 from coartic import CoarticError, MotionModel, UndeclaredError, corrective_trial, execute, load_task
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
-from coartic.method import BudgetError, Information, MethodError, Session
+from coartic.method import BudgetError, Information, MethodError, Session, run_method
 from coartic.motion.solution import movements_of
 from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
 from tests.support.strategies import shipped_optima, tiny_task
@@ -339,7 +342,7 @@ def test_what_is_no_point_is_refused_with_its_own_shape():
         for call in (cost, cost.many):
             with pytest.raises(ValueError, match="needed are real numbers"):
                 call(wrong)
-    with pytest.raises(ValueError, match="rows of different lengths"):
+    with pytest.raises(ValueError, match="in rows of one length"):
         cost.many([[1, 2], [3]])
     assert cost.evaluations == 0
 
@@ -358,20 +361,56 @@ def test_what_is_known_of_a_task():
     assert coartic.objective("ascending", model=coartic.MotionModel(gain=0.04)).best_known is None
 
 
-def test_the_history_is_that_of_the_costs_one_by_one():
-    rng = np.random.default_rng(0)
-    many, single = (coartic.objective("two-armed-1", "LRLR") for _ in range(2))
-    points = many.x0 + rng.uniform(0, 0.05, (400, 1)) * rng.standard_normal((400, many.dim))
-    costs = np.concatenate([many.many(points[:150]), many.many(points[150:])])
-    assert [single(point) for point in points] == costs.tolist()
-    assert many.history.equals(single.history)
-    lowest = np.minimum.accumulate([many.history.cost[0], *costs])
-    assert len(many.history) > 3
-    for target in np.unique(lowest):
-        due = np.flatnonzero(lowest <= target)[0]
-        assert many.evaluations_to(target) == many.evaluations_to(target + 0.5) == due
-    never = [lowest[-1] - 1, np.nan, -np.inf]
-    assert many.evaluations_to([*never, lowest[0]]).tolist() == [np.inf] * 3 + [0]
+@pytest.mark.parametrize("threads", [1, 4])
+@settings(max_examples=40)
+@given(
+    sizes=st.lists(st.integers(0, 40), max_size=12),
+    budget=st.integers(1, 200),
+    seed=st.integers(0, 99),
+)
+def test_history_and_evaluations_to_are_what_the_returned_costs_say(threads, sizes, budget, seed):
+    """In batches of any size, 0 for a point alone; where the budget cuts a batch; after refused
+    copies; and of threads, whose order is open."""
+    cost, single = (
+        coartic.objective("two-armed-1", "LRLR", budget=most) for most in (budget + 1, None)
+    )
+    rng, alone = np.random.default_rng(seed), cost.best_cost
+    batches = [
+        cost.x0 + rng.uniform(0, 0.05) * rng.standard_normal((max(size, 1), cost.dim))
+        for size in sizes
+    ]
+
+    def evaluate(size, points):
+        with suppress(CoarticError):
+            pickle.dumps(cost)
+        with suppress(BudgetError):
+            returned = cost.many(points) if size else [cost(points[0])]
+            np.testing.assert_array_equal(returned, [single(point) for point in points])
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(evaluate, sizes, batches))
+    costs, history = [single(point) for points in batches for point in points], cost.history
+    assert cost.evaluations == min(budget, len(costs))
+    assert {*history.cost} <= {alone, *costs}
+    if threads == 1 or len(costs) <= budget:
+        assert cost.best_cost == min([alone, *costs[:budget]])
+    if threads == 1:
+        lowest = np.minimum.accumulate([alone, *costs[:budget]])
+        first = [(int(np.argmax(lowest == each)), each) for each in np.unique(lowest)[::-1]]
+        assert [*history.itertuples(index=False, name=None)] == first
+        for target in [*lowest, *(lowest + 0.5)]:
+            assert cost.evaluations_to(target) == np.argmax(lowest <= target)
+    assert (np.diff(history.evaluations) > 0).all()
+    assert (np.diff(history.cost) < 0).all()
+    assert history.cost.iloc[-1] == cost.best_cost
+    assert cost.evaluations_to(history.cost).tolist() == history.evaluations.tolist()
+    assert cost.evaluations_to([cost.best_cost - 1, alone]).tolist() == [np.inf, 0]
+
+
+@pytest.mark.parametrize("wrong", [-456, [500, -1.0], np.nan, np.inf, -np.inf, 2_000_000, "456"])
+def test_a_target_that_is_no_cost_is_refused(wrong):
+    with pytest.raises(ValueError, match=r"targets (are|is) .*(a cost, the ticks|real numbers)"):
+        coartic.objective("ascending").evaluations_to(wrong)
 
 
 def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
@@ -384,6 +423,30 @@ def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     again(again.x0)
     with pytest.raises(ValueError, match="budget is 0; it must be a whole number from 1"):
         coartic.objective(FOUR, budget=0)
+    few = "budget is 15; to choose among the hand sequences .* takes 16 trials: give more, or say"
+    with pytest.raises(ValueError, match=few):
+        coartic.objective(FOUR, budget=15)
+    with pytest.raises(ValueError, match="budget is 3; .* takes .* trials"):
+        coartic.problems("two-armed/v1", count=1, budget=3)
+    assert coartic.objective(FOUR, "RLRR", budget=5).trials_left == 4
+    assert coartic.objective(FOUR, budget=16).trials_left == 0
+
+
+class Idle(coartic.Optimiser):
+    name, title, citation = "test/idle", "Idle", "None."
+
+    def optimise(self, objective, rng):
+        pass
+
+
+def test_an_optimiser_that_evaluates_nothing_has_no_solution():
+    """But where the hands take all trials, it could not."""
+    for trials in (2, 10):
+        with pytest.raises(MethodError, match="optimise ended without evaluating a point"):
+            run_method(Idle(Idle.Parameters(trials=trials)), "ascending")
+    result, session = run_method(Idle(Idle.Parameters(trials=16)), FOUR)
+    assert session.trials_made == 16
+    assert execute(FOUR, result.solution).reward == max(session.rewards)
 
 
 def test_instances_of_a_family():

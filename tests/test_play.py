@@ -17,6 +17,7 @@ from coartic.tasks.task import hands_of
 from tests.support.strategies import (
     PAPER_CELLS,
     make_trials,
+    metres_task,
     sample,
     shipped_optima,
     uneven_task,
@@ -31,6 +32,17 @@ TASKS = [
     *("one-armed/v1/i000", "two-armed/v1/i001", "long/v1/i000", "aligned/v1/i002"),
     *("redundancy/v1/i000", "redundancy/v1/i007"),
 ]
+
+
+OWN = {
+    "uneven": uneven_task(locked_base=["x"]),
+    "metres": metres_task(),
+    "millimetre": metres_task(radius=1e-3),
+    # The base is locked, and the left arm has one joint: its hand has no null space.
+    "stiff": uneven_task(
+        locked_base=["x", "y"], goals=[[2.5, 1.0], [-0.59, 0.835], [2.0, -1.0]], initial_hands="RLR"
+    ),
+}
 
 
 def node(script, *given):
@@ -72,10 +84,10 @@ TRIALS = """(task, cases) => {
 }"""
 
 
-@pytest.mark.parametrize("name", [*TASKS, "uneven"])
+@pytest.mark.parametrize("name", [*TASKS, "uneven", "metres", "millimetre"])
 def test_random_trials_are_those_of_the_package(name):
-    """11 tasks, 250 trials each: 2750."""
-    task = uneven_task() if name == "uneven" else load_task(name)
+    """13 tasks, 250 trials each: 3250."""
+    task = uneven_task() if name == "uneven" else OWN.get(name) or load_task(name)
     rng = np.random.default_rng(5)
     halves = [sample(task, 125, noise, seed=7) for noise in (0.05, 0.5)]
     hands, targets = halves[0][0] + halves[1][0], np.concatenate([half[1] for half in halves])
@@ -163,14 +175,9 @@ RUNS = [
     ("redundancy/v1/i007", "EC1", 0.3, 10),
     ("uneven", "EC4", 0.3, 11),
     ("stiff", "EC4", 0.3, 12),
+    ("metres", "EC1", 0, 13),
+    ("millimetre", "EC1", 0, 14),
 ]
-OWN = {
-    "uneven": uneven_task(locked_base=["x"]),
-    # The base is locked, and the left arm has one joint: its hand has no null space.
-    "stiff": uneven_task(
-        locked_base=["x", "y"], goals=[[2.5, 1.0], [-0.59, 0.835], [2.0, -1.0]], initial_hands="RLR"
-    ),
-}
 
 
 def test_the_same_seed_learns_the_same_trial_by_trial():

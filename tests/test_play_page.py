@@ -14,7 +14,7 @@ from coartic.analysis import solutions_of
 from coartic.analysis.signatures.context_tests import standardised_posture_difference
 from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play import page as pages
-from tests.support.strategies import changed
+from tests.support.strategies import changed, metres_task
 
 pytestmark = pytest.mark.browser
 
@@ -144,6 +144,28 @@ def test_a_task_from_a_file_begins_with_the_hands_of_the_package(visited, tmp_pa
     assert f"{words} (best hands {best})." in text(page, "finding")
     page.get_by_role("slider", name="Practice").fill("0")
     assert ticks(page, "The learner") == -corrective_trial(task, initial_hands(task)).reward
+
+
+def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(visited, tmp_path):
+    task, page_file = metres_task(), tmp_path / "play.html"
+    html = pages.play_page(task).replace("TRIALS = 10000;", "TRIALS = 100;")
+    html = html.replace("const figure = new", "const figure = window.player = new")
+    page_file.write_text(html, encoding="utf-8")
+    page = settled(visited(f"{page_file.as_uri()}#open=1", reduced_motion="reduce"))
+    runs = [learn(task, "EC1", seed=seed, trials=100) for seed in range(5)]
+    assert ticks(page, "The learner") == -median_run(runs).reward
+    assert ticks(page, "Corrective process alone") == -corrective_trial(task, "RRR").reward
+    width, height = (page.evaluate(f"player.problems[0].robot.base_size[{k}]") for k in (0, 1))
+    assert (width / 0.33, width / height) == (pytest.approx(1 / 4), pytest.approx(5))
+    left, bottom, right, top = page.evaluate("player.box")
+    assert right - left < 1.2
+    assert top - bottom < 1.0
+    assert page.evaluate("player.within([0.1234, 0.4567])") == [0.123, 0.457]
+    before = page.evaluate("player.state.goals.length")
+    page.get_by_role("button", name="Add a goal").click()
+    after = page.evaluate("player.state.goals")
+    assert len(after) == before + 1
+    assert all(abs(x) < 0.6 and abs(y) < 0.6 for x, y in after)
 
 
 def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):

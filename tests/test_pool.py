@@ -57,7 +57,11 @@ class Again(Does):
 """
 HONEST = -319  # what these movements are worth
 HANDLED = {
-    "hangs": ("time.sleep(999)", "timeout", "wall time limit of 1.4 s exceeded"),
+    "hangs": ("time.sleep(999)", "crashed", "wall time limit of 1.4 s exceeded twice: it waited"),
+    "hangs_once": ("if not os.path.exists(__file__ + '.slept'):\n"
+                   "            open(__file__ + '.slept', 'w').close()\n"
+                   "            time.sleep(999)\n"
+                   "        return Result(corrected(session))", "ok", ""),
     "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 0.5 s exceeded"),
     "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
                        "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
@@ -142,10 +146,10 @@ def folder(tmp_path_factory):
     def make(folder):
         folder.mkdir()
         does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-        hangs, *others = [cell_on(task, does, what=name) for name in HANDLED]
+        hangs, once, *others = [cell_on(task, does, what=name) for name in HANDLED]
         others += [cell_on(task, again), cell_on(task, KNOWN["corrective-alone/given"])]
         for name, cells, timeout_s, limit_s in (
-            ("hangs", [hangs], 0.5, 0.3),
+            ("hangs", [hangs, once], 0.5, 0.3),
             ("others", others, 600.0, 0.5),
         ):
             run_and_write(
@@ -229,6 +233,7 @@ def test_words_of_an_earlier_run_are_not_those_of_a_crash(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test finds the processes in /proc")
+@pytest.mark.filterwarnings("ignore:.* gives the same result")  # with any seed
 @pytest.mark.parametrize("whom", ["worker", "server"])
 def test_what_somebody_kills_is_repeated(tmp_path, whom):
     """A process at work, or the server that forks them."""
@@ -287,13 +292,33 @@ def test_without_a_place_for_answers_the_suite_ends(tmp_path, monkeypatch, why):
     ).runs.status.tolist() == ["ok", "ok"]
 
 
-def test_a_server_that_is_killed_while_a_file_is_read(tmp_path, monkeypatch):
-    def killed(_):
-        raise EOFError
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (EOFError(), "no process for it begins .EOFError.. Repeat the command$"),
+        (OSError(24, "Too many open files"), "Repeat the command after `ulimit -n 1024`"),
+    ],
+)
+def test_a_process_that_cannot_begin_says_what_ended_and_blames_no_file(
+    tmp_path, monkeypatch, error, words
+):
+    def fails(_):
+        raise error
 
-    monkeypatch.setattr("coartic.benchmarks.method_files.start_process", killed)
-    with pytest.raises(CoarticError, match=r"mine.py: cannot be imported: no process .* begins"):
+    monkeypatch.setattr("coartic.benchmarks.method_files.start_process", fails)
+    with pytest.raises(CoarticError, match=f"mine.py is not read: .*{words}"):
         entries(tmp_path, [("honest", "pass")])
+
+
+def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(CoarticError, match="mine.py is not read: .* working folder was removed"):
+        entries(tmp_path, [("honest", "pass")])
+    with pytest.raises(CoarticError, match="processes cannot begin .* working folder was removed"):
+        list(Local(1).perform(planned([cell_on(load_task("ascending"), KNOWN["hill-climbing"])])))
+    monkeypatch.chdir(tmp_path)
 
 
 def test_other_methods_and_the_parent_notice_nothing(folder, runs):

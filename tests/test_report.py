@@ -77,7 +77,7 @@ def test_the_commonest_reasons_are_said(traced):
     reported = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
     assert (reported["failed"], reported["reasons"]) == (
         10,
-        ["4 × often", "3 × thrice", "2 × twice"],
+        ["4 × often", "3 × thrice", "2 × twice", "1 for other reasons"],
     )
 
 
@@ -108,6 +108,15 @@ def test_text_from_files_is_escaped():
     assert "\\input{x}" not in latex
     assert "5 \\% of \\$x\\_1\\textasciicircum{}2\\$ \\#\\textasciitilde{}" in latex
     assert r"\textbackslash{}input\textbraceleft{}x\textbraceright{}" in latex
+
+
+def test_what_pdflatex_cannot_print_is_for_xelatex(traced):
+    frame = TABLES["ranking"](traced)
+    assert "XeLaTeX" not in render.latex_table(TABLES["ranking"], frame, "κ → 1, γ₁ ≥ ½")
+    text = render.latex_table(TABLES["ranking"], frame, "手 and κ")
+    assert text.startswith("% needs XeLaTeX or LuaLaTeX")
+    assert '\\symbol{"624B} and $\\kappa$' in text
+    assert text.isascii() or all(ord(c) < 0x300 for c in text)
 
 
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
@@ -196,7 +205,8 @@ def test_few_runs_say_so(tmp_path):
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
 def test_tables_compile(tables_by_name, tmp_path):
-    notes = ["The optimum of Two-armed 1 † is not proven."]
+    greek = "".join(map(chr, (*range(0x391, 0x3A2), *range(0x3A3, 0x3CF))))
+    notes = ["The optimum of Two-armed 1 † is not proven.", f"{greek} κ₂ → ⇒ ≤ ≈ ∈ … — ‘x’ ε² É"]
     tables = [name for name in render.IN_LATEX if len(tables_by_name[name])]
     assert {"ranking", "signatures", "runtimes", "tasks"} <= {*tables}
     texts = [render.latex_table(TABLES[n], tables_by_name[n], n, notes) for n in tables]

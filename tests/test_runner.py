@@ -2,6 +2,7 @@
 
 import hashlib
 import time
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -309,3 +310,31 @@ def test_a_folder_of_another_suite_is_refused(tmp_path):
     perform(plan, tmp_path, executor=InProcess())
     with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
         perform([replace(job, suite="quick") for job in plan], tmp_path, executor=InProcess())
+
+
+DOUBTS = {
+    "test/good": "",
+    "test/undrawn": "another seed, so its runs are one: take random numbers from session.rng",
+    "test/random": "another result on ascending with the same seed after another run",
+    "test/remembers": "another result on ascending with the same seed after another run",
+    "test/lucky": "declared not to be stochastic, but another seed gives another result",
+    "test/own-generator": "declared not to be stochastic, but makes a generator of its own",
+    "test/degrees": "on ascending: goal 1: the target has the angle 90",
+    "test/draws": "",
+}
+
+
+@pytest.mark.parametrize("name", DOUBTS)
+def test_runs_of_a_method_file_warn_of_what_a_check_would_find(name, tmp_path, monkeypatch):
+    """Once for a method, whatever the number of its runs and tasks; the results stay."""
+    monkeypatch.setattr(reproduce, "Local", InProcess)
+    methods, tasks = registry([BROKEN]), ["ascending", "two-armed-1"]
+    plan = planned([cell_on(load_task(task), methods[name]) for task in tasks])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        progress = perform(plan, tmp_path, executor=InProcess())
+        perform(plan, tmp_path, executor=InProcess())  # has nothing to perform
+    assert (progress.done, progress.failed) == (progress.total, 0)
+    texts = [str(each.message) for each in said]
+    assert len({*texts}) == len(texts)
+    assert any(DOUBTS[name] in text for text in texts) == bool(DOUBTS[name])

@@ -1,6 +1,7 @@
 """Executing and scoring solutions, whoever made them."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,6 +107,15 @@ def test_targets_in_degrees_are_hinted_at():
     with pytest.warns(UserWarning, match=r"has the angle .* rad\. Did you mean .*° = 0\.\d{3}\?"):
         execution = execute(task, movements_of("RRR", degrees))
     assert execution.reward == taken.reward < due.reward
+
+
+@pytest.mark.parametrize("field", ["goal", "hand", "kind"])
+@pytest.mark.parametrize("value", [np.zeros(10), None, [1], {}])
+def test_what_is_no_field_of_a_movement_is_named(field, value):
+    """Such as a posture in the place of the kind."""
+    movements = corrective_trial("ascending", "RRR").movements
+    with pytest.raises(CoarticError, match=f"{field} of a movement is .*; it must be a "):
+        execute("ascending", [replace(movements[0], **{field: value}), *movements[1:]])
 
 
 def test_a_goal_is_hit_by_one_hand():

@@ -162,6 +162,9 @@ def test_rounding_is_no_spread():
     assert not statistics.varies(np.full(6, 0.1))
     assert not statistics.centred(np.full((3, 2), 0.1)).any()
     assert statistics.varies(np.array([300.0, 300.001]))
+    assert not statistics.varies(np.zeros(3))
+    assert not statistics.varies(np.array([1e9, 1e9 - 1.0]))  # by the share that is rounding
+    assert statistics.varies(np.array([1e9, 1e9 - 2.0]))
     assert statistics.standard_deviation(np.full(3, 0.1)) == 0
 
 

@@ -19,6 +19,7 @@ import pytest
 
 from coartic import CoarticError, Movement
 from coartic.analysis.study import load
+from coartic.analysis.verify import check_runs
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.runner import perform
 from coartic.benchmarks.worker import fail
@@ -316,6 +317,9 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     report = perform(planned(ONE, **FEW), tmp_path, executor=InProcess())
     assert (report.stale, report.present, report.done) == (9, 0, 9)
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
+    one = replace(report, stale=1)
+    assert "(leaving out 1 run made by a different version of the code)" in repr(one)
+    assert "leaving out" not in repr(replace(report, stale=0))
     same_results(load(tmp_path), undisturbed)
     with open_store(tmp_path) as store:
         assert len(store.ids()) == 18
@@ -341,6 +345,24 @@ def other_reward(path):
         db.execute(text.replace('"reward"', "reward + 100 AS reward", 1))
 
 
+def pointer(path):
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+
+
+def dumped(path):
+    with closing(sqlite3.connect(path)) as db:
+        lines = "\n".join(db.iterdump())
+    path.write_text(lines)
+
+
+def restored(path):
+    dumped(path)
+    lines = path.read_text()
+    path.unlink()
+    with closing(sqlite3.connect(path)) as db:
+        db.executescript(lines)
+
+
 def behind_a_link(path):
     path.symlink_to(path.rename(path.with_name("elsewhere.sqlite")))
 
@@ -363,10 +385,8 @@ def journal_of_several(path):
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
         (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),
         (lambda path: path.rename(path.with_name("notes.txt")), "(not|no) .*results"),
-        (sql("CREATE VIEW mine AS SELECT 1"), "view mine is missing or is not ours"),
         (sql("DROP VIEW paths"), "view paths"),
         (sql("DROP TABLE learning"), "table learning"),
-        (sql("CREATE INDEX i ON results (reward)"), "index i "),
         (sql("ALTER TABLE movements ADD COLUMN left_x"), "table movements"),
         (
             sql(
@@ -375,8 +395,11 @@ def journal_of_several(path):
             "trigger t ",
         ),
         (other_reward, "view runs is missing or is not ours"),
-        (behind_a_link, "is no file of its own"),
-        (lambda path: path.with_name(f"{RUNS_FILE}-wal").mkdir(), "-wal is no file of its own"),
+        (behind_a_link, "runs.sqlite is a link: name the folder that holds the file, /"),
+        (lambda path: path.with_name(f"{RUNS_FILE}-wal").mkdir(), "-wal is a folder, not a file"),
+        (pointer, "is a pointer of Git LFS, not the file: `git lfs pull`"),
+        (dumped, "is a dump of a database as text: copy the file itself"),
+        (restored, "was restored from a dump.*copy the file itself"),
         (journal_of_several, "-journal was not written by coartic"),
     ],
 )
@@ -393,6 +416,20 @@ def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, w
         assert str(tmp_path) in str(caught.value)
         assert len(str(caught.value).splitlines()) == 1
         assert content() == before
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["ANALYZE", "PRAGMA optimize = 0xfffe", "VACUUM", "CREATE INDEX i ON results (reward)",
+     "CREATE VIEW mine AS SELECT 1", "CREATE TABLE notes (text)"],
+)  # fmt: skip
+def test_what_other_programs_add_does_no_harm(undisturbed, tmp_path, statement):
+    shutil.copytree(undisturbed.folder, tmp_path, dirs_exist_ok=True)
+    with closing(sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)) as db:
+        db.execute(statement)
+    same_results(load(tmp_path), undisturbed)
+    assert check_runs(tmp_path).wrong == []
+    assert perform(planned(ONE, **FEW), tmp_path, executor=InProcess()).done == 0
 
 
 def read_all(folder):
@@ -425,6 +462,7 @@ def read_all(folder):
         "suite SET seed = 'x'",
         "suite SET time_limit_s = 9e999",
         "plan SET runs = -1",
+        "plan SET runs = 0",
         "cells SET setting = 'x'",
         "movements SET left_1 = 9e999",
         "movements SET left_1 = left_1 + 0.1",

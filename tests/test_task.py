@@ -1,11 +1,16 @@
 """Task files: the shipped ones, and what is refused with what words."""
 
+import ast
+import math
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from coartic import (
+    CONDITIONS,
     CoarticError,
     ExplorationCondition,
     NotApplicableError,
@@ -94,11 +99,16 @@ def test_a_task_is_saved_as_toml(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"hands": "right"}, "Task: hands is 'right'; it should be a list, such as ['right']"),
+        (
+            {"hands": "right"},
+            "Task: hands is 'right'; it should be a list, such as ['left', 'right']",
+        ),
         ({"goals": [(3, "2")]}, "Task: goals[0][1] is '2'; it should be a number"),
         ({"goal": 3}, "Task: goal is an unknown key; did you mean 'goals'?"),
         ({"robot": {"right_links": [0]}}, "robot.right_links[0] is 0; it should be greater than 0"),
         ({"q0": [0, 0, 0, 0, 0, 0, 30, 40, 20, 0]}, "Did you mean 40° = 0.698?"),
+        ({"start": {"right": "x"}}, "start.right is 'x'; it should be a list of numbers"),
+        ({"locked_base": "xy"}, "locked_base is 'xy'; it should be a list, such as ['y']"),
         ({"q0": [0] * 3}, "Task: q0 has shape (3,); it must be (10,)"),
         ({"q0": {"base": [0, 0]}}, "Task: q0 is {'base': [0, 0]}; needed are real numbers"),
         ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "give one of them"),
@@ -117,6 +127,36 @@ def test_what_else_is_made_of_wrong_arguments_says_so_in_a_sentence():
         ExplorationCondition("x", ("right",), True, True, "all")
     with pytest.raises(ValueError, match=r"Parameters: trials is 0; it should be greater than 0"):
         Optimiser.Parameters(trials=0)
+
+
+LISTS = {
+    Task: ["hands", "locked_base", "goals"],
+    Start: ["base", "left", "right"],
+    Robot: ["left_links", "right_links", "left_shoulder", "right_shoulder"],
+}
+
+
+@pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in LISTS for key in LISTS[kind]])
+@pytest.mark.parametrize("text", ["x", "right", "xy", "1, 2"])
+def test_advice_on_a_list_can_be_followed(kind, key, text):
+    given = {Task: {"goals": [(3, 2)]}, Start: {"left": [0] * 4, "right": [0] * 4}}.get(kind, {})
+    with pytest.raises(ValueError, match=f"{key} is '{text}'; it should be a list") as caught:
+        kind(**given | {key: text})
+    for advice in re.findall(r"such as (\[.*\])", str(caught.value)):
+        kind(**given | {key: ast.literal_eval(advice)})
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: replace(CONDITIONS["EC4"], epsilon=math.nan),
+        lambda: replace(CONDITIONS["EC4"], discount=math.nan),
+        lambda: Optimiser.Parameters(half_width=math.nan),
+    ],
+)
+def test_nan_is_at_no_side_of_a_limit(make):
+    with pytest.raises(ValueError, match=r" is nan; it should be a finite number"):
+        make()
 
 
 def test_a_file_that_is_not_text(tmp_path):
@@ -196,3 +236,21 @@ def test_a_task_of_ones_own_needs_goals_alone(tmp_path):
     path = tmp_path / "shelf.toml"
     path.write_text("goals = [[3.0, 2.0], [4.5, 2.0]]\n", encoding="utf-8")
     assert load_task(path) == Task(name="shelf", goals=goals, q0=np.zeros(10))
+
+
+@pytest.mark.parametrize("name", ["arm.urdf", "run.MOT", "marks.trc", "marks.c3d", "hits.xlsx"])
+@pytest.mark.parametrize("kind", [str, Path])
+def test_files_of_other_programs_are_refused_by_their_kind(name, kind):
+    words = f"{name}: coartic reads no {Path(name).suffix.lower()} file; a task is a TOML file"
+    with pytest.raises(TaskError, match=words):
+        load_task(kind(name))
+
+
+@pytest.mark.parametrize("count", [100, 256, 257])
+def test_a_task_has_at_most_256_goals(count):
+    goals = [(4 + math.sin(k), 1 + math.cos(k)) for k in range(count)]
+    if count > 256:
+        with pytest.raises(ValueError, match="at most 256"):
+            Task(goals=goals)
+    else:
+        assert corrective_trial(Task(goals=goals, hands=["right"]), "R" * count).completed

@@ -140,7 +140,8 @@ def planned(cost, task, stops=False):
     method, session = kind(kind.Parameters(**QUICK)), Session(task, 0, kind.information)
     problem = trajectory_problem(task.robot, task.hands, len(task.goals), cost)
     hands = hands_of(task.initial_hands)
-    instance = Instance.of(task, hands, still=False, radius=task.radius - PAPER.arrival_tolerance)
+    inside = 0.9 * task.radius
+    instance = Instance.of(task, hands, still=False, radius=inside)
     starts = method.starts(session, task)[hands]
     plan = cheapest_plan(session, problem, instance, starts)
     if stops:

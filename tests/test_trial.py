@@ -172,7 +172,9 @@ def by_trajectory(task, model, cases):
 
 def by_checker(task, model, cases):
     """Movements as they are stored, with what they took."""
-    judge = checker.stored_task(task.model_dump_json(), json.dumps(model._asdict()))
+    judge = checker.stored_task(
+        task.model_dump_json(), json.dumps(model.for_radius(task.radius)._asdict())
+    )
     for case in cases:
         execution = execute(task, case.solution, model=model)
         if not execution.completed:

@@ -1,25 +1,46 @@
 """What a user writes wrong gets one sentence, with the key and what would be right."""
 
+import ast
+import itertools
 import os
+import re
+import traceback
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from coartic import CoarticError, builtin_tasks, load_task
+from coartic import (
+    CoarticError,
+    Movement,
+    Robot,
+    Task,
+    builtin_tasks,
+    correct,
+    corrective_trial,
+    execute,
+    learn,
+    load_task,
+    move,
+    movements_of,
+    trajectory,
+)
+from coartic.analysis import ecdf, means, ranking
 from coartic.analysis.figures import picture
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER
+from coartic.cli.arguments import runs_read
 from coartic.internal.text import RENAMED, did_you_mean
-from coartic.tasks.families import FAMILY_FOLDER, read_family
+from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
-from tests.support.suites import KNOWN
+from tests.support.suites import KNOWN, ROOT
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 FAMILY_FILE = FAMILY_FOLDER / "long.v1.toml"
@@ -156,7 +177,7 @@ def test_of_many_problems_the_first_are_said(tmp_path):
         ({"methods": ["dual-process/EC9"]}, "unknown method 'dual-process/EC9'; did you mean"),
         (
             {"tasks": ["ascending"], "methods": ["EC4"]},
-            "no method to run on what was asked for: EC4 uses the left",
+            "no method to run on task 'ascending': EC4 uses the left",
         ),
         ({"tasks": ["ascending.toml"]}, "name 'ascending' is already taken"),
         ({"tasks": ["left.toml"]}, "no method to run on task 'left': EC1 uses the right"),
@@ -170,8 +191,8 @@ def test_of_many_problems_the_first_are_said(tmp_path):
         ({"jobs": 2}, "jobs is no option: give executor=Local(jobs)"),
         ({"scheduler": "x"}, "scheduler is no option: give executor=Dask(scheduler)"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
-        ({"runs": "3"}, "runs is '3'; it should be a whole number"),
-        ({"runs": True}, "runs is True; it should be a whole number"),
+        ({"runs": "3"}, "runs is '3'; it must be a whole number"),
+        ({"runs": True}, "runs is True; it must be a whole number"),
         ({"seed": -1}, "seed is -1; it should be at least 0"),
         ({"trials": 10**9}, "trials is 1000000000; it should be at most 10000000"),
         ({"time_limit_s": float("nan")}, "time_limit_s is nan; it should be"),
@@ -316,3 +337,112 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
     assert line.startswith("Error: ")
     assert words in line
     assert not [*tmp_path.iterdir()]
+
+
+ODD = (
+    *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
+    *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
+)
+TASK, ROBOT = load_task("ascending"), Robot()
+TRIAL = corrective_trial(TASK, "RRR")
+FRAME = pd.DataFrame({"method": "a", "task": "t", "reward": [-300.0], "best_known": -292,
+                      "run": 0, "trials": 5})  # fmt: skip
+CALLS = (
+    (execute, {"task": TASK, "solution": TRIAL.movements}),
+    (trajectory, {"task": TASK, "movements": TRIAL.movements}),
+    (movements_of, {"hands": "RRR", "targets": TRIAL.configurations}),
+    (corrective_trial, {"task": TASK, "hands": "RRR"}),
+    (learn, {"task": TASK, "condition": "EC1", "seed": 0, "trials": 3}),
+    (load_task, {"name_or_path": "ascending"}),
+    (ROBOT.forward_kinematics, {"q": TASK.q0, "hand": "right"}),
+    (ROBOT.jacobian, {"q": TASK.q0, "hand": "right"}),
+    (Task, {"goals": [(3.0, 2.0)], "hands": ["right"], "locked_base": ["y"], "radius": 0.1}),
+    (Robot, {"left_links": (0.5, 0.5), "right_links": (0.5, 0.5)}),
+    (ranking, {"frame": FRAME}),
+    (means, {"frame": FRAME, "by": ["method"], "columns": ["reward"]}),
+    (ecdf, {"frame": FRAME, "targets": [0.1]}),
+    (plan_suite, {"suite": "quick", "tasks": ["ascending"], "methods": ["EC1"], "runs": 1,
+                  "seed": 0, "trials": 5, "time_limit_s": 1.0, "trial_budget": 5}),
+    (correct, {"robot": ROBOT, "q": TASK.q0, "hand": "right", "goal": (3.0, 2.0)}),
+    (move, {"robot": ROBOT, "q": TASK.q0, "target": TASK.q0, "hand": "right",
+            "goal": (3.0, 2.0), "radius": 0.1}),
+)  # fmt: skip
+
+
+def refused_by_us(call):
+    """Whether a call is taken, or refused by a statement of coartic rather than by what it calls;
+    and the error in words."""
+    try:
+        call()
+    except Exception as error:
+        return is_ours(error), repr(error)
+    return True, ""
+
+
+def is_ours(error):
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    file, number = Path(last.filename), last.lineno or 1
+    if ".venv" in file.parts or ROOT not in file.parents:
+        return False
+    return "raise " in "".join(file.read_text("utf-8").splitlines(True)[number - 2 : number])
+
+
+@pytest.mark.parametrize(("call", "usual"), CALLS)
+def test_no_wrong_argument_gets_an_error_of_python(call, usual):
+    """A movement's fields are arguments, too."""
+    call(**usual)
+    for name, value in itertools.product(usual, ODD):
+        ours, words = refused_by_us(partial(call, **usual | {name: value}))
+        assert ours, (name, value, words)
+
+
+@pytest.mark.parametrize("field", ["goal", "hand", "kind", "target", "waypoints"])
+def test_no_wrong_movement_gets_an_error_of_python(field):
+    for kind, value in itertools.product(("planned", "path"), ODD):
+        usual = {"goal": 1, "hand": "right", "kind": kind, "target": TASK.q0}
+        usual["waypoints"] = [TASK.q0] if kind == "path" else None
+        movement = partial(Movement, **usual | {field: value})
+        ours, words = refused_by_us(lambda make=movement: execute(TASK, [make()]))
+        assert ours, (value, words)
+        assert "ambiguous" not in words
+
+
+@pytest.mark.parametrize(
+    ("call", "usual", "name", "value"),
+    [
+        (Task, {"goals": [(6, 2)]}, "locked_base", "xy"),
+        (Task, {"goals": [(6, 2)]}, "hands", "left"),
+        (Task, {}, "goals", "x"),
+        (plan_suite, {"suite": "paper"}, "tasks", "ascending"),
+        (plan_suite, {"suite": "paper"}, "methods", "EC1"),
+        (plan_suite, {"suite": "paper"}, "runs", "3"),
+        (plan_suite, {"suite": "paper", "tasks": ["two-armed/v1/i000"]}, "methods", "EC4"),
+        (ecdf, {"frame": FRAME}, "targets", "x"),
+        (learn, {"task": "two-armed-1", "trials": 1, "seed": 0}, "condition", 3),
+        (instance_names, {"family": "long/v1", "split": "fresh"}, "year", None),
+    ],
+)  # fmt: skip
+def test_advice_that_is_followed_is_taken(call, usual, name, value):
+    with pytest.raises((CoarticError, ValueError, TypeError), match="such as") as caught:
+        call(**usual | {name: value})
+    said = str(caught.value).rpartition("such as ")[2]
+    advice = re.match(r"(\[+.*\]+|range\(.*\)|'[^']*'|[0-9]+)", said)[1]
+    call(**usual | {name: ast.literal_eval(advice) if "range" not in advice else range(50, 100)})
+
+
+def test_advice_about_instances_and_their_families_is_taken(tmp_path):
+    for wrong in ("two-armed/v1/x1", "two-armed/v1/i0..x9"):
+        with pytest.raises(CoarticError) as caught:
+            plan_suite("paper", tasks=[wrong])
+        advice = re.search(r"(for example|such as) ([a-z0-9/-]+[.]*[a-z0-9]*)", str(caught.value))
+        assert plan_suite("paper", tasks=[advice[2]], methods=["EC4"])
+    family = tmp_path / "strips.v1.toml"
+    shipped = ROOT / "coartic" / "tasks" / "families" / "two-armed.v1.toml"
+    family.write_text(shipped.read_text("utf-8"), "utf-8")
+    with pytest.raises(CoarticError, match="such as") as caught:
+        plan_suite("paper", family_files=[family])
+    advice = str(caught.value).rpartition("such as ")[2]
+    assert len(plan_suite("paper", family_files=[family], tasks=[advice], methods=["EC4"])) == 10
+    with pytest.raises(CoarticError, match=r"or a range, such as 50\.\.99"):
+        runs_read("x")
+    assert runs_read("50..99") == range(50, 100)

@@ -73,14 +73,16 @@ def true_folder(tmp_path_factory):
     solved, failed = {"solution": learners[0].solution}, {"status": "timeout", "bound": -999}
     asked = [
         (two_armed, {}, [(number, movements, {}) for number, movements in enumerate(parts)]),
-        (tiny, {}, [(2, {"solution": corrected("right", "right")}, {})]),
-        (straight, {}, [(3, {"solution": along_paths(straight)}, {})]),
-        (two_armed, {"other_arm": "free"}, [(4, solved, {"bound": best})]),
+        (tiny, {}, [(0, {"solution": corrected("right", "right")}, {})]),
+        (straight, {}, [(0, {"solution": along_paths(straight)}, {})]),
+        (two_armed, {"other_arm": "free"}, [(0, solved, {"bound": best})]),
     ]
-    for run, parameters in NARROW.items():
-        asked.append((two_armed, parameters, [(run, {}, failed)]))
+    asked += [(two_armed, parameters, [(0, {}, failed)]) for parameters in NARROW.values()]
     method = MethodInfo("method", "", "", (), True, {}, "", "code")
-    plan = [Job(Cell(task, method, each), 0, range(7), suite="suite") for task, each, _ in asked]
+    plan = [
+        Job(Cell(task, method, each), 0, range(len(runs)), suite="suite")
+        for task, each, runs in asked
+    ]
     with writing(folder) as store:
         store.replace_plan(plan, {}, [], "")
         for job, (_, _, runs) in zip(plan, asked, strict=True):
@@ -121,15 +123,21 @@ def test_nothing_is_wrong_with_what_was_not_edited(true_folder):
     assert report.unchecked[-1] == "Runs without a solution: 2."
 
 
+def test_runs_that_the_plan_does_not_ask_for_are_counted(true_folder, tmp_path):
+    folder = edited(true_folder, tmp_path, "DELETE FROM plan WHERE position = 0")
+    report = checker.check_runs(folder)
+    assert (report.wrong, report.runs) == ([], 7)
+    assert "should ask for 2 other runs, which no report shows" in report.unchecked[-1]
+
+
 def result(run, change):
-    """An edit of the row of a run."""
-    return run, f"UPDATE results SET {change} WHERE run = {run}"
+    """An edit of the row of a run, by its place among the runs."""
+    return run, f"UPDATE results SET {change} WHERE id = {run + 1}"
 
 
 def movement(run, change, part="solution", order=0):
     """An edit of one of its movements."""
-    changed = f"(SELECT id FROM results WHERE run = {run}) AND part = '{part}'"
-    where = f'WHERE result_id = {changed} AND "order" = {order}'
+    where = f"""WHERE result_id = {run + 1} AND part = '{part}' AND "order" = {order}"""
     return run, f"UPDATE movements SET {change} {where}"
 
 
@@ -171,8 +179,7 @@ EDITS = {  # what is said: of which run, and what was edited
     "no count up to": movement(2, "ticks = 1000000000"),
     "more rewards than": (
         0,
-        """INSERT INTO learning SELECT id, x'789c63606060000000040001' FROM results
-        WHERE run = 0""",
+        "INSERT INTO learning VALUES (1, x'789c63606060000000040001')",
     ),
     "the task is too long": (
         2,
@@ -185,6 +192,12 @@ EDITS = {  # what is said: of which run, and what was edited
         None,
         "UPDATE cells SET setting = '' WHERE id = 4",
     ),
+    # Of the plan: what it asks for is there.
+    "asks for 7 runs, of which the folder has 6": (None, "DELETE FROM results WHERE id = 2"),
+    "asks for 7 runs, of which the folder has 0": (None, "UPDATE suite SET seed = 1"),
+    "asks for 9 runs, of which the folder has 7": (None, "UPDATE plan SET runs = 4 WHERE runs = 2"),
+    "Table suite has 0 rows": (None, "DELETE FROM suite"),
+    "Row 0 of table plan asks for no runs": (None, "UPDATE plan SET runs = 0 WHERE position = 0"),
     "Tables or views are not": (None, "ALTER TABLE learning ADD COLUMN base_x REAL"),
     "ables or views are not": (None, "DROP VIEW paths"),
 }
@@ -194,13 +207,16 @@ EDITS = {  # what is said: of which run, and what was edited
 def test_an_edit_is_found(true_folder, tmp_path, words):
     run, statement = EDITS[words]
     with closing(sqlite3.connect(true_folder / RUNS_FILE)) as db:
-        (run_id,) = db.execute("SELECT max(run_id) FROM results WHERE run = ?", [run]).fetchone()
+        query = "SELECT max(run_id) FROM results WHERE id = ? + 1"
+        (run_id,) = db.execute(query, [run]).fetchone()
     wrong = checker.check_runs(edited(true_folder, tmp_path, statement)).wrong
     assert any((run_id or "") in sentence and words in sentence for sentence in wrong), wrong
 
 
 def test_a_movement_of_endless_steps_is_made_as_far_as_its_ticks():
-    task = checker.stored_task(tiny_task().model_dump_json(), json.dumps(PAPER._asdict()))
+    task = checker.stored_task(
+        tiny_task().model_dump_json(), json.dumps(PAPER.for_radius()._asdict())
+    )
     task.model.step = 1e-12
     far = np.full(10, 1e4)
     for kind, waypoints in (("learned", []), ("path", [far])):
@@ -211,7 +227,7 @@ def test_a_movement_of_endless_steps_is_made_as_far_as_its_ticks():
 
 
 def test_the_command_says_what_it_found(true_folder, tmp_path, capsys, monkeypatch):
-    wrong = edited(true_folder, tmp_path, "UPDATE results SET reward = -1 WHERE run = 0")
+    wrong = edited(true_folder, tmp_path, "UPDATE results SET reward = -1 WHERE id = 1")
     endings = [
         (true_folder, "Nothing differs."),
         (wrong, "not -1"),
@@ -245,7 +261,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
     """Exactly, with a goal whose rim runs through a point of the movement, or a bit beside it; also
     where there is no way to go."""
     robot, on_path = task.robot, kind == "path"
-    model = PAPER._replace(step=step * max(scale, 1.0))
+    model = PAPER.for_radius()._replace(step=step * max(scale, 1.0))
     q, middle, target = np.random.default_rng(seed).uniform(-scale, scale, (3, robot.dof))
     target = q if aim[0] == 0.0 and not on_path else target
     judge = checker.stored_task(task.model_dump_json(), json.dumps(model._asdict()))

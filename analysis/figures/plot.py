@@ -20,8 +20,10 @@ from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
+from coartic.internal.threads import environment
 
 FORMATS = (".svg", ".pdf", ".png")
+_NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # whatever the user has there: no date is written
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,13 @@ class Plot:
     data: pd.DataFrame
     """Drawn numbers as a tidy frame, enough to draw the figure again."""
 
+    def _repr_html_(self) -> str:
+        """Return the picture that a notebook shows, with title and caption."""
+        words = html.escape(one_line(f"{self.title}. {self.caption}"))
+        return f"<figure>{for_page(self)}<figcaption>{words}</figcaption></figure>"
+
     def _repr_png_(self) -> bytes:
-        """Return the picture that a notebook shows."""
+        """Return the picture that programs show that show no HTML."""
         return picture(self.figure, ".png")
 
 
@@ -95,7 +102,7 @@ def picture(drawing: Figure, ending: str) -> bytes:
     if ending not in FORMATS:
         raise CoarticError(f"a picture ends in {', '.join(FORMATS)}; not in {brief_value(ending)}")
     stream, dated = io.BytesIO(), {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}
-    with rc_context(style.RC):
+    with rc_context(style.RC), environment(_NO_DATE):
         drawing.savefig(stream, format=ending[1:], dpi=300, metadata={dated[ending]: None})
     return stream.getvalue()
 
@@ -115,7 +122,7 @@ def for_page(plot: Plot) -> str:
 
     stream = io.StringIO()
     none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-    with rc_context({**style.RC, "svg.fonttype": "none"}):
+    with rc_context({**style.RC, "svg.fonttype": "none"}), environment(_NO_DATE):
         plot.figure.savefig(stream, format="svg", transparent=True, metadata=none)
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, stream.getvalue())
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])

@@ -162,6 +162,7 @@ def means(
         The frame has no rows, lacks a column, or has text in place of numbers.
     """
     checked(frame, numbers=[x, y], others=[by] * bool(by))
+    frame = frame.reset_index(drop=True)
     groups = frame.groupby(by, sort=False) if by else [("", frame)]
     for number, (color, (name, rows)) in enumerate(
         zip(itertools.cycle(PALETTE), groups, strict=False)

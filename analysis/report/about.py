@@ -78,11 +78,13 @@ def limits(study: Study) -> dict[str, Any]:
     fewest = min(papers, default=RUNS)
     tasks = list(one_by_one(study).values())
     optima = [(task, study.optima.get(task.name)) for task in tasks]
-    reasons = Counter(map(str, failed.reason.dropna())).most_common(3)
+    reasons = Counter(map(str, failed.reason.fillna(""))).most_common(3)
+    others = len(failed) - sum(count for _, count in reasons)
     return {
         "runs": len(runs),
         "failed": len(failed),
-        "reasons": [f"{count} × {reason}" for reason, count in reasons],
+        "reasons": [f"{count} × {reason}" for reason, count in reasons]
+        + [f"{others} for other reasons"] * bool(others),
         "reconstructed": [task.label for task in tasks if task.reconstructed],
         "trials": sorted(trials) if trials != {TRIALS} else [],
         "few": fewest if fewest < RUNS else 0,

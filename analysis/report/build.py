@@ -29,7 +29,7 @@ from coartic.analysis.sections.ranking import differences
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Table
 from coartic.analysis.words import listed, number
-from coartic.internal.files import check_inside, make_folder, publish
+from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of
 
@@ -54,10 +54,11 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
     home, report = os.path.relpath(study.folder, folder), folder / "report.html"
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)
-    elif report.exists() and f'-results" content="{home}"' not in html.unescape(
-        report.read_text("utf-8").partition("<title>")[0]
-    ):
-        raise CoarticError(f"{folder} holds the report of other results: choose another folder")
+    else:
+        with errors_in_words(report):
+            head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
+        if head and f'-results" content="{home}"' not in html.unescape(head):
+            raise CoarticError(f"{folder} holds the report of other results: choose another folder")
     files = {"report.html": page(study, home).encode()}
     captions = {section.table.id: (section.short, section.caption) for section in SECTIONS}
     for name, table in TABLES.items():

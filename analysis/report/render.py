@@ -181,4 +181,6 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
     if "$\\dagger$" in body or any("†" in note for note in notes):
         notes = [*notes, RECONSTRUCTED]
     needs = "% needs \\usepackage{booktabs,longtable} and \\usepackage[T1]{fontenc}"
-    return "\n".join([needs, body, *map(latex, notes), ""])
+    text = "\n".join([needs, body, *map(latex, notes), ""])
+    xelatex = "% needs XeLaTeX or LuaLaTeX, and a font that has the characters of \\symbol\n"
+    return xelatex * ("\\symbol" in text) + text

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from coartic import estimates
 from coartic.estimates import FEWER_RESAMPLES, Estimate
+from coartic.internal.limits import real_array
 from coartic.robot import Array
 
 Scores = Mapping[str, Sequence[Array]]
@@ -72,7 +73,7 @@ def other_tasks(scores: Scores) -> Estimate:
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
     values = {
-        family: np.array([runs.mean() for runs in instances])
+        family: np.array([real_array("runs", runs).mean() for runs in instances])
         for family, instances in scores.items()
     }
     mean = float(np.mean([instances.mean() for instances in values.values()]))

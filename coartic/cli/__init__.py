@@ -23,6 +23,7 @@ import coartic
 from coartic.cli import draw, read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
+from coartic.internal.text import LONGEST_LINE, plain
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -103,6 +104,6 @@ def main() -> None:
     except BrokenPipeError:  # the reader, such as head, has ended: typer ends quietly
         raise
     except OSError as error:
-        place = f": {error.filename}" if error.filename else ""
+        place = f": {plain(str(error.filename), LONGEST_LINE)}" if error.filename else ""
         complain("Error", f"{error.strerror or error}{place}")
         sys.exit(1)

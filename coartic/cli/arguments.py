@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import keyword
+import os
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -12,7 +15,7 @@ import typer
 
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.limits import check_limits
+from coartic.internal.limits import check_limits, number_or_range
 from coartic.internal.text import did_you_mean, unknown
 
 if TYPE_CHECKING:
@@ -56,6 +59,21 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
         return value
 
     return typer.Option(option, parser=read, metavar=unit, help=what)
+
+
+def runs_read(text: str) -> int | range:
+    """Return the number of runs that an option names, or the range of runs, such as ``50..99``.
+
+    Raises CoarticError for any other text.
+    """
+    ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", text)
+    value: Any = range(int(ends[1]), int(ends[2]) + 1) if ends else text
+    with suppress(ValueError):
+        value = int(text)
+    try:
+        return number_or_range("--runs", value, "50..99")
+    except ValueError as error:
+        raise CoarticError(str(error)) from None
 
 
 def names_in(text: str | None) -> list[str]:
@@ -105,7 +123,7 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
             meant += methods_named(id_named(name, ids), registered)
         except CoarticError:
             check_kind(name)  # a thing of another kind has its own sentence
-            if Path(file := file_name(name)).is_file():
+            if os.path.isfile(file := file_name(name)):
                 words = f"method {name!r} is not known: add --method-file {file}"
                 raise CoarticError(f"{words}, if it is defined there") from None
             every = [*ids, *filter(None, ids.values())]
@@ -116,5 +134,8 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
 
 
 def file_name(method: str) -> str:
-    """Return the name of the file that ``coartic new`` writes for a method."""
-    return re.sub(r"\W", "_", method) + ".py"
+    """Return the name of the file that ``coartic new`` writes for a method: one that Python can
+    import, and that hides no module of Python's."""
+    stem = re.sub(r"\W", "_", method)
+    taken = {*keyword.kwlist, *sys.stdlib_module_names, "coartic", "numpy"}
+    return f"{stem if stem.isidentifier() and stem not in taken else f'my_{stem}'}.py"

@@ -6,7 +6,7 @@ import itertools
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,7 +16,7 @@ from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
-from coartic.internal.limits import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.internal.limits import MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.internal.text import counted, one_line, unknown
 from coartic.internal.threads import MOST_JOBS
 
@@ -42,7 +42,12 @@ def run(
         given.option("FOLDER", "Folder for the results; results/SUITE if not given.", "--out"),
     ] = None,
     runs: Annotated[
-        int | None, given.within("--runs", "Runs of each method on each task.", 1, MOST_RUNS)
+        Any,
+        typer.Option(
+            parser=given.runs_read,
+            metavar="N",
+            help="Runs of each method on each task, or a part of them, such as 50..99.",
+        ),
     ] = None,
     trials: Annotated[
         int | None, given.within("--trials", "Trials of each run.", 1, MOST_TRIALS)
@@ -99,6 +104,8 @@ def run(
         **{"runs": runs, "trials": trials, "seed": seed},
         **{"time_limit_s": time_limit, "trial_budget": trial_budget},
     )
+    if scheduler is not None and jobs is not None:
+        raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     perform_and_say(plan(chosen, request, registered), out, include or [], jobs, scheduler)
 
@@ -132,6 +139,10 @@ def perform_and_say(
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(plan, out, executor=executor, watch=display.update)
     say(str(progress))
+    if any(job.numbers[0] for job in plan):
+        part = f"{out} has a part of the runs: --include {out}, with all other parts, joins them"
+        say_pairs([("Next", part)])
+        sys.exit(1 if progress.crashed else 0)
     study = load(out)
     say_answers(study, ("Next", f"coartic report {out}"))
     exit_if_parts_failed(study)
@@ -353,7 +364,7 @@ def new(
     path = Path(given.file_name(name)) if out is None else out
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
-    mine = type("Mine", (template.Mine,), {"name": name})
+    mine = type(name, (template.Mine,), {"name": name})
     check_declaration(mine, "coartic new")
     add_methods(registry(with_code=False), [method_info(mine, "coartic new", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)

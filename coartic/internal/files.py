@@ -52,23 +52,23 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
     """Make a folder for :func:`publish`, for those who work long before. Returns the files that an
     earlier call wrote there. Raises CoarticError where :func:`publish` would."""
-    if os.path.lexists(folder) and not folder.is_dir():
-        raise CoarticError(f"cannot write {folder}: what is there is no folder")
     ours, listing = set[str](), folder / LISTING
-    if listing.is_file() and not listing.is_symlink():
-        ours = {*listing.read_text(encoding="utf-8", errors="replace").splitlines()}
-        # Names that lead elsewhere are somebody else's, and a folder is no file.
-        ours = {n for n in ours if n and not Path(n).is_absolute() and ".." not in n}
-        ours = {name for name in ours if not (folder / name).is_dir()}
-    for name in sorted({*ours, *names}):
-        check_inside(folder, folder / name)
-    in_the_way = [name for name in names if name not in ours and os.path.lexists(folder / name)]
-    if in_the_way:
-        raise CoarticError(
-            f"{folder} holds {plain(', '.join(in_the_way), 80)}, which coartic did not write "
-            "there. Move it away or choose another folder."
-        )
     with errors_in_words(folder):
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise CoarticError(f"cannot write {folder}: what is there is no folder")
+        if listing.is_file() and not listing.is_symlink():
+            ours = {*listing.read_text(encoding="utf-8", errors="replace").splitlines()}
+            # Names that lead elsewhere are somebody else's, and a folder is no file.
+            ours = {n for n in ours if n and not Path(n).is_absolute() and ".." not in n}
+            ours = {name for name in ours if not (folder / name).is_dir()}
+        for name in sorted({*ours, *names}):
+            check_inside(folder, folder / name)
+        in_the_way = [name for name in names if name not in ours and os.path.lexists(folder / name)]
+        if in_the_way:
+            raise CoarticError(
+                f"{folder} holds {plain(', '.join(in_the_way), 80)}, which coartic did not write "
+                "there. Move it away or choose another folder."
+            )
         folder.mkdir(parents=True, exist_ok=True)
     return ours
 
@@ -93,15 +93,16 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
 def check_output(path: Path, *, replace: bool) -> None:
     """Raises CoarticError where a file may not be written: its name has no folder, is that of
     a folder or a link, or, without ``replace``, is taken."""
-    if not path.parent.is_dir():
-        raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
-    if path.is_symlink() or (path.exists() and not path.is_file()):
-        raise CoarticError(f"cannot write {path}: what is there is a link or no file")
-    if path.exists() and not replace:
-        raise CoarticError(
-            f"{path} is there already; add --replace (in Python replace=True) to write over it, or "
-            "choose another name"
-        )
+    with errors_in_words(path):
+        if not path.parent.is_dir():
+            raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise CoarticError(f"cannot write {path}: what is there is a link or no file")
+        if path.exists() and not replace:
+            raise CoarticError(
+                f"{path} is there already; add --replace (in Python replace=True) to write over "
+                "it, or choose another name"
+            )
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
@@ -122,7 +123,7 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 @contextlib.contextmanager
 def errors_in_words(path: Path) -> Iterator[None]:
-    """Raises CoarticError for what the system refuses."""
+    """Raise CoarticError for what the system refuses to write, or to read in order to write."""
     try:
         yield
     except OSError as error:

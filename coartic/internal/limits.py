@@ -20,6 +20,9 @@ MOST_TRIALS = 10_000_000
 MOST_SECONDS = 1_000_000
 """Most seconds of a run: eleven days; the system's clocks of waiting end at twice that."""
 MOST_SEED = 2**63 - 1
+"""Largest seed of a suite."""
+MOST_RUN_SEED = 2**128 - 1
+"""Largest seed of a run: some are hashes."""
 MOST_BYTES = 10_000_000
 """Most bytes of a file of tasks, suites or methods: a hundred times the largest one shipped."""
 WIDTHS = (1e-9, 100.0)
@@ -39,17 +42,45 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
         )
 
 
+def number_or_range(name: str, value: Any, example: str) -> int | range:
+    """Return a number of runs, or a range of runs. Raises ValueError, with the ``example`` of a
+    range, for anything else."""
+    is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
+    first, last = (value.start, value.stop) if is_range else (0, value)
+    try:
+        check_limits(name, last, 1, MOST_RUNS)
+        check_limits("its first run", first, 0, MOST_RUNS)
+    except ValueError as error:
+        raise ValueError(f"{error}, or a range, such as {example}") from None
+    return value if is_range else int(value)
+
+
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Numbers as an array of the shape that they have. Raises ValueError for anything else."""
+    """Numbers as an array of the shape that they have. Raises ValueError for anything else, and
+    for masked entries, under which an array holds numbers that do not count."""
     import numpy as np  # which the command line's help does without
 
     try:
         array = np.asarray(value)
     except ValueError:
-        raise ValueError(f"{name} has rows of different lengths") from None
+        raise ValueError(
+            f"{name} is {brief_value(value)}; needed are real numbers, in rows of one length"
+        ) from None
+    refuse_mask(name, value)
     if array.dtype.kind not in "uif":
         raise ValueError(f"{name} is {brief_value(value)}; needed are real numbers")
     return array.astype(np.float64, copy=False)
+
+
+def refuse_mask(name: str, value: Any) -> None:
+    """Raise ValueError for an array with masked entries, or a list that contains one."""
+    import numpy as np
+
+    if isinstance(value, list | tuple):
+        for each in value:
+            refuse_mask(name, each)
+    elif np.ma.is_masked(value):
+        raise ValueError(f"{name} has masked entries; needed are numbers without a mask")
 
 
 def brief_value(value: object) -> str:

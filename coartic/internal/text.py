@@ -115,13 +115,34 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f"; did you mean {nearest[0]!r}?" if nearest else ""
 
 
-def unknown(kind: str, name: str, names: Iterable[str]) -> str:
-    """A sentence on a name that is not among some names: the nearest of them, or all."""
+FOREIGN = (
+    ".urdf",
+    ".xml",
+    ".osim",
+    ".mot",
+    ".sto",
+    ".trc",
+    ".c3d",
+    ".mat",
+    ".xlsx",
+    ".xls",
+    ".ods",
+)
+"""Endings of files of robots and recordings that other programs write."""
+
+
+def unknown(kind: str, name: object, names: Iterable[str]) -> str:
+    """A sentence on a name that is not among some names: the nearest of them, or all; or on the
+    file of another program."""
+    if isinstance(name, str) and name.lower().endswith(FOREIGN):
+        ending = name.lower().rpartition(".")[2]
+        wanted = "a task is a TOML file, see docs/howto/task.md"
+        return f"{plain(name, LONGEST_LINE)}: coartic reads no .{ending} file; {wanted}."
     several = list(names)
     shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
     more = f" and {len(several) - shown} others" if len(several) > shown else ""
     known = f". Known: {', '.join(several[:shown])}{more}."
-    hint = did_you_mean(name, several) or known
+    hint = (did_you_mean(name, several) if isinstance(name, str) else "") or known
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 
 

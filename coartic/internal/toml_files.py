@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import stat
 import tomllib
 from pathlib import Path
@@ -9,7 +11,16 @@ from typing import Any
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_BYTES
-from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.text import FOREIGN, LONGEST_LINE, plain
+
+
+def refuse_foreign(
+    path: str | Path, wanted: str, *, error: type[CoarticError] = CoarticError
+) -> None:
+    """Raises ``error`` for a file of another program; ``wanted`` says what is read and where it is
+    explained."""
+    if (ending := Path(path).suffix.lower()) in FOREIGN:
+        raise error(f"{plain(str(path), LONGEST_LINE)}: coartic reads no {ending} file; {wanted}")
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
@@ -35,6 +46,8 @@ def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) ->
     except (OSError, ValueError) as failure:  # ValueError: a NUL in the name
         reason = getattr(failure, "strerror", None) or failure
         raise error(f"{shown}: cannot be read: {reason}") from None
+    if not os.access(path, os.R_OK):
+        raise error(f"{shown}: cannot be read: {os.strerror(errno.EACCES)}")
     if not stat.S_ISREG(found.st_mode):
         kind = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
         raise error(f"{shown}: cannot be read: it is {kind}, not a file")

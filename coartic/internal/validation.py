@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from functools import wraps
@@ -34,6 +35,17 @@ _PLAINER = {
     r"(valid )?dictionary( or (an )?instance of \w+)?": "table",
 }
 """Wordings of pydantic, and what they say to a person."""
+_OF_NUMBERS = (
+    *("q0", "base", "left", "right", "left_links", "right_links"),
+    *("left_shoulder", "right_shoulder", "base_size", "links", "x", "y"),
+)
+_OF_TEXTS = ("tasks", "methods", "method_files", "family_files")
+_LISTS = {
+    **dict.fromkeys(_OF_NUMBERS, " of numbers"),
+    **dict.fromkeys(_OF_TEXTS, ", such as [{!r}]"),
+    **{"hands": ", such as ['left', 'right']", "locked_base": ", such as ['y']"},
+}
+"""Advice on a text in the place of a list, by key."""
 
 
 def in_sentences(kind: type[T]) -> type[T]:
@@ -125,9 +137,12 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
         case "list_type" | "tuple_type" if key == "goals":
             message = "should be a list of points, such as [[3.0, 2.0]]"
         case "list_type" | "tuple_type" if isinstance(detail["input"], str):
-            message = f"should be a list, such as [{detail['input']!r}]"
+            advice = _LISTS.get(key.rpartition(".")[2], "").format(detail["input"])
+            message = f"should be a list{advice}"
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
+    if isinstance(detail["input"], float) and math.isnan(detail["input"]):
+        message = "should be a finite number"
     for wording, plainer in _PLAINER.items():
         message = re.sub(wording, plainer, message)
     return f"{key} is {brief_value(detail['input'])}; it {message[:1].lower()}{message[1:]}"

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
-from coartic.internal.limits import MOST_TRIALS, brief_value, check_limits
+from coartic.internal.limits import (
+    MOST_RUN_SEED,
+    MOST_RUNS,
+    MOST_TRIALS,
+    brief_value,
+    check_limits,
+)
 from coartic.internal.threads import threads_for
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
@@ -33,16 +41,23 @@ from coartic.motion.solution import (
     Movement,
     corrective_movements,
     hands_in,
+    hint_of,
     initial_hands,
     movements_by_goal,
     movements_in,
 )
-from coartic.motion.trial import COUNTED, compiled_task, empty_accounts, make_trials, note_trials
+from coartic.motion.trial import (
+    COUNTED,
+    compiled_task,
+    count_trials,
+    empty_accounts,
+    make_trials,
+)
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 
 TRIALS = 10_000  # trials of one run (published)
-_MOST_SEED = 2**128 - 1  # seeds of runs are hashes
+_MOST_KEPT = 200_000_000  # trials of one call, whose rewards take 9 bytes each
 
 
 def learn(
@@ -155,7 +170,8 @@ def learn_many(
     TaskError, NotApplicableError, CoarticError, SolutionError
         As :func:`learn` raises them.
     TypeError, ValueError
-        Likewise; also for seeds that are no list, and ``jobs`` that is neither -1 nor at least 1.
+        Likewise; also for seeds that are no list or too many, and ``jobs`` that is neither -1 nor
+        at least 1.
     """
     task = as_task(task)
     condition = load_condition(condition)
@@ -165,12 +181,21 @@ def learn_many(
     check_limits("trials", trials, 1, MOST_TRIALS)
     if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):
         raise TypeError(f"seeds is {brief_value(seeds)}; it must be a list of whole numbers")
-    ordered: Sequence[int] = list(seeds)
+    trials, most = int(trials), min(MOST_RUNS, _MOST_KEPT // trials)
+    ordered = [*islice(seeds, most + 1)]
+    if len(ordered) > most:
+        raise ValueError(
+            f"seeds has more than {most:_} entries, which are the most for runs of {trials:_} "
+            "trials: the rewards of all are kept. Run some seeds after the others"
+        )
     for seed in ordered:
-        check_limits("seed", seed, 0, _MOST_SEED)
+        check_limits("seed", seed, 0, MOST_RUN_SEED)
+    ordered = [int(seed) for seed in ordered]
     check_model(model, radius=task.radius)
     if start:
         first = [movements[0] for movements in movements_by_goal(task, start)]
+        if hint := hint_of(first):
+            warnings.warn(hint, stacklevel=2)
         for movement in first:
             if movement.hand not in condition.hands:
                 raise NotApplicableError(
@@ -180,7 +205,6 @@ def learn_many(
     else:
         hands = check_hands(task, initial_hands(task, condition.hands, model=model))
         first = corrective_movements(hands)
-    note_trials(trials * len(ordered))
     threads = threads_for(jobs)
     together = max(min(SLOTS, math.ceil(len(ordered) / threads)), 1)
     batches = [ordered[begin : begin + together] for begin in range(0, len(ordered), together)]
@@ -224,6 +248,7 @@ def learn_together(
     generators = [np.random.default_rng(seed) for seed in seeds]
     learner, rngs = learner_parameters(compiled, condition, first), addresses(generators)
     workspace = workspace_for(runs, task)
+    count_trials(runs * trials)
     clock = time.perf_counter()
     learn_kernel(compiled.parameters, learner, tables, results, rngs, workspace)
     wall = time.perf_counter() - clock

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, PAPER_RADIUS, MotionModel
 from coartic.motion.compile import chain_by, inlined, inner, record_type
 from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, HANDS, Arm, Robot
@@ -68,7 +68,7 @@ def parameters_type(links: int) -> np.dtype[np.void]:
 @lru_cache(maxsize=1024)
 def robot_parameters(
     robot: Robot,
-    radius: float = 0.0,
+    radius: float = PAPER_RADIUS,
     *,
     locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
@@ -80,7 +80,8 @@ def robot_parameters(
         first, links, *shoulder = robot.arm(hand)
         arm["first"], arm["count"], arm["links"][: len(links)] = first, len(links), links
         arm["shoulder_x"], arm["shoulder_y"] = shoulder
-    parameters["model"], parameters["radius"], parameters["checks"] = model, radius, checks
+    parameters["model"] = model.for_radius(radius)
+    parameters["radius"], parameters["checks"] = radius, checks
     for axis in "xy":
         parameters[f"free_{axis}"] = axis not in locked_base
     return parameters

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.internal.limits import real_array
+from coartic.internal.limits import brief_value, check_limits, real_array
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
@@ -54,6 +54,7 @@ _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
+_SLOW = 0.1  # gain × |J|² of the stretched arm; the paper's has 1.55
 _RANK = 1e-12  # square of the ratio of singular values up to which the smaller counts as 0
 _IN_GOAL, _MISSED = 1.0, 2.0  # statuses of a slot that has moved
 _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # and of one that has been corrected
@@ -155,7 +156,8 @@ def set_off(at: Any, count: int, step: float) -> bool:
         at.base_rate[0, i], at.base_rate[1, i] = base_x, base_y
         at.distance[i], at.slowness[i], at.bend[i] = distance, 1.0 / speed, bend
         last = np.ceil(distance / step)
-        at.step[i], at.last[i] = 0.0, last
+        # A line without a finite length has no step; its target is where it ends.
+        at.step[i], at.last[i] = 0.0, last if last < math.inf else 0.0
         # No joint turns farther than at the farther end, and, where it passes it, a step.
         most = winding(at.start, i) + winding(at.target, i) + step * len(at.length)
         far += 0 if most < trigonometry.LARGEST else 1
@@ -197,7 +199,7 @@ def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -
         closing = velocity_x * dx + velocity_y * dy
         rim = rims[0] + at.clearance[i]
         clear = clear_steps(to_goal, rim, closing, at.slowness[i], at.bend[i])
-        stop = at.step[i] == at.last[i]
+        stop = not at.step[i] < at.last[i]
         if stop_on_arrival:
             dx, dy = at.end[0, i] - at.x[tip, i], at.end[1, i] - at.y[tip, i]
             to_end = dx * dx + dy * dy
@@ -315,7 +317,7 @@ def move(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    robot.arm(hand)  # refuses what is no hand
+    check_arm(robot, hand)
     batch = batch_for(robot, 1)
     run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = configuration(robot, q)
@@ -526,7 +528,7 @@ def correct(
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
-    robot.arm(hand)  # refuses what is no hand
+    check_arm(robot, hand)
     batch = batch_for(robot, 1)
     run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = run["target"][figures] = configuration(robot, q)
@@ -548,9 +550,9 @@ def explain_failure(
     empty without a cause that users can mend.
 
     One is a hand whose joints all lie on the line to the goal: none of them moves it nearer. The
-    other is a long arm. Near a goal, errors shrink by ``1 - gain σ²``, with the singular values σ
-    of the Jacobian J; so the descent is stable while gain × |J|² is below 2, for the largest σ,
-    which is that of the stretched arm.
+    others are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``, with the
+    singular values σ of the Jacobian J; so the descent is stable while gain × |J|² is below 2, for
+    the largest σ, which is that of the stretched arm, and slow where that is small.
     """
     free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
     arm = robot.joints(hand)
@@ -560,12 +562,18 @@ def explain_failure(
     square = float(reaches @ reaches)
     if np.abs(slopes).max() <= 1e-12 * math.sqrt(square) * math.hypot(*error):
         return ": the arm is straight and points at the goal; bend it"
-    if (largest := model.gain * (square + bool(free))) < 2.0:
+    arm_alone = model.gain * square
+    if _SLOW <= (largest := arm_alone + model.gain * bool(free)) < 2.0:
         return ""
-    factor = math.ceil(10.0 * math.sqrt(model.gain * square / (2.0 - model.gain * bool(free)))) / 10
+    if largest < _SLOW:
+        factor = float(math.ceil(math.sqrt(1.0 / arm_alone)))
+        what = f"below {_SLOW:g} the descent is slow; multiply all lengths by {factor:g}"
+    else:
+        factor = math.ceil(10.0 * math.sqrt(arm_alone / (2.0 - model.gain * bool(free)))) / 10
+        what = f"above 2 the descent can be unstable; divide all lengths by {factor:g}"
     return (
-        f": gain × |J|² of the stretched arm is {largest:.3g}, and above 2 the descent can be "
-        f"unstable; divide all lengths by {factor:g}, those of links, goals and radius"
+        f": gain × |J|² of the stretched arm is {largest:.3g}, and {what}, those of links, goals "
+        "and radius"
     )
 
 
@@ -626,12 +634,21 @@ def configuration(robot: Robot, q: Any) -> Array:
     return array
 
 
+def check_arm(robot: Any, hand: Any) -> None:
+    """Raise TypeError for an object that is no robot, and ValueError for one that is no hand."""
+    if not isinstance(robot, Robot):
+        raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
+    robot.arm(hand)
+
+
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     """Return the centre of a goal. Raises ValueError if it is not finite or beyond
     ``LARGEST_ENTRY``."""
-    x, y = float(centre[0]), float(centre[1])
+    place = real_array("goal", centre)
+    if place.shape != (2,):
+        raise ValueError(f"goal is {brief_value(centre)}; it must be two numbers, x and y")
+    x, y = place.tolist()
     if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
         raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
-    if not 0.0 <= radius <= LARGEST_ENTRY:
-        raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST_ENTRY:g}")
+    check_limits("radius", radius, 0.0, LARGEST_ENTRY)
     return x, y

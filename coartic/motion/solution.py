@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
@@ -27,9 +29,9 @@ from coartic.motion.trial import (
     CompiledTask,
     account_type,
     compiled_task,
+    count_trials,
     hands_among,
     make_trials,
-    note_trials,
     reason_of_failure,
     search_initial_hands,
     sequences_with,
@@ -104,7 +106,8 @@ class Execution:
         names = ("hands", "reward", "ticks", "corrections")
         facts = {name: getattr(self, name) for name in names}
         facts |= {"reason": self.reason} if self.reason else {}
-        return short_repr(self, **facts)
+        alone = goals_without_target(self.movements)
+        return short_repr(self, **facts | ({"goals_without_target": alone} if alone else {}))
 
     @property
     def completed(self) -> bool:
@@ -180,27 +183,34 @@ def execute(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    note_trials(1)
     (execution,) = execute_many(compiled_task(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
-    if execution.ticks > WHOLE_TURNS / model.step:
-        hint_at_degrees(execution.movements)
+    if execution.ticks > WHOLE_TURNS / model.step and (hint := hint_of(execution.movements)):
+        warnings.warn(hint, stacklevel=2)
     return execution
 
 
-def hint_at_degrees(movements: Iterable[Movement]) -> None:
-    """Warn of a target that turns a joint so far as degrees would."""
+def hint_of(movements: Iterable[Movement]) -> str:
+    """Return the hint of movements of which a target turns a joint so far as degrees would; empty
+    without such a target."""
     for movement in movements:
         if movement.kind != "corrective" and movement.target is not None:
             angle = max(movement.target[BASE_DOF:].tolist(), key=abs)
             if abs(angle) > WHOLE_TURNS:
-                warnings.warn(
+                return (
                     f"goal {movement.goal}: the target has the angle {angle:.4g}; angles are in "
-                    f"rad. Did you mean {angle:.4g}° = {math.radians(angle):.3f}?",
-                    stacklevel=3,
+                    f"rad. Did you mean {angle:.4g}° = {math.radians(angle):.3f}?"
                 )
-                return
+    return ""
+
+
+def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
+    """Return the numbers of the goals that corrective movements alone were made for."""
+    kinds = defaultdict[int, set[str]](set)
+    for movement in movements:
+        kinds[movement.goal].add(movement.kind)
+    return tuple(goal for goal, made in sorted(kinds.items()) if made == {"corrective"})
 
 
 def execute_many(
@@ -300,7 +310,9 @@ def movements_in(
 
 def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
     """Execute a plan that has paths, one movement after the other."""
-    task, model, q = compiled.task, compiled.model, compiled.starts[0]
+    count_trials(1)
+    task, q = compiled.task, compiled.starts[0]
+    model = compiled.model.for_radius(task.radius)
     made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
         hand, before = movements[0].hand, len(made)
@@ -382,6 +394,12 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
+        for name, kind in (("goal", Integral), ("hand", str), ("kind", str)):
+            if not isinstance(value := getattr(movement, name), kind):
+                raise SolutionError(
+                    f"task {task.name!r}: {name} of a movement is {brief_value(value)}; it must be "
+                    f"{'a whole number' if kind is Integral else 'a text'}"
+                )
         if not plan or plan[-1][0].goal != movement.goal:
             plan.append([])
         of_goal = plan[-1]
@@ -402,15 +420,15 @@ def check_movement(task: Task, movement: Movement) -> Movement:
     """The movement, if it has what its kind needs and leads to configurations that the task allows;
     a path with its target. Raises SolutionError or ValueError."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
-    if movement.hand not in task.hands:
-        raise SolutionError(
-            f"the robot has no {movement.hand} hand; it has {' and '.join(map(repr, task.hands))}"
-        )
-    if kind not in KINDS:
-        raise SolutionError(f"unknown kind {kind!r}; known: {KINDS}")
+    if not isinstance(movement.hand, str) or movement.hand not in task.hands:
+        known = " and ".join(map(repr, task.hands))
+        hand = brief_value(movement.hand).strip("'")
+        raise SolutionError(f"the robot has no {hand} hand; it has {known}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise SolutionError(f"unknown kind {brief_value(kind)}; known: {KINDS}")
     if kind == "path":
-        if waypoints is None or len(waypoints) == 0:
-            raise SolutionError("a path needs waypoints")
+        if waypoints is None or not isinstance(waypoints, Iterable) or len([*waypoints]) == 0:
+            raise SolutionError("a path needs waypoints, a list of configurations")
         path = np.array([check_point(task, point) for point in waypoints], dtype=np.float64)
         if target is not None and not np.array_equal(target, waypoints[-1]):
             raise SolutionError("a path's target is its last waypoint")
@@ -428,7 +446,7 @@ def check_movement(task: Task, movement: Movement) -> Movement:
 def check_point(task: Task, point: Any) -> Array:
     """The point, with its base held (:func:`hold_base`). Raises ValueError for what is no
     configuration of the robot, and where it moves a locked base coordinate."""
-    usual = isinstance(point, np.ndarray) and point.dtype == np.float64
+    usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
         point = configuration(task.robot, point)
@@ -456,7 +474,7 @@ def hold_base(task: Task, points: Array) -> Array:
 
 def check_targets(task: Task, targets: Any) -> Configs:
     """Return a copy of the targets. Raises ValueError for targets that do not fit the task."""
-    copy = np.array(targets, dtype=np.float64)
+    copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
             f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
@@ -490,17 +508,17 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     ValueError
         The hands are no text of L and R, or there is not a row for each.
     """
-    targets = real_array("targets", targets)
-    if targets.ndim != 2 or len(targets) != len(hands):
+    chosen, targets = hands_of(hands), real_array("targets", targets)
+    if targets.ndim != 2 or len(targets) != len(chosen):
         raise ValueError(
             f"targets have shape {targets.shape}; needed is a row for each of the "
-            f"{len(hands)} hands in {brief_value(hands)}"
+            f"{len(chosen)} hands in {brief_value(hands)}"
         )
     return tuple(
         Movement(number, hand, "corrective")
         if np.isnan(target).all()
         else Movement(number, hand, "learned", target)
-        for number, (hand, target) in enumerate(zip(hands_of(hands), targets, strict=True), 1)
+        for number, (hand, target) in enumerate(zip(chosen, targets, strict=True), 1)
     )
 
 

@@ -22,6 +22,7 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
@@ -495,6 +496,37 @@ def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
     return compiled
 
 
+# ---- Trials outside the session of a run, of which honest methods make none ----
+
+_outside = 0
+_of_run: ContextVar[bool] = ContextVar("of_run", default=False)
+
+
+def count_trials(count: int) -> None:
+    """Count trials of a task as they are made, unless the session of a run makes them.
+
+    Called where trials are made, in the callers of the three loops and of single movements: no
+    function that has trials made needs to count.
+    """
+    global _outside
+    _outside += 0 if _of_run.get() else count
+
+
+@contextmanager
+def inside(of_run: bool) -> Iterator[None]:
+    """Count no trials of this block, in its thread, if the session of a run makes them."""
+    before = _of_run.set(_of_run.get() or of_run)
+    try:
+        yield
+    finally:
+        _of_run.reset(before)
+
+
+def trials_outside() -> int:
+    """Trials made outside so far, in this process."""
+    return _outside
+
+
 def make_trials(
     compiled: CompiledTask,
     hands: Hands,
@@ -503,6 +535,7 @@ def make_trials(
 ) -> Accounts:
     """Make N trials of a task: ``hands`` of shape ``(N, G)``; ``targets`` and ``stops`` as in
     :class:`Requests`."""
+    count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
     return reach(compiled.task.robot, arms, compiled.parameters)
 
@@ -589,34 +622,6 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
     return rows
 
 
-# ---- Trials outside the session of a run, of which honest methods make none ----
-
-_trials = 0
-_inside = 0
-
-
-def note_trials(count: int) -> None:
-    """Count trials, unless the session of a run makes them."""
-    global _trials
-    _trials += 0 if _inside else count
-
-
-@contextmanager
-def inside(of_run: bool) -> Iterator[None]:
-    """Count no trials in this block if they belong to the session of a run."""
-    global _inside
-    _inside += of_run
-    try:
-        yield
-    finally:
-        _inside -= of_run
-
-
-def trials_outside() -> int:
-    """Trials made outside so far, in this process."""
-    return _trials
-
-
 # ---- Initial hands: those of trial 0 ----
 
 MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
@@ -633,7 +638,6 @@ def ranked_sequences(
     given first.
     """
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
-    note_trials(len(codes))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets)
     trials = []

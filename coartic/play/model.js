@@ -12,17 +12,22 @@ const BASE_DOF = 2;
 const MOST_LINKS = 100;
 const MOST_SEQUENCES = 4096; // hand sequences that are tried one by one
 
-/* coartic/model.py */
+/* coartic/model.py; a tolerance of null is a tenth of the goals' radius. */
 const PAPER = {
-  step: 0.01, arrival_tolerance: 0.01, gain: 0.05, correction_tolerance: 0.01, max_iterations: 20000,
+  step: 0.01, arrival_tolerance: null, gain: 0.05, correction_tolerance: null, max_iterations: 20000,
 };
+
+function for_radius({ arrival_tolerance, correction_tolerance, ...model }, radius) {
+  const or_tenth = (tolerance) => tolerance ?? radius / 10;
+  return { ...model, arrival_tolerance: or_tenth(arrival_tolerance), correction_tolerance: or_tenth(correction_tolerance) };
+}
 
 /* coartic/motion/batch.py; `task` is one of the package as plain data. */
 function problem_of(task, model = PAPER) {
   const { robot, goals, radius, start: { base, left, right } } = task;
   const arm = (first, links, [shoulder_x, shoulder_y]) => ({ first, links, shoulder_x, shoulder_y });
   return {
-    task, robot, goals, radius, model, start: [...base, ...left, ...right],
+    task, robot, goals, radius, model: for_radius(model, radius), scale: scale_of(robot), start: [...base, ...left, ...right],
     hands: task.hands.map((hand) => HANDS.indexOf(hand)).sort(),
     arms: [
       arm(BASE_DOF, robot.left_links, robot.left_shoulder),
@@ -30,6 +35,11 @@ function problem_of(task, model = PAPER) {
     ],
     free: ["x", "y"].map((axis) => !task.locked_base.includes(axis)),
   };
+}
+
+/* coartic/robot.py */
+function scale_of({ left_links, right_links }) {
+  return Math.min(...[left_links, right_links].map((links) => links.reduce((sum, length) => sum + length))) / 4;
 }
 
 /* Of each coordinate whether it moves with some hands: base and their arms. */

@@ -66,6 +66,7 @@ def preset_of(task: Task) -> dict[str, Any]:
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
+    content["robot"]["base_size"] = list(task.robot.drawn_base)
     best = best_shipped(task)
     optimum = best.reward if best and best.proven else None
     return {"label": f"{task.label}{mark}", "task": content, "optimum": optimum}

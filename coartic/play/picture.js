@@ -66,20 +66,20 @@ class Picture {
     context.setLineDash([]);
   }
 
-  /* A grid of length units, one of which is named. */
-  grid(colour, ink) {
+  /* A grid of a number of length units, which is named. */
+  grid(unit, colour, ink) {
     const { context, size, scale } = this;
     const [left, top] = this.toWorld([0, 0]);
     const [right, bottom] = this.toWorld(size);
     context.strokeStyle = colour;
     context.globalAlpha = 0.45;
-    for (let x = Math.ceil(left); x <= right; x += 1) this.line([[x, bottom], [x, top]], 0.5);
-    for (let y = Math.ceil(bottom); y <= top; y += 1) this.line([[left, y], [right, y]], 0.5);
+    for (let k = Math.ceil(left / unit); k * unit <= right; k += 1) this.line([[k * unit, bottom], [k * unit, top]], 0.5);
+    for (let k = Math.ceil(bottom / unit); k * unit <= top; k += 1) this.line([[left, k * unit], [right, k * unit]], 0.5);
     context.globalAlpha = 1;
     context.strokeStyle = ink;
-    const [from, to] = [12, 12 + scale].map((x) => this.toWorld([x, size[1] - 12]));
+    const [from, to] = [12, 12 + unit * scale].map((x) => this.toWorld([x, size[1] - 12]));
     this.line([from, to], 1.5);
-    this.text("1 length unit", [18 + scale, size[1] - 12], ink, "left", 12);
+    this.text(`${unit} length unit${unit === 1 ? "" : "s"}`, [18 + unit * scale, size[1] - 12], ink, "left", 12);
   }
 
   /* What the box slides on, below it or beside it. */

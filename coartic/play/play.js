@@ -10,7 +10,7 @@ const HOLD_S = 0.9; // at a hit
 const DRIFTS = [0, 0.03, 0.1, 0.3, 1]; // κ, how far exploration leans towards the next goal
 const MOST_GOALS = 6;
 const FAR = 12; // length units or rad: no goal lies farther, no joint is turned more
-const STRIDE = 2; // length units, to a new goal
+const STRIDE = 2; // to a new goal, for arms of length 4
 const ROLES = ["first", "second"];
 const NAMES = {
   alone: "corrective process alone", learner: "the learner", plan: "the planner (local search)", you: "you",
@@ -20,7 +20,6 @@ const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
 const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, value)));
-const within = (place) => bounded(place).map((value) => Math.round(100 * value) / 100);
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 /* What the reader has chosen; all of it is in the link. `mate` moves the second robot where you move the first.
@@ -74,7 +73,7 @@ class Mover {
   seen() {
     const step = Math.max(1, Math.floor(this.rows.length / 40));
     return this.rows.filter((_, k) => k % step === 0 || k === this.last).flatMap((q) => [
-      [q[0] - 0.6, q[1] - 0.2], ...this.problem.hands.flatMap((hand) => joint_positions(this.problem, q, hand)),
+      [q[0] - 0.6 * this.problem.scale, q[1] - 0.2 * this.problem.scale], ...this.problem.hands.flatMap((hand) => joint_positions(this.problem, q, hand)),
     ]);
   }
 }
@@ -368,11 +367,11 @@ class Play {
     colours.ghost = colours.dim;
     this.colours = colours;
     const points = [...this.movers.flatMap((mover) => mover.seen()), ...this.problems.flatMap((problem) => problem.goals)];
-    if (!this.box || !this.held) this.box = around(points, 0.7);
+    const [{ free, start, robot, scale }] = this.problems;
+    if (!this.box || !this.held) this.box = around(points, 0.7 * scale);
     if (!this.held) this.glide(); // the place under the pointer stays
     stage.begin(this.view);
-    stage.grid(colours.line, colours.soft);
-    const [{ free, start, robot }] = this.problems;
+    stage.grid(this.unit, colours.line, colours.soft);
     if (free[0] !== free[1]) stage.rail(start, robot.base_size[1] / 2, free[0], colours.line);
     if (!this.editing) this.movers.forEach((mover) => {
       const row = this.row(mover);
@@ -414,9 +413,9 @@ class Play {
   glide() {
     if (!this.view || this.calm.matches) this.view = this.box;
     else {
-      const off = Math.max(...this.box.map((value, k) => Math.abs(value - this.view[k])));
-      this.view = off < 0.02 ? this.box : this.view.map((value, k) => value + 0.25 * (this.box[k] - value));
-      if (off >= 0.02) this.refresh();
+      const [off, near] = [Math.max(...this.box.map((value, k) => Math.abs(value - this.view[k]))), 0.02 * this.unit];
+      this.view = off < near ? this.box : this.view.map((value, k) => value + 0.25 * (this.box[k] - value));
+      if (off >= near) this.refresh();
     }
   }
 
@@ -446,7 +445,9 @@ class Play {
     const { means } = this.difference;
     const points = both.flatMap((runs, k) => [...runs, means[k]].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
     const [x, y] = problem.goals[this.shared];
-    inset.begin(around([...points, [x + 0.3, y + 0.2], ...means.map(([base_x, base_y]) => [base_x - 0.5, base_y - 0.1])], 0.3));
+    const { scale } = problem;
+    const sides = means.map(([base_x, base_y]) => [base_x - 0.5 * scale, base_y - 0.1 * scale]);
+    inset.begin(around([...points, [x + 0.3 * scale, y + 0.2 * scale], ...sides], 0.3 * scale));
     both.forEach((runs, k) => {
       runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
       inset.robot(problem, means[k], { colour: colours[ROLES[k]], alpha: 0.9 });
@@ -689,7 +690,7 @@ class Play {
       const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
       if (!way) return;
       event.preventDefault();
-      const by = event.shiftKey ? 0.02 : 0.1;
+      const by = (event.shiftKey ? 0.02 : 0.1) * this.unit;
       this.showMeeting();
       handle.at = [handle.at[0] + by * way[0], handle.at[1] + by * way[1]];
       handle.move(handle.at);
@@ -706,8 +707,8 @@ class Play {
 
   moveGoal(k, g, to) {
     const { state } = this;
-    if (k) state.others = state.others.with(g - 1, within(to));
-    else state.goals = state.goals.with(g, within(to));
+    if (k) state.others = state.others.with(g - 1, this.within(to));
+    else state.goals = state.goals.with(g, this.within(to));
     Object.assign(state, { own: null, announced: null });
     this.ask();
   }
@@ -750,7 +751,7 @@ class Play {
       settle(0);
     } else {
       const [moved, k] = part;
-      bring_within(problem, q, to, moved, joints(problem.arms[moved], 0, k), 0.01, k);
+      bring_within(problem, q, to, moved, joints(problem.arms[moved], 0, k), 0.01 * this.unit, k);
       if (moved === hand) settle(k);
     }
     this.state.own = this.own.with(goal, [hand, ...q.map((value) => Math.round(1e4 * value) / 1e4)]);
@@ -808,8 +809,8 @@ class Play {
       const { moved, state } = this;
       const [from, to] = state.goals.slice(moved - 1);
       const way = [to[0] - from[0], to[1] - from[1]];
-      const length = Math.hypot(...way) || 1;
-      Object.assign(state, { goals: state.goals.with(moved, within([to[0] - way[1] / length, to[1] + way[0] / length])), others: null, announced: [to], tick: -1 });
+      const length = Math.hypot(...way) / this.unit || 1;
+      Object.assign(state, { goals: state.goals.with(moved, this.within([to[0] - way[1] / length, to[1] + way[0] / length])), others: null, announced: [to], tick: -1 });
       this.playing = false;
       this.ask();
       this.keep();
@@ -843,17 +844,27 @@ class Play {
     on("trials-csv", "click", () => this.download(new Blob([this.csv], { type: "text/csv" }), "trials.csv"));
   }
 
+  /* A power of ten near the robot's size: 1 for arms of length 4. Places have two digits after it. */
+  get unit() {
+    return 10 ** Math.round(Math.log10(scale_of(this.preset.task.robot)));
+  }
+
+  within(place) {
+    const parts = 100 / this.unit;
+    return bounded(place).map((value) => Math.round(parts * value) / parts);
+  }
+
   /* A place for one more goal of a list: the one that is wished for, or a stride from the last in some direction; in
      reach of the robot, and apart from all other goals. */
   spot(list, wish) {
-    const [last, before = [last[0] - 1, last[1]]] = [list.at(-1), list.at(-2)];
+    const [stride, last, before = [last[0] - 1, last[1]]] = [STRIDE * this.problems[0].scale, list.at(-1), list.at(-2)];
     const way = Math.atan2(last[1] - before[1], last[0] - before[0]);
     const turned = [2, -2, 3, -3, 1, -1, 4, -4, 0, 5, -5, 6].map((k) => way + (k * Math.PI) / 6);
     const taken = [...this.state.goals, ...(this.state.others || []), ...list];
-    const places = [...(wish ? [wish] : []), ...turned.map((angle) => [last[0] + STRIDE * Math.cos(angle), last[1] + STRIDE * Math.sin(angle)])].map(within);
+    const places = [...(wish ? [wish] : []), ...turned.map((angle) => [last[0] + stride * Math.cos(angle), last[1] + stride * Math.sin(angle)])].map((to) => this.within(to));
     return places.find((place) => {
       const problem = problem_of(this.taskWith([...list, place]));
-      return taken.every((goal) => Math.hypot(goal[0] - place[0], goal[1] - place[1]) >= STRIDE / 2) && corrective_trial(problem, initial_hands(problem)).going;
+      return taken.every((goal) => Math.hypot(goal[0] - place[0], goal[1] - place[1]) >= stride / 2) && corrective_trial(problem, initial_hands(problem)).going;
     }) || places[0];
   }
 
@@ -864,7 +875,7 @@ class Play {
     if (!this.data.presets[state.preset]) state.preset = this.first.preset;
     const { task, others = null } = this.preset;
     const most = Math.max(MOST_GOALS, task.goals.length);
-    const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, most).map(within);
+    const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, most).map((place) => this.within(place));
     const [goals, second, announced] = ["goals", "others", "announced"].map(places);
     state.goals = goals && goals.length ? goals : task.goals;
     state.others = second ? (second.length && state.goals.length > 1 ? second : null) : others;

@@ -62,7 +62,7 @@ class Cell:
                 "task": self.definition,
                 "method": self.method.name,
                 "parameters": self.parameters,
-                "model": PAPER._asdict(),
+                "model": PAPER.for_radius(self.task.radius)._asdict(),
                 "trial_budget": self.trial_budget,
             }
         )
@@ -76,7 +76,8 @@ class Job:
     seed: int
     """Seed of the suite."""
     numbers: SkipValidation[Sequence[int]]
-    """Numbers of the runs, from 0 within the cell."""
+    """Numbers of the runs, from 0 within the cell; in a plan a range. A plan of runs 50 to 99 is a
+    part of the plan of runs 0 to 99, which a folder states."""
     time_limit_s: Annotated[float, Field(allow_inf_nan=False)] | None = None
     """CPU time of all these runs together, s."""
     suite: str = ""

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from coartic.errors import CoarticError
+from coartic.internal.files import make_folder
 from coartic.internal.limits import MOST_RUNS, MOST_TRIALS, check_limits
 from coartic.internal.text import one_line, plain
 from coartic.internal.validation import explain_inline
@@ -107,6 +108,7 @@ _SURROUNDINGS: dict[str, Any] = {
 """Types of the facts about the surroundings of a suite that reports show."""
 _LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
 WAIT_S = 1.0  # wait for another program
+_LONGEST_PATH = 500  # letters of the path of a file; SQLite adds those of its journal
 
 
 class Store:
@@ -153,7 +155,7 @@ class Store:
                 latest = (as_text(row["defaults"]), row["setting"], row["origin"], cell)
                 query = "UPDATE cells SET defaults = ?, setting = ?, origin = ? WHERE id = ?"
                 self._db.execute(query, latest)
-                asked = {"position": position, "cell": cell, "runs": len(job.numbers)}
+                asked = {"position": position, "cell": cell, "runs": job.numbers[-1] + 1}
                 self._insert("plan", asked)
             robots = [job.cell.task.robot for job in plan]
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
@@ -168,7 +170,7 @@ class Store:
             tasks: dict[str, Task] = {}
             jobs = []
             for row in self._db.execute(query):
-                check_limits("runs", row["runs"], 0, MOST_RUNS)
+                check_limits("runs", row["runs"], 1, MOST_RUNS)
                 cell = self._read_cell(row)
                 if tasks.setdefault(cell.task.name, cell.task) != cell.task:
                     raise ValueError(f"two tasks are called {cell.task.name!r}")
@@ -452,7 +454,7 @@ def cell_row(cell: Cell) -> dict[str, Any]:
         "origin": method.origin,
         "parameters": cell.parameters,
         "setting": cell.setting,
-        "model": PAPER._asdict(),
+        "model": PAPER.for_radius(cell.task.radius)._asdict(),
         "trial_budget": cell.trial_budget,
     }
 
@@ -465,14 +467,19 @@ def open_store(folder: Path) -> Iterator[Store]:
     ``coartic run`` writes into it.
     """
     path = folder / RUNS_FILE
-    if not os.path.lexists(path):
-        near = [*folder.parent.glob(RUNS_FILE), *sorted(folder.glob(f"*/{RUNS_FILE}"))][:3]
-        hint = f"; did you mean {' or '.join(str(each.parent) for each in near)}?" if near else ""
-        if not os.path.lexists(folder):
-            raise CoarticError(f"there is no folder {folder}{hint}")
-        raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}{hint}")
-    check_files(folder)
-    with closing(connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)) as connection:
+    with explain_errors(folder):
+        try:
+            path.lstat()
+        except (FileNotFoundError, NotADirectoryError):
+            near = [*folder.parent.glob(RUNS_FILE), *sorted(folder.glob(f"*/{RUNS_FILE}"))][:3]
+            meant = " or ".join(str(each.parent) for each in near)
+            hint = f"; did you mean {meant}?" if near else ""
+            what = f"{folder} is not a results folder: it has no {RUNS_FILE}"
+            what = what if os.path.lexists(folder) else f"there is no folder {folder}"
+            raise CoarticError(f"{what}{hint}") from None
+        check_files(folder)
+        opened = connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)
+    with closing(opened) as connection:
         with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
             connection.execute("BEGIN")  # all reads of this block see one state
@@ -498,18 +505,18 @@ def writing(folder: Path) -> Iterator[Store]:
     Raises CoarticError if the folder holds something else or cannot be written, and while another
     process writes into it.
     """
-    visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
-    if not (folder / RUNS_FILE).exists() and any(visible):
-        raise CoarticError(
-            f"{folder} is not empty and holds no results of coartic. Choose another folder."
-        )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
+    with explain_errors(folder):
+        visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
+        if not (folder / RUNS_FILE).exists() and any(visible):
+            raise CoarticError(
+                f"{folder} is not empty and holds no results of coartic. Choose another folder."
+            )
+        make_folder(folder)
     with lock(folder):
-        check_files(folder)
-        with closing(connect(str(folder / RUNS_FILE), WAIT_S)) as connection:
+        with explain_errors(folder):
+            check_files(folder)
+            opened = connect(str(folder / RUNS_FILE), WAIT_S)
+        with closing(opened) as connection:
             with explain_errors(folder):
                 is_there = has_tables(connection)  # raises before anything is written
                 # No write-ahead log, which is unsafe on network disks and adds a file.
@@ -571,9 +578,13 @@ def check_files(folder: Path) -> None:
     """
     for ending in ("", "-journal", "-wal", "-shm"):
         path = folder / f"{RUNS_FILE}{ending}"
-        if path.is_symlink() or (path.exists() and not path.is_file()):
+        if path.is_symlink():
+            holder = plain(str(Path(os.path.realpath(path)).parent))
+            raise CoarticError(f"{path} is a link: name the folder that holds the file, {holder}")
+        if path.exists() and not path.is_file():
+            kind = "a folder" if path.is_dir() else "a pipe or a device"
             raise CoarticError(
-                f"{path} is no file of its own, as a link is none: name the folder that holds it"
+                f"{path} is {kind}, not a file: move it away, or name another folder"
             )
         # After a rollback SQLite deletes the file that such a journal names.
         if ending == "-journal" and path.exists() and path.stat().st_size >= len(_OF_SEVERAL):
@@ -586,8 +597,9 @@ def check_files(folder: Path) -> None:
 def has_tables(connection: sqlite3.Connection) -> bool:
     """Return True if the file has the tables of coartic, and False if the file is empty.
 
-    Raises CoarticError for any other file, and ValueError for a row that names a missing row: no
-    view would show its run.
+    What other programs add to the file (statistics, indexes, tables, views) is let be, except
+    triggers, which change what is written. Raises CoarticError for any other file, and ValueError
+    for a row that names a missing row: no view would show its run.
     """
 
     def schema(of: sqlite3.Connection) -> set[tuple[str, str, str]]:
@@ -598,6 +610,11 @@ def has_tables(connection: sqlite3.Connection) -> bool:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     there = schema(connection)
     if application != _APPLICATION:
+        if {"cells", "results"} <= {name for _, name, _ in there}:
+            raise CoarticError(
+                "it was restored from a dump, which keeps neither whose file it is nor its format: "
+                "copy the file itself"
+            )
         if there:
             raise CoarticError("it is not a file of coartic; move it away")
         return False
@@ -612,7 +629,8 @@ def has_tables(connection: sqlite3.Connection) -> bool:
         ours.executescript(_SCHEMA)
         columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]
         add_joints(ours, filter(_JOINT.fullmatch, columns))
-        for kind, name, _ in sorted(there ^ schema(ours)):
+        triggers = {entry for entry in there if entry[0] == "trigger"}
+        for kind, name, _ in sorted((schema(ours) - there) | triggers):
             raise CoarticError(
                 f"it is not as coartic makes it: {kind} {plain(name, 80)} is missing or is not "
                 "ours. Restore a copy, or run the suite again with another --out."
@@ -633,16 +651,16 @@ def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
 
 
 UNREADABLE = (
-    *(sqlite3.DatabaseError, zlib.error),
+    *(OSError, sqlite3.DatabaseError, zlib.error),
     *(ValueError, KeyError, TypeError, OverflowError, RecursionError),
 )
-"""Errors that a file raises whose content coartic did not write."""
+"""Errors that a file raises that cannot be used, or whose content coartic did not write."""
 
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Turn an error of this block into a CoarticError, be it an error of SQLite or of the content
-    of the file."""
+    """Turn an error of this block into a CoarticError, be it an error of the system, of SQLite or
+    of the content of the file."""
     try:
         yield
     except (CoarticError, *UNREADABLE) as error:
@@ -654,6 +672,8 @@ def explain(path: Path, error: Exception) -> str:
     if isinstance(error, CoarticError):
         said = one_line(str(error))
         return said if str(path.parent) in said else f"{path}: {said}"
+    if isinstance(error, OSError):
+        return f"cannot use {plain(str(error.filename or path))}: {error.strerror or error}"
     kind, is_text = getattr(error, "sqlite_errorname", ""), "decode to UTF-8" in str(error)
     if isinstance(error, sqlite3.OperationalError) and not is_text:
         if kind == "SQLITE_READONLY_DBMOVED":
@@ -668,15 +688,43 @@ def explain(path: Path, error: Exception) -> str:
                 f"{path} was left in the middle of writing, and cannot be put right, since the "
                 "folder cannot be written. Copy the whole folder, and use the copy."
             )
+        if kind.startswith("SQLITE_CANTOPEN"):
+            return f"cannot use {path}: {why_not_opened(path) or error}"
         return f"cannot use {path}: {error}"
     wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
     wrong = plain(wrong, 200) or type(error).__name__
+    if kind == "SQLITE_NOTADB" and (what := what_it_is(path)):
+        return f"{path} is {what}"
     if type(error) is sqlite3.DatabaseError or is_text:  # malformed, no database, or no UTF-8
         return (
             f"{path} is damaged ({wrong}). Move it away and repeat the `coartic run` command, or "
             "restore a copy."
         )
     return f"{path} holds what coartic does not write ({wrong})"
+
+
+def why_not_opened(path: Path) -> str:
+    """Return why SQLite cannot open a file, in words; empty if the system would open the file."""
+    try:
+        path.open("rb").close()
+    except FileNotFoundError:
+        return "" if os.access(path.parent, os.W_OK) else "its folder may not be written"
+    except OSError as error:
+        return error.strerror or str(error)
+    if len(str(path.absolute())) >= _LONGEST_PATH:
+        return f"SQLite takes no path of {_LONGEST_PATH} letters: name a folder higher up"
+    return ""
+
+
+def what_it_is(path: Path) -> str:
+    """Return what a file is that is no database, with what to do; empty for any other file."""
+    with path.open("rb") as file:
+        begins = file.read(40).lstrip()
+    if begins.startswith(b"version https://git-lfs"):
+        return "a pointer of Git LFS, not the file: `git lfs pull` brings the file"
+    if begins.startswith((b"PRAGMA", b"BEGIN TRANSACTION")):
+        return "a dump of a database as text: copy the file itself"
+    return ""
 
 
 def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:

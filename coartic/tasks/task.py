@@ -7,6 +7,7 @@ the key and what would be right.
 
 from __future__ import annotations
 
+import html
 import json
 import math
 import re
@@ -25,7 +26,7 @@ from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import Line, counted, did_you_mean, short_repr
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, error_saying, explain_file
-from coartic.model import PAPER, MotionModel, check_model
+from coartic.model import PAPER, PAPER_RADIUS, MotionModel, check_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
@@ -33,7 +34,7 @@ INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all"
 LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "paper"
 
-MOST_GOALS = 100
+MOST_GOALS = 256
 LONGEST_NAME = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Form of names of tasks and suites, which become names of files and parts of commands."""
@@ -135,7 +136,7 @@ class Task(FileData):
     """Hands the robot has."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
     """Goal centres x_g in the order in which they are to be hit, length unit."""
-    radius: Length = 0.1
+    radius: Length = PAPER_RADIUS
     """θ^g: radius of every goal, length unit."""
     locked_base: Annotated[tuple[Literal["x", "y"], ...], Field(max_length=2)] = ()
     """Base coordinates that cannot move."""
@@ -299,6 +300,37 @@ class Task(FileData):
             initial_hands=self.initial_hands,
         )
 
+    def _repr_html_(self) -> str:
+        """Return the picture that a notebook shows: base, arms and numbered goals at the start."""
+        arms = [self.robot.joint_positions(self.q0, hand) for hand in HANDS]
+        lines = [(arms[0], "grey"), (arms[1], "currentColor")]
+        corners = self.robot.base_outline(self.q0)
+        lines.append((np.concatenate([corners, corners[:1]]), "currentColor"))
+        around = np.concatenate([self.goal_array, *(points for points, _ in lines)])
+        (left, low), (right, high) = around.min(axis=0) - 0.5, around.max(axis=0) + 0.5
+
+        def places(points: Array) -> str:
+            return " ".join(f"{x:.3f},{high - y:.3f}" for x, y in points - [left, 0.0])
+
+        marks = [
+            f'<polyline points="{places(points)}" fill="none" stroke="{colour}" '
+            'stroke-width="0.06"/>'
+            for points, colour in lines
+        ]
+        for number, goal in enumerate(self.goal_array, 1):
+            (x, y), radius = places(goal[None]).split(","), self.radius
+            marks.append(
+                f'<circle cx="{x}" cy="{y}" r="{radius:g}" fill="none" stroke="#009e73" '
+                f'stroke-width="0.04"/><text x="{x}" y="{y}" dy="-0.2" font-size="0.35" '
+                f'text-anchor="middle" fill="currentColor">{number}</text>'
+            )
+        words = html.escape(repr(self))
+        return (
+            f'<figure><svg viewBox="0 0 {right - left:.3f} {high - low:.3f}" width="420" '
+            f'role="img" aria-label="{words}">{"".join(marks)}</svg>'
+            f"<figcaption>{words}</figcaption></figure>"
+        )
+
 
 def check_hands(task: Task, hands: str) -> str:
     """The hand sequence itself; ValueError where it does not fit the task."""
@@ -357,7 +389,8 @@ def check_task(task: Task, model: MotionModel = PAPER) -> Task:
         check_model(model, radius=task.radius)
     except ValueError as error:
         raise TaskError(f"task {task.name!r}: {error}") from None
-    problem = out_of_reach(task, model.correction_tolerance)
+    _, tolerance = model.tolerances(task.radius)
+    problem = out_of_reach(task, tolerance)
     if problem is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
     return task

@@ -15,11 +15,11 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from coartic.benchmarks import shipped
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
+from coartic.runs import shipped
 from coartic.runs.store import RUNS_FILE, open_store, writing
 
 

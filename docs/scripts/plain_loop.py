@@ -96,7 +96,7 @@ def arguments(task: Task, hands: str) -> tuple[Any, ...]:
     for hand in HANDS:
         first, links, shoulder_x, shoulder_y = task.robot.arm(hand)
         arms.append((first, len(links), np.array(links), shoulder_x, shoulder_y))
-    model = PAPER
+    model = PAPER.for_radius(task.radius)
     rules = (
         task.radius, model.step, model.arrival_tolerance, model.gain, model.correction_tolerance,
         float(model.max_iterations),

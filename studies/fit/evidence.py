@@ -11,8 +11,7 @@ B: residuals are N(0, σ² s² + τ² B Bᵀ).
 from typing import NamedTuple
 
 import numpy as np
-from hits import HANDS
-from models import landings, starts, tables_before
+from models import HANDS, landings, starts, tables_before
 from scipy import linalg, sparse
 
 DRIFTS = (0.0, 0.03, 0.1, 0.3, 1.0)
@@ -70,8 +69,8 @@ class Evidence(NamedTuple):
         return sparse.csr_array((each[there], (row[there], self.records[there])), shape)
 
     def covariance(self, sigma, kappa, noise, residual):
-        """Return the covariance of residuals, or its diagonal if they are independent, and the
-        logarithm of the probability that some hits landed elsewhere and the others did not."""
+        """Return the covariance of residuals, or its diagonal if they are independent, and where
+        hits landed elsewhere."""
         variance = (sigma * self.at(kappa)[1]) ** 2
         b = self.weights(kappa) if noise else None
         total = variance + (noise**2 * b.power(2).sum(axis=1) if noise else 0.0)
@@ -79,20 +78,25 @@ class Evidence(NamedTuple):
         here = np.log(1 - ELSEWHERE) - (self.sizes * np.log(total) + square / total) / 2
         elsewhere = here < np.log(ELSEWHERE) - square / 2
         variance = np.where(elsewhere, 1.0, variance)
-        prior = np.log(np.where(elsewhere, ELSEWHERE, 1 - ELSEWHERE)).sum()
-        return (noise**2 * (b @ b.T).toarray() + np.diag(variance) if noise else variance), prior
+        full = noise**2 * (b @ b.T).toarray() + np.diag(variance) if noise else variance
+        return full, elsewhere
 
     def log_likelihood(self, sigma, kappa, noise):
         """Return the logarithm of the likelihood of the postures."""
-        residual, _ = self.at(kappa)
-        covariance, prior = self.covariance(sigma, kappa, noise, residual)
+        z, scale, elsewhere = self.standardised(sigma, kappa, noise, self.at(kappa)[0])
+        logs = (z**2).sum() / 2 + self.sizes @ np.log(np.sqrt(2 * np.pi) * scale)
+        return prior_of(elsewhere) - logs
+
+    def standardised(self, sigma, kappa, noise, residual):
+        """Return residuals as N(0, 1), their scales, and where hits landed elsewhere."""
+        covariance, elsewhere = self.covariance(sigma, kappa, noise, residual)
         if noise:
             root = linalg.cholesky(covariance, lower=True)
             z, scale = linalg.solve_triangular(root, residual, lower=True), root.diagonal()
         else:
             scale = np.sqrt(covariance)
             z = residual / scale[:, None]
-        return prior - (z**2).sum() / 2 - self.sizes @ np.log(np.sqrt(2 * np.pi) * scale)
+        return z, scale, elsewhere
 
     def hands(self, epsilon):
         """Return the logarithm of the likelihood of the choices of hands."""
@@ -107,7 +111,7 @@ class Evidence(NamedTuple):
         weight = np.full((len(DRIFTS), number.max() + 1), 1 / len(DRIFTS))
         least = (values**2).sum(axis=2).argmin(axis=0)
         nearest = values[least, np.arange(len(least))]
-        covariance, prior = self.covariance(sigma, float(np.mean(DRIFTS)), noise, nearest)
+        covariance, elsewhere = self.covariance(sigma, float(np.mean(DRIFTS)), noise, nearest)
         precision = linalg.inv(covariance) if noise else 1 / covariance
         diagonal = precision.diagonal() if noise else precision
         log_root = np.linalg.slogdet(covariance)[1] / 2 if noise else 0.0
@@ -119,8 +123,13 @@ class Evidence(NamedTuple):
             total = np.logaddexp.reduce(logs)
             weight = np.exp(logs - total)
         half = self.sizes.mean() * log_root if noise else self.sizes @ np.log(covariance) / 2
-        return (prior + total.sum() + (mean * others).sum() / 2 - half
+        return (prior_of(elsewhere) + total.sum() + (mean * others).sum() / 2 - half
                 - self.sizes.sum() * np.log(2 * np.pi) / 2)  # fmt: skip
+
+
+def prior_of(elsewhere):
+    """Return the logarithm of the probability that these hits landed elsewhere, the others not."""
+    return np.log(np.where(elsewhere, ELSEWHERE, 1 - ELSEWHERE)).sum()
 
 
 def evidence_in(task, condition, trials, rule, plan=None, simulated=None):

@@ -7,18 +7,31 @@ profile intervals.
 """
 
 import argparse
+import os
 import sys
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from evidence import NODES, evidence_in
-from hits import read_hits, trials_of
-from models import condition_for, plan_for, tables_before
+from check import (
+    gain_statistic,
+    misfits,
+    refuse_without_null_space,
+    residuals_of,
+    statistics_of,
+    why_not,
+)
+from evidence import DRIFTS, NODES, evidence_in
+from models import (
+    condition_for,
+    plan_for,
+    trials_of,
+)
 from scipy import optimize, stats
 
 from coartic import CONDITIONS, CoarticError, load_task
+from coartic.analysis import read_hits
 
 MODELS = {
     "best": "keep the best",
@@ -29,6 +42,7 @@ MODELS = {
     "planner": "a noisy planner, replayed",
 }
 LEARNERS = ("best", "informed", "drawn")
+HERE = Path(__file__).parent
 CLEAR = 6.0
 """Difference in BIC from which a model is preferred ("strong" in Kass & Raftery 1995)."""
 SIMULATED = 8
@@ -106,14 +120,14 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
     ``sigma``, ``epsilon`` and ``kappa`` are of *keep the best, informed*, with ``_low`` and
     ``_high``; ``bic_`` and the name of a model.
     """
-    row, plan = {}, plan or plan_for(task)
+    row, plan, fitted = {}, plan or plan_for(task), {}
     for model in MODELS:
         if model not in LEARNERS[1:]:  # which have the same tables
             rule = "memoryless" if model == "planner" else model
             planned = plan if model == "planner" else None
             evidence = evidence_in(task, condition, trials, rule, planned)
         count = int(evidence.sizes.sum()) + len(evidence.follows)
-        free, total = 1, 0.0
+        free, total, epsilon, kappa = 1, 0.0, 0.0, 0.0
         if len(condition.hands) > 1:
             epsilon, total = maximum(evidence.hands, 0.0, 1.0)
             free += 1
@@ -139,9 +153,29 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
                     return of.drawn(np.exp(log_sigma), noise)
                 return of.log_likelihood(np.exp(log_sigma), 0.0, noise)
 
-            _, best = maximum(postures, middle - 3.0, middle + 1.5)
+            log_sigma, best = maximum(postures, middle - 3.0, middle + 1.5)
+            kappa = float(np.mean(DRIFTS)) if model == "drawn" else 0.0
         row[f"bic_{model}"] = free * np.log(count) - 2 * (total + best)
-    return row
+        fitted[model] = evidence, np.exp(log_sigma), epsilon, kappa
+    model, others = judge(row)
+    statistics = {}
+    for name in (model, *others):  # one of those that BIC cannot distinguish may fit
+        each = checked(task, condition, trials, name, fitted[name], noise, plan)
+        statistics = statistics or each
+        if not misfits(each):
+            statistics = each
+            break
+    row |= {f"check_{name}": value for name, value in statistics.items()}
+    return row | {"misfit": "; ".join(misfits(statistics))}
+
+
+def checked(task, condition, trials, model, fitted, noise, plan):
+    """Return the statistics of :mod:`check` for a fitted model."""
+    evidence, sigma, epsilon, kappa = fitted
+    z, elsewhere = residuals_of(evidence, sigma, kappa, noise, model == "drawn")
+    drift = kappa if model == "informed" else 0.0
+    gain = gain_statistic(task, condition, trials, model, sigma, epsilon, drift, plan)
+    return statistics_of(evidence, trials, z, elsewhere) | {"gain": gain}
 
 
 def judge(row):
@@ -157,7 +191,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
     Parameters
     ----------
     frame : DataFrame
-        Rows of :func:`hits.read_hits`.
+        Rows of :func:`coartic.analysis.read_hits`.
     task : Task
         The task that was practised.
     condition : ExplorationCondition, optional
@@ -174,6 +208,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
         better than all before; ``model`` and ``others`` (:func:`judge`).
     """
     condition, rows = condition or condition_for(task), []
+    refuse_without_null_space(task, condition)
     if other := {*frame.hand} - {*condition.hands}:
         raise CoarticError(f"{condition.id} does not use the {other.pop()} hand, the data do")
     plan = plan_for(task)
@@ -186,8 +221,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
             "missing": int((len(task.goals) - hits[hits > 0]).sum()),
             "improved": int((np.diff(np.maximum.accumulate(rewards)) > 0).sum()),
         }  # fmt: skip
-        if not (tables_before(task, condition, trials, "best").stored >= 0).any():
-            why = "no hit follows a complete trial; needed are two trials, the first with all goals"
+        if why := why_not(task, condition, trials):
             warnings.warn(f"subject {subject} is left out: {why}", stacklevel=2)
             continue
         row |= fit_subject(task, condition, trials, noise=noise, plan=plan)
@@ -199,6 +233,14 @@ def fit(frame, task, *, condition=None, noise=0.0):
 def sentence(row):
     """Return what a row of :func:`fit` says, in words."""
     alike = [row.model, *row.others.split()]
+    if row.misfit:
+        return (
+            f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
+            f"{row.missing}): none of the six models explains these trials ({row.misfit}). The "
+            f"nearest is {MODELS[row.model]}. No parameters are given."
+            + " With motor noise or lost trials this answer is often wrong."
+            * bool(row.noise or row.lost + row.missing)
+        )
     text = (
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
         f"{row.missing}): "
@@ -221,12 +263,33 @@ def sentence(row):
         doubts = ["A trial with lost hits may have been the best"] * bool(row.lost + row.missing)
         doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
         doubt = f" {'. '.join(doubts)}: intervals can be too narrow, and the model wrong."
-        return f"{text}. {', '.join(numbers)}.{doubt if doubts else ''}"
+        held = (
+            " Such profile intervals held the true σ and κ of {:.0f} and {:.0f} % of {:d} "
+            "simulated people{}.".format(*coverage(row))
+        )
+        return f"{text}. {', '.join(numbers)}.{held}{doubt if doubts else ''}"
     return (
         f"{text}these trials cannot distinguish {'; '.join(MODELS[name] for name in alike)} "
         f"(differences in BIC below {CLEAR:g}), so no parameters are given. Trials better than all "
         f"before: {row.improved}."
     )
+
+
+def coverage(row):
+    """Return the measured coverage of intervals of σ and κ, %, the number of people, and what their
+    data had, for the stored case that is nearest to a row of :func:`fit`."""
+    data = "noisy" if row.noise else "lossy" if row.lost + row.missing else "complete"
+    table = pd.read_csv(HERE / "results.csv").query("group == 'paper' and data == @data")
+    nearest = table.iloc[np.abs(np.log(table.trials / row.trials)).argmin()]
+    words = {"noisy": " with motor noise that is given", "lossy": " who lost 10 % of their trials",
+             "complete": ""}  # fmt: skip
+    held = 100 * nearest.sigma_cover, 100 * nearest.kappa_cover
+    return *held, int(nearest.informed), f"{words[data]} after {nearest.trials} trials"
+
+
+def printable(text):
+    """Return text whose characters that do not print, such as escape codes, are shown as ``?``."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in str(text))
 
 
 def main():
@@ -241,21 +304,25 @@ def main():
     )
     parser.add_argument("--out", help="CSV file for all numbers")
     given = parser.parse_args()
-    warnings.showwarning = lambda text, *_: print(f"warning: {text}", file=sys.stderr)
+    warnings.showwarning = lambda text, *_: print(printable(f"warning: {text}"), file=sys.stderr)
     try:
         if not given.noise >= 0:
             raise CoarticError(f"--noise is {given.noise:g}; needed is 0 or more")
-        if given.out and not Path(given.out).parent.is_dir():
-            raise CoarticError(f"--out {given.out}: there is no such folder")
+        out = Path(given.out or "")
+        if given.out and (out.is_dir() or not os.access(out.parent, os.W_OK)):
+            raise CoarticError(f"--out {out}: name a file, in a folder that may be written")
         task = load_task(given.task)
         frame = read_hits(given.csv, task, ticks_per_unit=given.ticks_per_unit)
         condition = CONDITIONS[given.condition] if given.condition else None
         table = fit(frame, task, condition=condition, noise=given.noise)
     except CoarticError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(printable(f"error: {error}"), file=sys.stderr)
         raise SystemExit(2) from None
+    if not len(table):
+        print("error: no subject can be fitted", file=sys.stderr)
+        raise SystemExit(2)
     for _, row in table.iterrows():
-        print(sentence(row))
+        print(printable(sentence(row)))
     if given.out:
         table.to_csv(given.out, index=False)
 

@@ -5,14 +5,40 @@ the target t + κ N(t) (p − t), which lands in a posture L(κ): the package's 
 a movement ends early, where the goal is hit.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 import pandas as pd
-from hits import HANDS
 
 from coartic import CONDITIONS, execute
 from coartic.baselines.posture_based import TwoGoals
 from coartic.method import run_method
 from coartic.motion.trial import reach_goals
+
+HANDS = ("left", "right")
+"""Hands in the order in which arrays count them."""
+
+
+class Trials(NamedTuple):
+    """Trials of a subject, from the first to the last number; G goals."""
+
+    hands: np.ndarray
+    """Hands as places in HANDS, shape ``(T, G)``; -1 for a hit that is missing."""
+    postures: np.ndarray
+    """Shape ``(T, G, dof)``; NaN for a hit that is missing."""
+    rewards: np.ndarray
+    """Minus the ticks, shape ``(T,)``; NaN where a hit of the trial is missing."""
+
+
+def trials_of(frame, task):
+    """Return the trials of one subject from rows of :func:`coartic.analysis.read_hits`."""
+    shape = int(frame.trial.max()), len(task.goals)
+    hands, ticks = np.full(shape, -1), np.full(shape, np.nan)
+    postures = np.full((*shape, task.robot.dof), np.nan)
+    at = frame.trial.to_numpy(int) - 1, frame.goal.to_numpy(int) - 1
+    hands[at], ticks[at] = frame.hand.map(HANDS.index), frame.ticks
+    postures[at] = frame[[*task.robot.joint_names]]
+    return Trials(hands, postures, -ticks.sum(axis=1))
 
 
 def condition_for(task):

@@ -14,7 +14,6 @@ no memory.
 import os
 import sys
 import zlib
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
 
@@ -22,142 +21,36 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a process for each core
 
 import numpy as np
 import pandas as pd
-from evidence import DRIFTS
+from check import LIMITS
 from fit import MODELS, fit_subject
-from hits import HANDS, trials_of
-from models import condition_for, explored_by, plan_for, projection
+from foreign import FOREIGN, simulate_foreign
+from models import condition_for, plan_for, trials_of
+from simulate import simulate
 
-from coartic import initial_hands, load_task
-from coartic.motion.trial import reach_goals
-
-
-def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, plan=None):
-    """Return the hits of N simulated people, a frame in the format of :func:`hits.read_hits`.
-
-    Parameters
-    ----------
-    task : Task
-        The task.
-    model : str
-        One of :data:`fit.MODELS`.
-    sigma, epsilon, kappa : float or array_like, shape (N,)
-        SD of exploration (length unit and rad), exploration rate of hands, drift.
-    seeds : sequence of int
-        A seed for each person.
-    trials : int
-        Number of trials of a person.
-    condition : ExplorationCondition, optional
-        The condition: its hands and its explored joints.
-    plan : tuple of ndarray, optional
-        Hands and postures of the planner; by default those of :func:`models.plan_for`.
-
-    Returns
-    -------
-    DataFrame
-        A row for each hit.
-    """
-    condition = condition or condition_for(task)
-    people, goals, dof, robot = len(seeds), len(task.goals), task.robot.dof, task.robot
-    sigma, epsilon, kappa = (np.broadcast_to(each, people) for each in (sigma, epsilon, kappa))
-    rngs = [np.random.default_rng(seed) for seed in seeds]
-    allowed = [HANDS.index(hand) for hand in HANDS if hand in condition.hands]
-    first = ["LR".index(letter) for letter in initial_hands(task, condition.hands)]
-    masks = explored_by(task, condition)
-    value = np.full((people, goals, 3, 2), -np.inf)
-    stored = np.full((people, goals, 3, 2, dof), np.nan)
-    plan = (plan or plan_for(task)) if model == "planner" else None
-    rows = []
-    for trial in range(trials):
-        q, before = np.tile(task.q0, (people, 1)), np.full(people, 2)
-        going, total = np.ones(people, bool), np.zeros(people, int)
-        drift = np.array(kappa, dtype=float)
-        if model == "drawn" and trial:
-            drift = np.array([DRIFTS[int(rng.random() * len(DRIFTS))] for rng in rngs])
-        visits = []
-        for goal in range(goals):
-            hands, targets = np.zeros(people, int), np.full((people, dof), np.nan)
-            for n, rng in enumerate(rngs):
-                entries, where = value[n, goal, before[n]], stored[n, goal, before[n]]
-                hand = max(allowed, key=lambda each: entries[each])  # of equal ones the first
-                if plan:
-                    hand = plan[0][goal]
-                if trial == 0 and not plan:
-                    hand = first[goal]
-                elif len(allowed) > 1 and rng.random() < epsilon[n]:
-                    hand = explored_hand(task, condition, q[n], goal, allowed, rng)
-                hands[n] = hand
-                target = where[hand]
-                if plan and hand == plan[0][goal]:
-                    target = plan[1][goal]
-                if np.isfinite(target[0]) and (trial or plan):
-                    explored = masks[hand]
-                    mean, idle = np.array(target), robot.joints(HANDS[1 - hand])
-                    if not condition.modify_other:
-                        mean[idle] = q[n][idle]
-                    if drift[n]:
-                        p = np.array(q[n])
-                        if goal + 1 < goals and np.isfinite(value[n, goal + 1, hand]).any():
-                            following = value[n, goal + 1, hand]
-                            best = max(allowed, key=lambda each: following[each])
-                            middle = (q[n] + stored[n, goal + 1, hand, best]) / 2
-                            p = np.where(masks[best], middle, p)
-                        jacobian = robot.jacobian(target, HANDS[hand])
-                        mean += drift[n] * projection(jacobian, explored) @ (p - target)
-                    mean[explored] += sigma[n] * rng.standard_normal(int(explored.sum()))
-                    targets[n] = mean
-            reached = reach_goals(robot, q, hands, task.goal_array[[goal] * people], task.radius,
-                                  targets, locked_base=task.locked_base)  # fmt: skip
-            going &= reached.hit
-            total += reached.ticks
-            visits.append((before, hands, reached.q))
-            for n in np.flatnonzero(going):
-                rows.append([n, trial + 1, goal + 1, HANDS[hands[n]], reached.ticks[n],
-                             *reached.q[n]])  # fmt: skip
-            q, before = reached.q, hands
-        for goal, (state, hands, postures) in enumerate(visits):
-            for n in np.flatnonzero(going):
-                entry = n, goal, state[n], hands[n]
-                better = -total[n] > value[entry]
-                if better or model == "walk":
-                    if model in ("memoryless", "planner") and np.isfinite(value[entry]):
-                        continue
-                    value[entry], stored[entry] = -total[n], postures[n]
-    columns = ["subject", "trial", "goal", "hand", "ticks", *robot.joint_names]
-    frame = pd.DataFrame(rows, columns=columns)
-    return frame.sort_values(["subject", "trial", "goal"], ignore_index=True)
-
-
-def explored_hand(task, condition, q, goal, allowed, rng):
-    """Return the hand of an exploration: random, or the hand closest to the goal."""
-    if condition.hand_exploration == "closest":
-        far = [np.linalg.norm(task.robot.forward_kinematics(q, hand) - task.goals[goal])
-               for hand in HANDS]  # fmt: skip
-        if abs(far[0] - far[1]) > 1e-9:
-            return int(np.argmin(far))
-    return allowed[int(rng.random() * len(allowed))]
-
+from coartic import load_task
 
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 INSTANCES = [f"{family}/v1/i{number:03d}" for number in range(4) for family in FAMILIES]
 DATA = {
     "complete": (0.0, 0.0, 0.0), "lossy": (0.0, 0.1, 0.0), "noisy": (0.02, 0.0, 0.02),
-    "ignored": (0.02, 0.0, 0.0),
+    "ignored": (0.02, 0.0, 0.0), "lapses": (0.02, 0.0, 0.02),
 }  # fmt: skip
 """SD of motor noise in recorded postures (length unit and rad), share of trials that are lost, and
-the SD that the fit is given."""
+the SD that the fit is given. People with lapses make 5 % of their hits with ten times the noise."""
+LAPSES, LAPSE = 0.05, 10.0
 PLAN = (
-    (TASKS, "complete", 100, 6), (TASKS, "complete", 30, 3), (TASKS, "lossy", 100, 2),
-    (TASKS, "ignored", 100, 1), (TASKS, "noisy", 100, 1), (TASKS, "complete", 300, 1),
-    (INSTANCES, "complete", 100, 1), (TASKS, "lossy", 100, 4), (TASKS, "complete", 30, 6),
-    (TASKS, "complete", 300, 3), (TASKS, "ignored", 100, 3), (TASKS, "noisy", 100, 3),
-    (INSTANCES, "complete", 30, 1), (TASKS, "complete", 100, 12), (INSTANCES, "lossy", 100, 1),
-    (TASKS, "lossy", 30, 4), (TASKS, "noisy", 30, 4), (TASKS, "lossy", 300, 3),
-    (INSTANCES, "complete", 300, 1), (TASKS, "complete", 300, 6), (TASKS, "complete", 30, 12),
-    (TASKS, "noisy", 300, 1), (INSTANCES, "noisy", 100, 1),
+    (TASKS, "noisy", 100, 1), (TASKS, "complete", 100, 2), (TASKS, "lossy", 100, 1),
+    (TASKS, "lapses", 100, 1), (TASKS, "ignored", 100, 1), (TASKS, "complete", 100, 3),
+    (TASKS, "complete", 30, 2), (TASKS, "noisy", 100, 2), (TASKS, "lossy", 100, 2),
+    (TASKS, "noisy", 30, 2), (TASKS, "complete", 300, 1), (TASKS, "lapses", 100, 3),
+    (INSTANCES, "complete", 100, 1), (TASKS, "noisy", 100, 4), (TASKS, "lossy", 100, 4),
+    (TASKS, "ignored", 100, 4), (TASKS, "complete", 100, 12), (TASKS, "complete", 30, 12),
+    (INSTANCES, "lossy", 100, 1), (INSTANCES, "noisy", 100, 1), (TASKS, "complete", 300, 6),
+    (TASKS, "lossy", 300, 3), (TASKS, "noisy", 300, 1),
 )  # fmt: skip
 """Tasks, data, trials and repeats, those first that matter most."""
-PEOPLE = (*MODELS, "informed")
+PEOPLE = (*MODELS, "informed", *FOREIGN)
 """Models of the people of a repeat."""
 
 
@@ -186,10 +79,17 @@ def recover(cell):
             rng.uniform(0.05, 0.5),
         )
         kappa = rng.uniform(0.0, 1.0) if model == "informed" else 0.0
-        frame = simulate(task, model, sigma, epsilon, kappa, seeds=[[seed, person, 1]],
-                         trials=trials, plan=plan)  # fmt: skip
+        if model in FOREIGN:
+            frame = simulate_foreign(task, model, sigma, epsilon, seed=[seed, person, 1],
+                                     trials=trials)  # fmt: skip
+        else:
+            frame = simulate(task, model, sigma, epsilon, kappa, seeds=[[seed, person, 1]],
+                             trials=trials, plan=plan)  # fmt: skip
         joints = [*task.robot.joint_names]
-        frame[joints] += noise * rng.standard_normal((len(frame), len(joints)))
+        motor = noise * rng.standard_normal((len(frame), len(joints)))
+        if data == "lapses":
+            motor *= np.where(rng.random((len(frame), 1)) < LAPSES, LAPSE, 1.0)
+        frame[joints] += motor
         kept = rng.random(trials) >= lost
         there = trials_of(frame[kept[frame.trial - 1]], task)
         truth = {"true_sigma": sigma, "true_epsilon": epsilon, "true_kappa": kappa}
@@ -208,7 +108,7 @@ COLUMNS = [
     "task", "trials", "data", "repeat", "person", "true", "true_sigma", "true_epsilon",
     "true_kappa",
     *(f"{name}{end}" for name in ("sigma", "epsilon", "kappa") for end in ("", "_low", "_high")),
-    *(f"bic_{model}" for model in MODELS),
+    *(f"bic_{model}" for model in MODELS), *(f"check_{name}" for name in LIMITS), "misfit",
 ]  # fmt: skip
 
 
@@ -220,10 +120,9 @@ def main(folder):
         path.write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
     done = {*pd.read_csv(path)[COLUMNS[:4]].itertuples(index=False, name=None)}
     left = [cell for cell in cells() if cell not in done]
-    with ProcessPoolExecutor(2) as pool:
-        for rows in pool.map(recover, left):
-            with path.open("a", encoding="utf-8", newline="") as file:
-                rows.to_csv(file, header=False, index=False, float_format="%.6g")
+    for rows in map(recover, left):
+        with path.open("a", encoding="utf-8", newline="") as file:
+            rows.to_csv(file, header=False, index=False, float_format="%.6g")
 
 
 if __name__ == "__main__":

@@ -24,12 +24,14 @@ NOISE = 0.02
 
 
 def measure_people(raw):
-    """Add what the fit says of each simulated person: ``model``, the model of least BIC, and
-    ``others``, the models that are not clearly worse; ``group``, the task or the family."""
+    """Add what the fit says of each simulated person: ``model``, the model of least BIC,
+    ``others``, the models that are not clearly worse, and ``answer``, the model or ``none``;
+    ``group``, the task or the family."""
     judged = [judge(row) for _, row in raw.iterrows()]
     return raw.assign(
         model=[model for model, _ in judged],
         others=[" ".join(others) for _, others in judged],
+        answer=np.where(raw.misfit.fillna("") == "", [model for model, _ in judged], "none"),
         group=raw.task.str.partition("/")[0],
     )
 
@@ -40,13 +42,14 @@ def tabulate(people):
     Groups are tasks, families, the tasks of the paper, random tasks, and people whose estimate of σ
     is less than twice the motor noise (``loud``) or not (``quiet``).
 
-    ``people`` of all models: shares of them whose model has the least BIC (``right``), whose model
-    the fit excludes (``wrong``) and for whom no other model is left (``decided``).
+    ``people`` of the six models: shares of them whose model has the least BIC (``right``), whose
+    model BIC excludes (``wrong``) and for whom no other model is left (``decided``).
     ``excluded_drift``: largest drift of excluded people, true of the informed and estimated of
     those who keep the best; infinite where others are excluded. ``informed`` of
     them: correlation, bias (of σ as a share), and coverage of intervals of each parameter;
     ``kappa_0_cover`` and ``kappa_0_bias`` of people who keep the best and have κ = 0.
     """
+    people = people[people.true.isin([*MODELS])]
     pooled = people.assign(group=np.where(people.task.isin(TASKS), "paper", "random"))
     noisy = pooled[pooled.data == "noisy"]
     noisy = noisy.assign(group=np.where(noisy.sigma < 2 * NOISE, "loud", "quiet"))
@@ -86,8 +89,26 @@ def covers(people, name):
     return (people[f"{name}_low"] <= truth) & (truth <= people[f"{name}_high"])
 
 
+def answer(people):
+    """Count people with 100 trials by data, arms, true model and answer, one of six or none."""
+    chosen = people[(people.trials == 100) & people.task.isin(TASKS)]
+    arms = np.where(chosen.task.isin(TASKS[:2]), " one ", " two ")
+    counts = pd.crosstab((chosen.data + arms + chosen.true).rename("row"), chosen.answer)
+    return counts.reindex(columns=[*MODELS, "none"], fill_value=0)
+
+
+def outliers(people):
+    """Tabulate what outliers do to σ: errors of people who keep the best trial, by data."""
+    chosen = people[(people.trials == 100) & people.true.isin(["best", "informed"])]
+    off = np.log(chosen.sigma / chosen.true_sigma).groupby(chosen.data)
+    table = pd.DataFrame({"people": off.size(), "sigma_bias": off.mean(),
+                          "sigma_rmse": (off.var(ddof=0) + off.mean() ** 2) ** 0.5})  # fmt: skip
+    return table.rename_axis("row")
+
+
 def confuse(people):
-    """Count the people of each model by the model of least BIC."""
+    """Count the people of each of the six models by the model of least BIC."""
+    people = people[people.true.isin([*MODELS])]
     cell = people.group.where(people.task.isin(TASKS), "random")
     row = cell + " " + people.trials.astype(str) + " " + people.data + " " + people.true
     return pd.crosstab(row.rename("row"), people.model).reindex(columns=[*MODELS], fill_value=0)
@@ -137,6 +158,7 @@ def measure(folder):
     people = measure_people(pd.read_csv(Path(folder) / "recovery.csv"))
     return {
         "results": tabulate(people), "confusion": confuse(people),
+        "answers": answer(people), "outliers": outliers(people),
         "people": scatter(people).reset_index(drop=True),
     }  # fmt: skip
 

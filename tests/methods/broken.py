@@ -1,13 +1,17 @@
 """Methods that break one law of the conformance kit each, and one that keeps them all."""
 
 import random
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
+import numpy as np
 from pydantic import ConfigDict
+from scipy._lib._util import check_random_state
 
 import coartic
 from coartic import load_task
-from coartic.method import Information, Method, Parameters, Result
-from coartic.motion.solution import Movement
+from coartic.method import Information, Method, Parameters, Result, Session
+from coartic.motion.solution import Movement, movements_of
 
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
 SEEN = []
@@ -26,6 +30,7 @@ class Good(Method):
     title = "Keeps every law"
     citation = "None (2026)."
     information = CORRECTIVE
+    stochastic = False
 
     def solve(self, session):
         return Result(by_correction(session))
@@ -161,6 +166,29 @@ class Outsider(Good):
             coartic.objective(task, "RRR").many([[0.0] * 18] * 5)
         elif self.parameters.means == "learn":
             coartic.learn(task, "EC1", seed=0, trials=9)
+        elif self.parameters.means == "session":
+            own = Session(task, 0, Information)
+            own.trial(by_correction(session, ["right"] * 3))
+            own.trials("RRR", np.zeros((3, 3, own.dof)))
+        elif self.parameters.means == "hands":
+            coartic.corrective_trial(task, "RRR")
+        elif self.parameters.means == "path":
+            alone = coartic.corrective_trial(task, "RRR")
+            path = [replace(m, kind="path", waypoints=[m.target]) for m in alone.movements]
+            coartic.trajectory(task, path)
+        elif self.parameters.means == "environment":
+            from coartic.gym import TaskEnv
+
+            env = TaskEnv(task)
+            env.reset()
+            env.step(env.action_space.sample())
+        elif self.parameters.means == "environments in a thread":
+            from coartic.gym import TaskVectorEnv
+
+            env = TaskVectorEnv(5, task)
+            env.reset()
+            with ThreadPoolExecutor(1) as pool:
+                pool.submit(env.step, env.action_space.sample()).result()
         else:
             coartic.execute(task, by_correction(session, ["right"] * 3))
         return Result(by_correction(session))
@@ -170,10 +198,78 @@ class Lucky(Good):
     """Draws, though it says that no seed matters."""
 
     name = "test/lucky"
-    stochastic = False
 
     def solve(self, session):
         return Result(by_correction(session), {"drawn": session.rng.random()})
+
+
+class OwnGeneratorParameters(Parameters):
+    maker: str = "default_rng"
+
+
+class OwnGenerator(Good):
+    """Has a lucky seed, though it says that no seed matters."""
+
+    name = "test/own-generator"
+    Parameters = OwnGeneratorParameters
+
+    def solve(self, session):
+        makers = {
+            "default_rng": lambda: np.random.default_rng(7),
+            "RandomState": lambda: np.random.RandomState(7).uniform(),
+            "Random": lambda: random.Random(7).random(),
+            "subclass": lambda: OwnRandom(7).doubled(),
+            "seed": lambda: np.random.seed(7),  # noqa: NPY002
+            "scipy": lambda: check_random_state(7),
+        }
+        makers[self.parameters.maker]()
+        assert isinstance(np.random.mtrand._rand, np.random.RandomState)
+        return Result(by_correction(session))
+
+
+class OwnRandom(random.Random):
+    def doubled(self):
+        return 2 * self.random()
+
+
+class Degrees(Good):
+    """Moves to targets in degrees."""
+
+    name = "test/degrees"
+
+    def solve(self, session):
+        q, goals = session.q0, range(1, session.goals_count + 1)
+        q[-4:] = 90.0, -30.0, 10.0, 5.0
+        by_correction(session)
+        return Result(tuple(Movement(goal, "right", "planned", q) for goal in goals))
+
+
+class NoTarget(Good):
+    """Has an inverse kinematics that fails, which looks like a solution."""
+
+    name = "test/no-target"
+
+    def solve(self, session):
+        by_correction(session)
+        targets = np.full((session.goals_count, session.dof), np.nan)
+        return Result(movements_of("R" * session.goals_count, targets))
+
+
+class Draws(Good):
+    """Draws as it should."""
+
+    name = "test/draws"
+    stochastic = True
+
+    def solve(self, session):
+        return Result(by_correction(session), {"drawn": session.rng.random()})
+
+
+class Undrawn(Good):
+    """Is declared stochastic, but no seed changes it."""
+
+    name = "test/undrawn"
+    stochastic = True
 
 
 class Quits(Good):

@@ -35,7 +35,7 @@ def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PA
     """
     arm = robot.arm(hand)
     rules = SimpleNamespace(
-        model=model,
+        model=model.for_radius(radius),
         arms={hand: (robot.joints(hand), arm.links, (arm.shoulder_x, arm.shoulder_y))},
         goals=[goal],
         radius=radius,
@@ -54,7 +54,7 @@ Outcome = namedtuple("Outcome", "reward ticks corrections iterations hits moveme
 
 def execute(task, solution, model=PAPER):
     """:func:`coartic.execute`, movement after movement; joints whose target is NaN stay."""
-    q, hits, made = np.array(task.q0), [], []
+    q, hits, made, model = np.array(task.q0), [], [], model.for_radius(task.radius)
     rows, corrections, iterations = [np.empty((0, len(q)))], 0, 0
     for number, goal in enumerate(task.goals, 1):
         due = [movement for movement in solution if movement.goal == number]
@@ -96,7 +96,7 @@ def execute(task, solution, model=PAPER):
 def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, preferred=None):
     """:func:`coartic.motion.movement.correct`, with the Jacobian as a matrix; each iteration adds
     β N(x) (p − x) with the pull β and a preferred posture p."""
-    free = np.ones(robot.dof)
+    free, model = np.ones(robot.dof), model.for_radius()
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
     q = np.array(q)
     for iteration in range(model.max_iterations):
@@ -149,6 +149,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     first_hands = [movement.hand for movement in start] or hands_of(
         initial_hands(task, condition.hands, model=model)
     )
+    model = model.for_radius(task.radius)
     values = {}
     targets = {}
     rewards = np.zeros(trials, dtype=np.int64)

@@ -64,6 +64,21 @@ def uneven_task(left=(1.0,), right=(0.5, -0.5, 0.2, 1.0), base=(0.0, 0.0), **cha
     )
 
 
+def metres_task(radius=0.01, **changes):
+    """As :func:`tiny_task`, for a person's right arm in metres, 0.33 + 0.27, with a fixed trunk."""
+    place = [0.0, 0.0]
+    robot = {"left_links": [0.33], "right_links": [0.33, 0.27], "left_shoulder": place}
+    return tiny_task(
+        **{
+            "robot": {**robot, "right_shoulder": place},
+            "start": {"base": place, "left": [0.0], "right": [1.047, 1.047]},
+            "hands": ["right"], "radius": radius, "locked_base": ["x", "y"],
+            "goals": [[0.13, 0.42], [0.2, 0.35], [0.05, 0.45]], "initial_hands": "RRR",
+            **changes,
+        }
+    )  # fmt: skip
+
+
 TIED = tiny_task(
     goals=[[4.0, 0.1], [4.9, 0.1], [3.1, 0.1]], radius=0.6, initial_hands="best-of-all"
 )

@@ -12,9 +12,13 @@ from coartic.analysis import SIGNATURES, solutions_of
 from coartic.analysis.solutions import Solutions
 from tests.support import reference
 from tests.support.processes import program
+from tests.support.strategies import metres_task
 
 FOLDER = Path(__file__).parents[3] / "studies" / "fit"
-PROTOCOLS, FIT, STUDY = (program(FOLDER / f"{name}.py") for name in ("protocols", "fit", "study"))
+PROTOCOLS, FIT, STUDY, FOREIGN, PLAIN = (
+    program(FOLDER / f"{name}.py")
+    for name in ("protocols", "fit", "study", "foreign", "plain_person")
+)
 TASK = load_task("two-armed-1")
 
 
@@ -106,48 +110,45 @@ def test_lost_trials_and_hits_are_counted(people):
         FIT.fit(first, TASK, condition=CONDITIONS["EC1"])
 
 
-WRONG = {
-    "no column left_2": lambda t: t.drop(columns="left_2"),
-    "line 4: hand is 'both'": lambda t: t.assign(hand=t.hand.where(t.index != 2, "both")),
-    "line 3: goal is 9": lambda t: t.assign(goal=t.goal.where(t.index != 1, 9)),
-    "line 2: trial is 0.5;": lambda t: t.assign(trial=t.trial.where(t.index != 0, 0.5)),
-    "line 3: ticks is 0": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, 0)),
-    "line 2: ticks is 7.5": lambda t: t.assign(ticks=t.ticks.where(t.index != 0, 7.5)),
-    "has no hit": lambda t: t[:0],
-    "line 2: ticks is nan": lambda t: t.assign(ticks=t.ticks.where(t.index != 0)),
-    "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
-    "a line above": lambda t: pd.concat([t, t]),
-}
+@pytest.mark.parametrize("why", ["two trials", "postures are equal", "take 400 ticks, as by a met"])
+def test_degenerate_trials_are_left_out_with_the_reason(people, why):
+    first = people[people.subject == 0]
+    if why == "two trials":
+        frame = first[first.trial == 1]
+    elif why == "postures are equal":
+        same = [first[first.trial == 1].assign(trial=n) for n in range(1, 31)]
+        frame = pd.concat(same, ignore_index=True)
+    else:
+        frame = first.assign(ticks=100)
+    with pytest.warns(UserWarning, match=f"subject 0 is left out: .*{why}"):
+        assert not len(FIT.fit(frame, TASK))
 
 
-@pytest.mark.parametrize("sentence", WRONG)
-def test_reader_says_what_is_wrong_and_where(people, tmp_path, sentence):
-    WRONG[sentence](people).to_csv(tmp_path / "people.csv", index=False)
-    with pytest.raises(CoarticError, match=sentence):
-        FIT.read_hits(tmp_path / "people.csv", TASK)
+def test_an_arm_without_a_null_space_is_refused_before_any_fit():
+    task = metres_task()
+    rows = [["s", t, g, "right", 30, 0, 0, 0, 0.5 + t / 99, 1.5] for t in (1, 2) for g in (1, 2, 3)]
+    names = ["subject", "trial", "goal", "hand", "ticks", *task.robot.joint_names]
+    with pytest.raises(CoarticError, match="2 coordinates move for the right hand.*null space"):
+        FIT.fit(pd.DataFrame(rows, columns=names), task)
 
 
-def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
-    path = tmp_path / "people.csv"
-    timed = people.rename(columns={"ticks": "duration"})
-    timed.assign(duration=timed.duration / 100).to_csv(path, index=False)
-    assert FIT.read_hits(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
-    since_start = people.groupby(["subject", "trial"]).ticks.cumsum()
-    people.assign(ticks=since_start).to_csv(path, index=False)
-    with pytest.warns(UserWarning, match="from the hit before"):
-        FIT.read_hits(path, TASK)
-    angles = [name for name in people if name[-1].isdigit()]
-    people.assign(**np.degrees(people[angles] / 10)).to_csv(path, index=False)
-    with pytest.warns(UserWarning, match="Are the angles in rad"):
-        FIT.read_hits(path, TASK)
+@pytest.mark.parametrize("model", ["averages", "recent", "by goal", "decays"])
+def test_people_of_other_models_are_none_of_the_six(model):
+    people = FOREIGN.simulate_foreign(TASK, model, 0.04, 0.3, seed=1, trials=100)
+    fitted = FIT.fit(people, TASK).iloc[0]
+    assert "none of the six models explains these trials" in FIT.sentence(fitted)
+    assert "σ =" not in FIT.sentence(fitted)
 
 
 def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
     example, pages = FOLDER / "example.csv", FOLDER.parents[1] / "docs" / "howto"
-    monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", str(example)])
-    FIT.main()
     page = (pages / "people.md").read_text("utf-8")
-    assert all(line in page for line in capsys.readouterr().out.splitlines())
+    metres = [str(FOLDER / name) for name in ("metres.toml", "metres.csv")]
+    options = ("--ticks-per-unit", "100", "--noise", "0.005")
+    for given in (("two-armed-1", str(example)), (*metres, *options)):
+        monkeypatch.setattr("sys.argv", ["fit.py", *given])
+        FIT.main()
+        assert all(line in page for line in capsys.readouterr().out.splitlines())
     assert example.stat().st_size < 30_000
     for option in (("--noise", "-1"), ("--out", "no/such/folder.csv")):
         monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", str(example), *option])
@@ -156,14 +157,28 @@ def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
         assert capsys.readouterr().err.startswith(f"error: {option[0]}")
 
 
+def test_the_recording_in_metres_is_of_a_simulator_without_the_package(capsys):
+    assert "coartic" not in (FOLDER / "plain_person.py").read_text("utf-8").split('"""')[2]
+    PLAIN.main()
+    assert capsys.readouterr().out == (FOLDER / "metres.csv").read_text("utf-8")
+    assert (FOLDER / "metres.csv").stat().st_size < 40_000
+
+
 def test_tables_count_whom_the_fit_recovers():
     cells = [("two-armed-1", 30, "complete", repeat) for repeat in (0, 1)]
     people = STUDY.measure_people(pd.concat(map(PROTOCOLS.recover, cells)))
     row = STUDY.tabulate(people).loc["two-armed-1 30 complete"]
     assert (row.people, row.informed, row.best) == (14, 4, 2)
-    assert row.right == (people.model == people.true).mean() >= 12 / 14
+    six = people[people.true.isin([*FIT.MODELS])]
+    assert row.right == (six.model == six.true).mean() >= 12 / 14
     informed = people[people.true == "informed"]
     assert row.kappa_bias == pytest.approx((informed.kappa - informed.true_kappa).mean())
     walks = people[people.true == "walk"].model.tolist()
     confusion = STUDY.confuse(people).loc["two-armed-1 30 complete walk"]
     assert confusion.to_dict() == {model: walks.count(model) for model in FIT.MODELS}
+    hundred = people.assign(trials=100)
+    answers = STUDY.answer(hundred)
+    assert answers.to_numpy().sum() == len(people) == 22
+    assert answers.none.sum() == (people.misfit.fillna("") != "").sum() >= 4
+    assert answers[~answers.index.str.contains("|".join(FOREIGN.FOREIGN))].none.sum() <= 1
+    assert STUDY.outliers(hundred).people.tolist() == [6]

@@ -45,7 +45,9 @@ def test_constants_are_those_of_the_code():
     assert robot.right_links == robot.left_links
     assert robot.base_size == (constant("base-width"), constant("base-height"))
     assert {constant("goal-radius")} == {load_task(name).radius for name in TASKS}
-    assert constant("arrival-tolerance") == 10 * PAPER.arrival_tolerance  # docs/model.md says why
+    assert (
+        constant("arrival-tolerance") == 10 * PAPER.for_radius().arrival_tolerance
+    )  # docs/model.md says why
 
 
 @pytest.mark.parametrize("name", TASKS)

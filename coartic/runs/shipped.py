@@ -1,5 +1,5 @@
-"""Open the shipped results: ``shipped/SUITE.sqlite.xz``, each the file of a results folder, which
-``docs/scripts/pack_shipped.py`` has packed."""
+"""Open the shipped results: ``benchmarks/shipped/SUITE.sqlite.xz``, each the file of a results
+folder, which ``docs/scripts/pack_shipped.py`` has packed."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import lzma
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+import coartic
 from coartic.errors import CoarticError
-from coartic.runs.store import Store, open_content
+from coartic.runs.store import Store, open_content, open_store
 
 SHIPPED = "shipped"
 """Name of the shipped results, in place of a folder."""
-SHIPPED_FOLDER = Path(__file__).with_name("shipped")
+SHIPPED_FOLDER = Path(coartic.__file__).parent / "benchmarks" / "shipped"
 HASHES = "SHA256SUMS"
 PACKED = ".sqlite.xz"
 
@@ -35,6 +36,12 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
         return open_content(lzma.decompress(content), SHIPPED)
     except (ValueError, lzma.LZMAError):
         raise CoarticError(f"{path} is not as it was shipped: install coartic again") from None
+
+
+def open_results(folder: Path) -> AbstractContextManager[Store]:
+    """Open a results folder for reading, or by the name ``shipped`` the shipped results of suite
+    ``comparison``. Raises CoarticError as :func:`open_store` and :func:`open_shipped` do."""
+    return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
 
 
 def shipped_hashes() -> dict[str, str]:

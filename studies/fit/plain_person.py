@@ -1,0 +1,89 @@
+"""Two simulated people in metres, for the how-to: a simulator that does not use coartic.
+
+    python studies/fit/plain_person.py > studies/fit/metres.csv
+
+A right arm (upper arm, forearm, hand) practises four targets of 1 cm. p1 keeps the best trial; p2
+averages: what is kept moves half the way to each better trial, as none of the six models does.
+Recorded are the duration in s (100 control steps) and joint angles with motor noise of 0.005 rad.
+"""
+
+import math
+import random
+
+LINKS, START = (0.33, 0.27, 0.09), (0.6, 1.4, 0.5)
+GOALS, RADIUS = ((0.05, 0.45), (0.25, 0.40), (0.20, 0.25), (-0.05, 0.35)), 0.01
+STEP, GAIN, EXPLORATION, MOTOR = 0.01, 0.05, 0.05, 0.005
+
+
+def places(q):
+    """Return the places of shoulder, elbow, wrist and hand."""
+    x, y, angle, found = 0.0, 0.0, 0.0, [(0.0, 0.0)]
+    for length, joint in zip(LINKS, q, strict=True):
+        angle += joint
+        x, y = x + length * math.cos(angle), y + length * math.sin(angle)
+        found.append((x, y))
+    return found
+
+
+def move(q, target, goal, stops):
+    """Return the posture where a straight movement ends, and its control steps."""
+    way = [b - a for a, b in zip(q, target, strict=True)]
+    steps, end = math.ceil(math.hypot(*way) / STEP), places(target)[-1]
+    for k in range(steps + 1):
+        share = min(k * STEP / (math.hypot(*way) or 1.0), 1.0)
+        here = [a + share * d for a, d in zip(q, way, strict=True)]
+        hand = places(here)[-1]
+        if math.dist(hand, goal) <= RADIUS or (stops and math.dist(hand, end) <= RADIUS / 10):
+            break
+    return here, k + 1
+
+
+def correct(q, goal):
+    """Return the posture that descent on the distance to the goal finds."""
+    q = list(q)
+    while math.dist((points := places(q))[-1], goal) > RADIUS / 10:
+        x, y = points[-1]
+        for j, (a, b) in enumerate(points[:-1]):
+            q[j] += GAIN * (-(y - b) * (goal[0] - x) + (x - a) * (goal[1] - y))
+    return q
+
+
+def practise(averages, trials, rng):
+    """Yield trial, goal, duration and recorded posture of each hit; trial 1 is clumsy."""
+    kept, best = [None] * len(GOALS), math.inf
+    for trial in range(1, trials + 1):
+        q, hits, total = list(START), [], 0
+        for goal, stored in zip(GOALS, kept, strict=True):
+            ticks = 0
+            if stored:
+                target = [angle + rng.gauss(0, EXPLORATION) for angle in stored]
+                q, ticks = move(q, target, goal, True)
+            else:
+                q, ticks = move(q, [q[0] + 0.3, q[1] - 0.3, q[2] - 0.6], goal, True)
+            if math.dist(places(q)[-1], goal) > RADIUS:
+                q, more = move(q, correct(q, goal), goal, False)
+                ticks += more
+            total += ticks
+            hits.append((ticks, q))
+        if total < best:
+            best = total
+            mixed = [
+                [(a + b) / 2 if averages else b for a, b in zip(old or new, new, strict=True)]
+                for old, (_, new) in zip(kept, hits, strict=True)
+            ]
+            kept = mixed
+        for goal, (ticks, q) in enumerate(hits, 1):
+            yield trial, goal, ticks / 100, [angle + rng.gauss(0, MOTOR) for angle in q]
+
+
+def main():
+    """Print the recording as CSV."""
+    print("subject,trial,goal,hand,duration,right_1,right_2,right_3")
+    for subject, averages in (("p1", False), ("p2", True)):
+        for trial, goal, duration, q in practise(averages, 100, random.Random(subject)):
+            angles = ",".join(f"{angle:.3f}" for angle in q)
+            print(f"{subject},{trial},{goal},right,{duration:.2f},{angles}")
+
+
+if __name__ == "__main__":
+    main()

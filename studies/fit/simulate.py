@@ -1,0 +1,122 @@
+"""People who practise a task by one of six models, simulated."""
+
+import numpy as np
+import pandas as pd
+from evidence import DRIFTS
+from models import HANDS, condition_for, explored_by, plan_for, projection
+
+from coartic import initial_hands
+from coartic.motion.trial import reach_goals
+
+
+def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, plan=None,
+             first=None):  # fmt: skip
+    """Return the hits of N simulated people, as :func:`coartic.analysis.read_hits` does.
+
+    Parameters
+    ----------
+    task : Task
+        The task.
+    model : str
+        One of :data:`fit.MODELS`.
+    sigma, epsilon, kappa : float or array_like, shape (N,)
+        SD of exploration (length unit and rad), exploration rate of hands, drift.
+    seeds : sequence of int
+        A seed for each person.
+    trials : int
+        Number of trials of a person.
+    condition : ExplorationCondition, optional
+        The condition: its hands and its explored joints.
+    plan : tuple of ndarray, optional
+        Hands and postures of the planner; by default those of :func:`models.plan_for`.
+    first : tuple of ndarray, optional
+        Hands and postures that all but planners aim at in trial 1; by default they have the task's
+        initial hands and correct.
+
+    Returns
+    -------
+    DataFrame
+        A row for each hit.
+    """
+    condition = condition or condition_for(task)
+    people, goals, dof, robot = len(seeds), len(task.goals), task.robot.dof, task.robot
+    sigma, epsilon, kappa = (np.broadcast_to(each, people) for each in (sigma, epsilon, kappa))
+    rngs = [np.random.default_rng(seed) for seed in seeds]
+    allowed = [HANDS.index(hand) for hand in HANDS if hand in condition.hands]
+    begun = ["LR".index(letter) for letter in initial_hands(task, condition.hands)]
+    begun = begun if first is None else first[0]
+    masks = explored_by(task, condition)
+    value = np.full((people, goals, 3, 2), -np.inf)
+    stored = np.full((people, goals, 3, 2, dof), np.nan)
+    plan = (plan or plan_for(task)) if model == "planner" else None
+    rows = []
+    for trial in range(trials):
+        q, before = np.tile(task.q0, (people, 1)), np.full(people, 2)
+        going, total = np.ones(people, bool), np.zeros(people, int)
+        drift = np.array(kappa, dtype=float)
+        if model == "drawn" and trial:
+            drift = np.array([DRIFTS[int(rng.random() * len(DRIFTS))] for rng in rngs])
+        visits = []
+        for goal in range(goals):
+            hands, targets = np.zeros(people, int), np.full((people, dof), np.nan)
+            for n, rng in enumerate(rngs):
+                entries, where = value[n, goal, before[n]], stored[n, goal, before[n]]
+                hand = max(allowed, key=lambda each: entries[each])  # of equal ones the first
+                if plan:
+                    hand = plan[0][goal]
+                if trial == 0 and not plan:
+                    hand = begun[goal]
+                elif len(allowed) > 1 and rng.random() < epsilon[n]:
+                    hand = explored_hand(task, condition, q[n], goal, allowed, rng)
+                hands[n] = hand
+                target = where[hand]
+                if trial == 0 and first is not None and not plan:
+                    targets[n] = first[1][goal]
+                if plan and hand == plan[0][goal]:
+                    target = plan[1][goal]
+                if np.isfinite(target[0]) and (trial or plan):
+                    explored = masks[hand]
+                    mean, idle = np.array(target), robot.joints(HANDS[1 - hand])
+                    if not condition.modify_other:
+                        mean[idle] = q[n][idle]
+                    if drift[n]:
+                        p = np.array(q[n])
+                        if goal + 1 < goals and np.isfinite(value[n, goal + 1, hand]).any():
+                            following = value[n, goal + 1, hand]
+                            best = max(allowed, key=lambda each: following[each])
+                            middle = (q[n] + stored[n, goal + 1, hand, best]) / 2
+                            p = np.where(masks[best], middle, p)
+                        jacobian = robot.jacobian(target, HANDS[hand])
+                        mean += drift[n] * projection(jacobian, explored) @ (p - target)
+                    mean[explored] += sigma[n] * rng.standard_normal(int(explored.sum()))
+                    targets[n] = mean
+            reached = reach_goals(robot, q, hands, task.goal_array[[goal] * people], task.radius,
+                                  targets, locked_base=task.locked_base)  # fmt: skip
+            going &= reached.hit
+            total += reached.ticks
+            visits.append((before, hands, reached.q))
+            for n in np.flatnonzero(going):
+                rows.append([n, trial + 1, goal + 1, HANDS[hands[n]], reached.ticks[n],
+                             *reached.q[n]])  # fmt: skip
+            q, before = reached.q, hands
+        for goal, (state, hands, postures) in enumerate(visits):
+            for n in np.flatnonzero(going):
+                entry = n, goal, state[n], hands[n]
+                better = -total[n] > value[entry]
+                if better or model == "walk":
+                    if model in ("memoryless", "planner") and np.isfinite(value[entry]):
+                        continue
+                    value[entry], stored[entry] = -total[n], postures[n]
+    columns = ["subject", "trial", "goal", "hand", "ticks", *robot.joint_names]
+    frame = pd.DataFrame(rows, columns=columns)
+    return frame.sort_values(["subject", "trial", "goal"], ignore_index=True)
+
+
+def explored_hand(task, condition, q, goal, allowed, rng):
+    """Return the hand of an exploration: random, or the hand closest to the goal."""
+    if condition.hand_exploration == "closest":
+        far = [np.linalg.norm(task.robot.forward_kinematics(q, hand) - task.goals[goal])
+               for hand in HANDS]  # fmt: skip
+        if abs(far[0] - far[1]) > 1e-9:
+            return int(np.argmin(far))
+    return allowed[int(rng.random() * len(allowed))]

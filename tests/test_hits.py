@@ -1,0 +1,227 @@
+"""Reading of recorded trials, and the kernels that get them."""
+
+import warnings
+from itertools import count
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import CONDITIONS, CoarticError, correct, learn_many, load_task, move
+from coartic.analysis import TwoContexts, read_hits, solutions_of
+from coartic.motion.trial import reach_goals
+from tests.support import reference
+from tests.support.strategies import metres_task
+
+TASK = load_task("two-armed-1")
+JOINTS = [*TASK.robot.joint_names]
+
+
+@pytest.fixture(scope="module")
+def people():
+    """Ten trials of the plain learner of the tests, each of two subjects."""
+    rows = []
+    for subject in ("a", "b"):
+        run = reference.learn(TASK, CONDITIONS["EC4"], seed=ord(subject), trials=10)
+        for trial, (visited, spent) in enumerate(
+            zip(run.visits, run.ticks_by_goal, strict=True), 1
+        ):
+            for goal, ((_, hand, q), ticks) in enumerate(zip(visited, spent, strict=True), 1):
+                rows.append([subject, trial, goal, hand, ticks, *q])
+    return pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks", *JOINTS])
+
+
+WRONG = {
+    "no column left_2": lambda t: t.drop(columns="left_2"),
+    "line 4: hand is 'both'": lambda t: t.assign(hand=t.hand.where(t.index != 2, "both")),
+    "line 3: goal is 9": lambda t: t.assign(goal=t.goal.where(t.index != 1, 9)),
+    "line 2: trial is 0.5;": lambda t: t.assign(trial=t.trial.where(t.index != 0, 0.5)),
+    "line 3: ticks is 0": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, 0)),
+    "line 2: ticks is 7.5": lambda t: t.assign(ticks=t.ticks.where(t.index != 0, 7.5)),
+    "has no hit": lambda t: t[:0],
+    "line 2: ticks is empty": lambda t: t.assign(ticks=t.ticks.where(t.index != 0)),
+    "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
+    "a line above already; number trials": lambda t: pd.concat([t, t]),
+    "line 2: ticks is .*column duration": lambda t: t.assign(ticks=t.ticks / 100),
+    "less than a tick": lambda t: t.assign(duration=t.ticks / 1000).drop(columns="ticks"),
+    "line 3: ticks is -5": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, -5)),
+    "hand is 'RIGHT'; needed is left or right": lambda t: t.assign(hand=t.hand.str.upper()),
+    "base_x is 1e\\+300": lambda t: t.assign(base_x=1e300),
+    "line 2: left_2 is 'inf'": lambda t: t.assign(left_2=np.inf),
+    "line 2: right_1 is 'NA'": lambda t: t.assign(right_1="NA"),
+    "no column subject.*found are who, trial": lambda t: t.rename(columns={"subject": "who"}),
+}
+
+
+@pytest.mark.parametrize("sentence", WRONG)
+def test_reader_says_what_is_wrong_and_where(people, tmp_path, sentence):
+    WRONG[sentence](people).to_csv(tmp_path / "people.csv", index=False)
+    with pytest.raises(CoarticError, match=sentence):
+        read_hits(tmp_path / "people.csv", TASK)
+
+
+def as_text(people):
+    return people.to_csv(index=False)
+
+
+def test_frames_are_refused_as_files_are(people):
+    for change in WRONG.values():
+        frame = change(people)
+        if "duration" not in frame:
+            with pytest.raises(CoarticError, match="the frame"):
+                solutions_of(TASK, frame)
+    with pytest.raises(CoarticError, match="in no trial are all 4 goals hit"):
+        solutions_of(TASK, people[people.goal < 4])
+
+
+FORMS = {
+    "initials NA": lambda text: text.replace("\na,", "\nNA,"),
+    "initials nan": lambda text: text.replace("\na,", "\nnan,"),
+    "commas at the end": lambda text: text.replace("\n", ",\n"),
+    "commas at the end of rows": lambda text: text.replace("\n", ",,\n").replace(",,", "", 1),
+    "comments": lambda text: "# made by hand\n" + text.replace("\nb,1,2", "\n# second\nb,1,2"),
+    "blanks in headings": lambda text: text.replace(",", ", ", 14).replace("ticks", " ticks "),
+    "blank lines": lambda text: "\n" + text.replace("\nb", "\n\n,,,,\nb"),
+    "byte order mark": lambda text: "\ufeff" + text,
+    "quotes": lambda text: text.replace("\na,", '\n"a",'),
+    "lines of Windows": lambda text: text.replace("\n", "\r\n"),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_other_forms_of_the_same_table_are_read(people, tmp_path, form):
+    plain, other = tmp_path / "plain.csv", tmp_path / "other.csv"
+    plain.write_text(as_text(people), encoding="utf-8")
+    with other.open("w", encoding="utf-8", newline="") as file:
+        file.write(FORMS[form](as_text(people)))
+    given, same = read_hits(other, TASK), read_hits(plain, TASK)
+    pd.testing.assert_frame_equal(given.drop(columns="subject"), same.drop(columns="subject"))
+    assert given.subject.nunique() == 2
+
+
+NO_TABLE = {
+    "line 3: it has 16 entries, the headings are 15: subject,": lambda text: "".join(
+        line[:-1] + ",7" * (n == 2) + "\n" for n, line in enumerate(text.splitlines(True))
+    ).encode(),
+    "line 2: it has 14 entries": lambda text: text.replace("\na,", "\n", 1).encode(),
+    "is in UTF-16, as Excel": lambda text: text.encode("utf-16"),
+    "in UTF-16": lambda text: text.encode("utf-16-le"),
+    "is not in UTF-8: save": lambda text: text.replace("\na,", "\nJos\xe9,").encode("latin-1"),
+    "separated by commas; found are subject;trial": lambda text: text.replace(",", ";").encode(),
+    "two columns 'ticks'": lambda text: text.replace("goal", "ticks", 1).encode(),
+    "no column subject": lambda text: b"",
+}
+
+
+@pytest.mark.parametrize("sentence", NO_TABLE)
+def test_what_is_no_table_is_named(people, tmp_path, sentence):
+    path = tmp_path / "people.csv"
+    path.write_bytes(NO_TABLE[sentence](as_text(people)))
+    with pytest.raises(CoarticError, match=sentence):
+        read_hits(path, TASK)
+
+
+@pytest.mark.parametrize("name", ["hits.xlsx", "hits.c3d", "hits.MOT", "hits.trc"])
+def test_files_of_other_programs_are_named(name):
+    with pytest.raises(CoarticError, match=f"coartic reads no .{name[5:].lower()} file; recorded"):
+        read_hits(name, TASK)
+
+
+@pytest.mark.parametrize("turn", ["0..2π", "-π..π", "a turn more", "turns of degrees"])
+def test_wrapped_angles_are_unwrapped_with_a_warning(people, tmp_path, turn):
+    path, wrapped, angles = tmp_path / "people.csv", people.copy(), JOINTS[2:]
+    if turn == "0..2π":
+        wrapped[angles] %= 2 * np.pi
+    elif turn == "a turn more":
+        wrapped.loc[wrapped.trial == 3, "right_1"] += 2 * np.pi
+    elif turn == "turns of degrees":
+        wrapped[angles] = np.radians(np.degrees(wrapped[angles]) % 360)
+    else:
+        wrapped[angles] = (wrapped[angles] + np.pi) % (2 * np.pi) - np.pi
+    wrapped.to_csv(path, index=False)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        frame = read_hits(path, TASK)
+        recorded = solutions_of(TASK, wrapped)
+    np.testing.assert_allclose(frame[angles], people[angles], atol=1e-9)
+    same = solutions_of(TASK, people)
+    np.testing.assert_allclose(recorded.configurations, same.configurations, atol=1e-9)
+    context, plain = (
+        TwoContexts(each, same, 1, "right").posture_difference for each in (recorded, same)
+    )
+    assert context == pytest.approx(plain, abs=1e-9)
+    assert len(said) == (0 if turn == "-π..π" else 2)
+    assert all("by a turn (2π) between hits" in str(each.message) for each in said)
+
+
+def test_angles_whose_direction_is_in_doubt_are_named_by_subject_and_line(people, tmp_path):
+    path = tmp_path / "people.csv"
+    doubtful = people.copy()
+    doubtful.loc[50, "left_1"] = TASK.q0[2] + 3.4  # or 2.9 the other way
+    doubtful.to_csv(path, index=False)
+    with pytest.raises(CoarticError, match=r"line 52: left_1 of subject b turns by -?\d"):
+        read_hits(path, TASK)
+    with pytest.raises(CoarticError, match="row 50: left_1 of subject b turns"):
+        solutions_of(TASK, doubtful)
+    straddling = people.copy()  # from trial to trial, not from hit to hit
+    straddling["left_1"] = np.where(straddling.trial % 2, 3.1, -3.1) + TASK.q0[2]
+    with pytest.raises(CoarticError, match="of subject a turns by"):
+        solutions_of(TASK, straddling)
+
+
+def test_one_armed_people_need_no_columns_of_the_other_arm(tmp_path):
+    task, path = metres_task(), tmp_path / "people.csv"
+    rows = [["s", t, g, "right", 30, 0.5 + t / 100, 1.5] for t in (1, 2) for g in (1, 2, 3)]
+    names = ["subject", "trial", "goal", "hand", "ticks", "right_1", "right_2"]
+    frame = pd.DataFrame(rows, columns=names)
+    frame.to_csv(path, index=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of hands far from goals
+        read = read_hits(path, task)
+        assert len(solutions_of(task, frame).runs) == 2
+    assert (read[["base_x", "base_y", "left_1"]] == 0).to_numpy().all()
+    with pytest.raises(CoarticError, match="no column base_x, left_1"):
+        read_hits(path, TASK)
+
+
+def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
+    path = tmp_path / "people.csv"
+    timed = people.rename(columns={"ticks": "duration"})
+    timed.assign(duration=timed.duration / 100).to_csv(path, index=False)
+    assert read_hits(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
+    since_start = people.groupby(["subject", "trial"]).ticks.cumsum()
+    people.assign(ticks=since_start).to_csv(path, index=False)
+    with pytest.warns(UserWarning, match="from the hit before"):
+        read_hits(path, TASK)
+    angles = [name for name in people if name[-1].isdigit()]
+    people.assign(**np.degrees(people[angles] / 10)).to_csv(path, index=False)
+    with pytest.warns(UserWarning, match="Are the angles in rad"):
+        read_hits(path, TASK)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
+@pytest.mark.parametrize("where", ["start", "target", "goal"])
+def test_kernels_end_whatever_they_get(bad, where):
+    """As they are called without checks; a loop that does not end would end the tests."""
+    q, targets = np.tile(TASK.q0, (5, 1)), np.tile(TASK.q0 + 0.5, (5, 1))
+    goals = np.tile(TASK.goal_array[0], (5, 1))
+    {"start": q, "target": targets, "goal": goals}[where][::2, 0] = bad
+    for given in (targets, None):
+        reached = reach_goals(TASK.robot, q, np.array([0, 1, 0, 1, 0]), goals, TASK.radius, given)
+        assert reached.ticks.shape == (5,)
+
+
+@pytest.mark.parametrize("goal", [(1, 2, 3), (1,), 1.0, (1, np.nan), (np.inf, 1), ("1", "2"), None])
+def test_a_goal_is_two_finite_numbers(goal):
+    with pytest.raises(ValueError, match="goal"):
+        correct(TASK.robot, TASK.q0, "right", goal)
+    with pytest.raises(ValueError, match="goal"):
+        move(TASK.robot, TASK.q0, TASK.q0, "right", goal, 0.1)
+    with pytest.raises(ValueError, match="configuration"):
+        correct(TASK.robot, TASK.q0 * np.nan, "right", (1, 2))
+
+
+@pytest.mark.parametrize("seeds", [range(10**9), count()])
+def test_the_number_of_seeds_has_a_limit(seeds):
+    with pytest.raises(ValueError, match="seeds has more than 1_000_000 entries"):
+        learn_many(TASK, "EC4", seeds=seeds, trials=1)

@@ -1,0 +1,78 @@
+"""What a notebook shows of tasks, studies, tables and figures, and the results that are shipped."""
+
+import os
+from xml.dom import minidom
+
+import pytest
+
+from coartic import CoarticError, Task, load_task
+from coartic.analysis import load, ranking
+from coartic.analysis.sections import FIGURES, TABLES
+from coartic.runs.shipped import open_shipped
+
+
+def elements(page, name):
+    """The elements of a page that is well formed, with their attributes and their text."""
+    found = minidom.parseString(f"<div>{page}</div>").getElementsByTagName(name)
+    return [
+        (dict(each.attributes.items()), "".join(n.data for n in each.childNodes if n.nodeType == 3))
+        for each in found
+    ]
+
+
+@pytest.mark.parametrize("name", ["ascending", "two-armed-2", "long/v1/i000"])
+def test_a_task_is_a_picture_of_its_goals(name):
+    task = load_task(name)
+    page = task._repr_html_()
+    assert [text for _, text in elements(page, "text")] == [
+        str(number + 1) for number in range(len(task.goals))
+    ]
+    ((svg, _),) = elements(page, "svg")
+    left, low, width, height = map(float, svg["viewBox"].split())
+    for circle, _ in elements(page, "circle"):
+        assert left < float(circle["cx"]) < width
+        assert low < float(circle["cy"]) < height
+        assert float(circle["r"]) == task.radius
+    first, second = (elements(page, "circle")[n][0] for n in (0, 1))
+    for axis, sign, place in (("cx", 1, 0), ("cy", -1, 1)):
+        apart = task.goals[1][place] - task.goals[0][place]
+        drawn = float(second[axis]) - float(first[axis])
+        assert drawn == pytest.approx(sign * apart, abs=2e-3)
+
+
+def test_studies_tables_and_figures_are_shown_well_formed(traced):
+    page = traced._repr_html_()
+    rows = [text for _, text in elements(page, "td")]
+    assert len(rows) == 5 * len(traced.runs.groupby(["method", "setting"]))
+    assert "dual-process/EC4" in rows
+    headings = [text for _, text in elements(TABLES["methods"]._repr_html_(), "td")]
+    assert "gap" in headings
+    assert "run_ids" in headings
+    plot = FIGURES["learning-curves"](traced)
+    ((_, caption),) = elements(plot._repr_html_(), "figcaption")
+    assert caption.startswith("Learning curves. ")
+    assert len(elements(plot._repr_html_(), "path")) > 5
+
+
+def test_a_title_of_markup_stays_text():
+    task = Task(name="mine", title="<b>&", goals=[(3, 2)])
+    assert elements(task._repr_html_(), "b") == []
+
+
+def test_shipped_results_are_read_as_a_study(tmp_path, monkeypatch):
+    """Read-only, whatever folder is here; by their own names as others."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "shipped").mkdir()
+    study = load("shipped")
+    with open_shipped("comparison") as store:
+        assert len(study.runs) == len(store.runs()) > 3_000
+    run = study.executed("ascending", "corrective-alone/best-hands").runs[0]
+    assert run.reward == max(study.sequences("ascending").reward.dropna())
+    few = study.runs[study.runs.run == 0]
+    ranked = ranking(few)
+    assert ranked.missing["dual-process (EC1, EC4)"] == 0
+    assert ranked.missing["dual-process/EC1"] > 0
+    assert len(next(study.rewards())[1]) > 0
+    assert os.listdir("shipped") == []
+    with pytest.raises(CoarticError, match="did you mean|Known"):
+        study.executed("ascending", "absent")

@@ -1,0 +1,149 @@
+"""Places that may not be read or written, or that cannot be: each command says a sentence."""
+
+import json
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+
+import pytest
+
+from coartic import CoarticError
+from coartic.runs import store
+from tests.support.bad_inputs import GOOD
+from tests.support.suites import ROOT, paper_cells, run_and_write
+
+RUN = "0" * 16
+LONG = "/".join(["long" * 30] * 5)  # SQLite takes no path of more than 512 letters
+COMMANDS = {
+    "run": "run quick --tasks ascending --methods corrective-alone/given --jobs 1 --out {}",
+    "include": "run paper --tasks ascending --methods EC1 --include {} --out new",
+    "report": "report {}",
+    "report to": "report good --out {}",
+    "verify": "verify {}",
+    "cite": "cite {}",
+    "animate": f"animate {RUN} --in {{}} --out film.gif",
+    "animate to": "animate {run} --in good --out {}/film.gif",
+    "reproduce": f"reproduce {RUN} --in {{}}",
+    "draw to": "draw ascending --out {}",
+    "draw into": "draw ascending --out {}/tasks.svg",
+    "play": "play {}/task.toml --no-open --out page.html",
+    "play to": "play --no-open --out {}/page.html",
+    "new": "new my-search --out {}/mine.py",
+    "list": "list {}",
+    "list file": "list {}/task.toml",
+    "check": "check {}",
+    "check file": "check {}/task.toml",
+    "suite": "run {}/suite.toml --out new",
+    "task": "run paper --tasks {}/task.toml --out new",
+    "family": "run paper --family-file {}/task.toml --out new",
+    "method": "list --method-file {}/mine.py",
+}
+READ_FILES = ("play", "list file", "check file", "suite", "task", "family", "method")
+READ = ("run", "include", "report", "verify", "cite", "animate", "reproduce")
+WRITE = ("report to", "draw to", "draw into", "animate to", "play to", "new", "run")
+BOTH = (*READ, *WRITE, *READ_FILES, "list", "check")
+PLACES = {
+    "file": BOTH,
+    "locked": BOTH,
+    "under": BOTH,
+    "unreadable": (*READ, *READ_FILES),
+    "closed": (*WRITE, "report"),
+    "empty": (*WRITE, "report"),
+    "folder": READ,
+    LONG: READ,
+    "x" * 5000: BOTH,
+    "missing": (*set(BOTH) - {"run", "report to", "draw to"},),
+}
+"""Places, and the commands that cannot use them."""
+CALL = """
+import contextlib, io, json, os, sys
+from coartic import cli
+said = {}
+for key, words in json.load(sys.stdin).items():
+    out, sys.argv = io.StringIO(), ["coartic", *words]
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+        try:
+            code = cli.main() or 0
+        except SystemExit as stop:
+            code = stop.code or 0
+        except BaseException as error:
+            code = repr(error)
+    said[key] = code, out.getvalue()
+json.dump(said, sys.stdout)
+"""
+
+
+def without_rights():
+    """A command that takes root's rights over files away, empty if there are none."""
+    if not hasattr(os, "geteuid") or os.geteuid():
+        return []
+    if not shutil.which("setpriv"):
+        pytest.skip("root may read and write everything")
+    return ["setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-all"]
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory):
+    """What each command says of each place."""
+    here = tmp_path_factory.mktemp("places")
+    study = run_and_write(here / "good", paper_cells(tasks=["ascending"]), runs=1, trials=5)
+    (run,) = study.runs.run_id
+    (here / "file").write_text("no folder")
+    (here / "empty").mkdir()
+    (here / "folder" / store.RUNS_FILE).mkdir(parents=True)
+    (here / LONG).mkdir(parents=True)
+    for name in ("locked", "unreadable", "closed", "over/under", LONG):
+        shutil.copytree(here / "good", here / name, dirs_exist_ok=True)
+        (here / name / "report").mkdir(exist_ok=True)
+        (here / name / "report" / ".coartic-files").write_text("report.html\n")
+        for file in ("task.toml", "suite.toml", "mine.py"):
+            (here / name / file).write_text(GOOD)
+            (here / name / file).chmod(0)
+    os.symlink("over/under", here / "under")
+    for path in (here / "unreadable" / store.RUNS_FILE, here / "locked", here / "over"):
+        path.chmod(0)
+    for path in (*(here / "closed").rglob("*"), here / "closed", here / "empty"):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    calls = {
+        f"{command} {place}": COMMANDS[command].format(place, run=run[:8]).split()
+        for place, chosen in PLACES.items()
+        for command in chosen
+    }
+    done = subprocess.run(
+        [*without_rights(), sys.executable, "-c", CALL], cwd=here, input=json.dumps(calls),
+        capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    for path in (here / "over", here / "locked", here / "closed", here / "empty"):
+        path.chmod(0o755)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform == "win32", reason="rights of POSIX")
+@pytest.mark.parametrize("place", PLACES, ids=lambda place: place[:12])
+def test_a_place_that_cannot_be_used_gets_a_sentence(said, place):
+    for command in PLACES[place]:
+        code, words = said[f"{command} {place}"]
+        assert code == 2, (command, words)
+        assert words.startswith("Error: "), command
+        assert len(words.splitlines()) == 1, words
+        assert len(words) < 1200, command
+
+
+def test_a_connection_that_fails_gets_a_sentence(tmp_path, monkeypatch):
+    """At every door of a store, whatever the reason."""
+    folder = run_and_write(
+        tmp_path / "good", paper_cells(tasks=["ascending"]), runs=1, trials=5
+    ).folder
+
+    def fail(*_, **__):
+        raise sqlite3.OperationalError("unable to open database file")
+
+    monkeypatch.setattr(sqlite3, "connect", fail)
+    for door in (store.open_store, store.writing):
+        with pytest.raises(CoarticError, match="cannot use .*runs.sqlite: unable"), door(folder):
+            pass

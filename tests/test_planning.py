@@ -1,0 +1,188 @@
+"""Plans: every option of a request changes the plan, or is refused; so does every name."""
+
+import inspect
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+
+from coartic import CoarticError, load_task
+from coartic.analysis.study import load
+from coartic.benchmarks import pool, template
+from coartic.benchmarks.planning import Request, plan_suite
+from coartic.benchmarks.runner import run_suite
+from coartic.cli import app
+from tests.support.suites import ROOT, InProcess, suite_of
+
+MINE = Path(template.__file__).read_text(encoding="utf-8")
+FAMILY = (ROOT / "coartic" / "tasks" / "families" / "long.v1.toml").read_text(encoding="utf-8")
+ONE = {"tasks": ["ascending"], "methods": ["EC1"], "runs": 2, "trials": 20}
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder with a method file of two methods and a family file."""
+    monkeypatch.chdir(tmp_path)
+    second = MINE[MINE.index("class Mine(") :].replace("class Mine(", "class Second(")
+    both = MINE.replace("NAME", "first") + "\n\n" + second.replace("NAME", "second")
+    Path("mine.py").write_text(both, encoding="utf-8")
+    Path("strips.v1.toml").write_text(FAMILY, encoding="utf-8")
+
+
+CHANGED = {
+    "tasks": ["descending"],
+    "methods": ["corrective-alone/given", "EC1"],
+    "method_files": ["mine.py"],
+    "family_files": ["strips.v1.toml"],
+    "runs": 3,
+    "trials": 21,
+    "seed": 1,
+    "time_limit_s": 5.0,
+    "trial_budget": 7,
+}
+
+
+def outline(plan):
+    return [(job, job.cell.label, job.cell.trial_budget) for job in plan]
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("option", Request.model_fields)
+def test_a_second_value_of_an_option_changes_the_plan_or_is_refused(option):
+    changed = ONE | {option: CHANGED[option]}
+    if option == "family_files":  # none of its tasks is asked for
+        with pytest.raises(CoarticError, match="strips.v1.toml has no effect: no instance of"):
+            plan_suite("paper", **changed)
+        changed |= {"tasks": ["strips/v1/i000"], "methods": ["EC4"]}
+    assert outline(plan_suite("paper", **changed)) != outline(plan_suite("paper", **ONE))
+
+
+@pytest.mark.usefixtures("here")
+def test_a_second_value_of_an_argument_of_run_suite_changes_what_it_does(monkeypatch):
+    seen = []
+    monkeypatch.setattr(pool, "Local", InProcess)
+
+    class Watched(InProcess):
+        def perform(self, jobs):
+            seen.append("executor")
+            return super().perform(jobs)
+
+    values = {
+        "executor": Watched(),
+        "watch": lambda progress, cell: seen.append("watch"),
+        "suite": "quick",
+        "folder": "other",
+    }
+    assert {*inspect.signature(run_suite).parameters} == {*values, "options"}
+    run_suite("paper", "first", executor=InProcess(), **ONE)
+    for name, value in values.items():
+        run_suite(**{"suite": "paper", "folder": name, "executor": InProcess(), name: value} | ONE)
+    assert {*seen} == {"executor", "watch"}
+    assert [load(name).suite for name in ("first", "suite", "other")] == ["paper", "quick", "paper"]
+
+
+OPTIONS = {
+    "suite": ("quick",),
+    "folder": ("--out", "other"),
+    "runs": ("--runs", "3"),
+    "trials": ("--trials", "21"),
+    "tasks": ("--tasks", "descending"),
+    "methods": ("--methods", "EC1,corrective-alone/given"),
+    "method_file": ("--method-file", "mine.py"),
+    "family_file": ("--family-file", "strips.v1.toml"),
+    "seed": ("--seed", "1"),
+    "time_limit": ("--time-limit", "5"),
+    "trial_budget": ("--trial-budget", "7"),
+    "include": ("--include", "before"),
+    "jobs": ("--jobs", "2"),
+    "scheduler": ("--scheduler", "127.0.0.1:1", "--jobs", "2"),
+}
+
+
+@pytest.mark.usefixtures("here", "in_this_process")
+def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, monkeypatch):
+    """And each option is tried."""
+    known = get_command(app).commands["run"].params
+    assert {parameter.name for parameter in known} == {*OPTIONS, "help"} - {"help"}
+    base = {"suite": ("paper",), "folder": ("--out", "out"), "tasks": ("--tasks", "ascending")}
+    base |= {"methods": ("--methods", "EC1"), "runs": ("--runs", "2"), "trials": ("--trials", "20")}
+    workers = []
+
+    class Counted(InProcess):
+        def __init__(self, jobs=1):
+            workers.append(jobs)
+
+    monkeypatch.setattr(pool, "Local", Counted)
+
+    def told(name, changed):
+        place = {"folder": ("--out", name)}
+        words = [word for each in (base | place | changed).values() for word in each]
+        before = len(workers)
+        code, _, error = coartic("run", *words)
+        folder = Path((place | changed)["folder"][1])
+        if code:
+            return error
+        study = load(folder)
+        runs = study.runs[["run_id", "time_limit_s"]].to_numpy().tolist()
+        return study.suite, str(folder) if name == "folder" else "", runs, workers[before:]
+
+    usual = told("usual", {})
+    assert told("again", {}) == usual
+    assert told(
+        "before", {"methods": ("--methods", "corrective-alone/given"), "runs": (), "trials": ()}
+    )
+    for name, words in OPTIONS.items():
+        assert told(name, {name: words}) != usual, name
+    assert "--jobs has no effect with --scheduler" in told("x", {"x": OPTIONS["scheduler"]})
+
+
+@pytest.mark.usefixtures("here")
+def test_a_method_file_that_is_named_runs():
+    """All its methods, with what was asked for, unless some of them are named."""
+
+    def methods(suite="paper", **selection):
+        plan = plan_suite(
+            suite, **{"tasks": ["ascending"], "method_files": ["mine.py"]} | selection
+        )
+        return [job.cell.method.name for job in plan]
+
+    assert methods() == ["dual-process/EC1", "first", "second"]
+    assert methods(methods=["EC1"]) == ["dual-process/EC1", "first", "second"]
+    assert methods(methods=["EC1", "second"]) == ["dual-process/EC1", "second"]
+    assert methods(tasks=[load_task("ascending").model_copy(update={"name": "own"})]) == [
+        "dual-process/EC1", "first", "second",
+    ]  # fmt: skip
+    Path("own.toml").write_text(
+        'title = "x"\ndescription = "x"\nruns = 1\n[[blocks]]\ntasks = ["ascending"]\n'
+        'methods = ["first"]\n'
+    )
+    assert methods("own.toml") == ["first"]
+
+
+def test_the_command_outranks_a_grid_and_a_block(tmp_path):
+    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
+    suite_of(tmp_path, ec1 + "grid = { trials = [5, 50] }", ec1 + "parameters = { trials = 500 }")
+    trials = [job.cell.parameters["trials"] for job in plan_suite(tmp_path / "own.toml")]
+    assert trials == [5, 50, 500]
+    (job,) = plan_suite(tmp_path / "own.toml", trials=7)
+    assert job.cell.parameters["trials"] == 7
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            {"methods": ["corrective-alone/given"], "trials": 5},
+            "trials has no effect: no parameter",
+        ),
+        ({"methods": ["corrective-alone/given"], "runs": 2}, "runs has no effect: no run of"),
+        ({"methods": ["EC1", "EC4"]}, "EC4 uses the left and right hand"),
+        ({"methods": ["EC4"], "tasks": ["ascending", "two-armed-1"]}, "EC4 uses the left"),
+        ({"runs": range(3, 3)}, r"runs is range\(3, 3\); it must be .*, or a range, such as"),
+        ({"runs": range(0, 9, 2)}, r"runs is range\(0, 9, 2\); it must be"),
+        ({"runs": range(-1, 9)}, "its first run is -1"),
+    ],
+)
+def test_what_has_no_effect_is_refused(options, words):
+    with pytest.raises(CoarticError, match=words):
+        plan_suite("paper", **{"tasks": ["ascending"]} | options)
