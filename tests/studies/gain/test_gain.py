@@ -1,0 +1,73 @@
+"""Differences at equal gain, of planted tasks, and of every stored run in plain loops."""
+
+import lzma
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic.analysis import load
+from tests.support.processes import program
+
+GAIN = program(Path(__file__).parents[3] / "studies" / "gain" / "study.py")
+
+
+def planted(*rows):
+    """Cells of one task: name, gain and next goal nearer; other signatures are half as large."""
+    cells = pd.DataFrame(rows, columns=["name", "gain", "arm"])
+    others = {"other arm": cells.arm / 2, "first": cells.arm / 2, "whole": cells.gain}
+    return cells.assign(group="one-armed", task="a", trials=1, **others)
+
+
+LEARNER = ("learner", 10.0, 2.0), ("learner", 20.0, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("how", "gain", "at"),
+    [
+        ("linear", 0.0, 0.0),
+        ("linear", 5.0, 1.0),
+        ("linear", 15.0, 4.0),
+        ("linear", 20.0, 6.0),
+        ("nearest", 4.0, 0.0),
+        ("nearest", 6.0, 2.0),
+        ("nearest", 16.0, 6.0),
+        ("same hands", 15.0, 4.0),
+    ],
+)
+def test_the_learner_is_interpolated_between_its_gains(how, gain, at):
+    (row,) = GAIN.at_equal_gain(planted(*LEARNER, ("CMA-ES", gain, 7.0)), how).to_dict("records")
+    assert row["status"] == "compared"
+    assert (row["arm"], row["first"]) == (7.0 - at, 3.5 - at / 2)
+
+
+@pytest.mark.parametrize(
+    ("gain", "status"), [(-0.1, "gain below 0"), (20.1, "beyond the learner"), (20.0, "compared")]
+)
+def test_what_the_learner_does_not_gain_is_counted_and_not_compared(gain, status):
+    (row,) = GAIN.at_equal_gain(planted(*LEARNER, ("CMA-ES", gain, 7.0))).to_dict("records")
+    assert row["status"] == status
+    assert np.isnan(row["arm"]) == (status != "compared")
+
+
+def test_a_learner_that_gains_nothing_covers_no_gain():
+    rows = GAIN.at_equal_gain(planted(("learner", -3.0, 2.0), ("CMA-ES", 1.0, 7.0)))
+    assert rows.status.tolist() == ["beyond the learner"]
+
+
+def test_cells_are_means_over_runs(tmp_path):
+    """Of each run's ticks and its own signatures, in loops over runs."""
+    stored = Path(__file__).parent / "runs.sqlite.xz"
+    (tmp_path / "runs.sqlite").write_bytes(lzma.decompress(stored.read_bytes()))
+    study = load(tmp_path)
+    cells = GAIN.measure_cells(study)
+    signature = study.signature("arm")
+    for row in cells.to_dict("records"):
+        mine = []
+        for at, run in study.runs.iterrows():
+            named = next(name for key, name in GAIN.NAMES.items() if run.method.startswith(key))
+            if (run.task, named) == (row["task"], row["name"]) and row["trials"] in (0, run.trials):
+                mine.append((float(run.reward) - run.corrective_best, signature[at]))
+        assert len(mine) in (1, 3)
+        assert np.allclose(np.nanmean(mine, axis=0), (row["gain"], row["arm"]))
