@@ -180,7 +180,7 @@ def draw(table):
         axes.axhline(0, color=figures.GREY, linewidth=0.5)
         axes.set_xlabel("gain (ticks)")
         axes.set_title(SIGNATURES[column])
-    figures.legend(figure, panels[0].get_legend_handles_labels()[0], 5)
+    figures.legend(figure, panels[0].get_legend_handles_labels()[0], 3)
     return figure
 
 
