@@ -67,8 +67,8 @@ def at_equal_gain(cells, how="linear"):
     for _, of_task in cells.groupby("task", sort=False):
         learner = of_task[(of_task.name == "learner") & (of_task[gain] > 0)].sort_values(gain)
         for row in of_task[of_task.name != "learner"].to_dict("records"):
-            most = learner[gain].max() if len(learner) else 0.0
-            status = BEYOND if row[gain] > most else BELOW if row[gain] < 0 else "compared"
+            most = learner[gain].max() if len(learner) else -np.inf
+            status = BELOW if row[gain] < 0 else BEYOND if row[gain] > most else "compared"
             out = {key: row[key] for key in ("group", "task", "name", "trials")}
             for name in SIGNATURES:
                 known = learner.dropna(subset=name)

@@ -52,8 +52,10 @@ def test_what_the_learner_does_not_gain_is_counted_and_not_compared(gain, status
 
 
 def test_a_learner_that_gains_nothing_covers_no_gain():
-    rows = GAIN.at_equal_gain(planted(("learner", -3.0, 2.0), ("CMA-ES", 1.0, 7.0)))
-    assert rows.status.tolist() == ["beyond the learner"]
+    gains = [("CMA-ES", gain, 7.0) for gain in (1.0, 0.0, -1.0)]
+    rows = GAIN.at_equal_gain(planted(("learner", -3.0, 2.0), *gains))
+    assert rows.status.tolist() == ["beyond the learner", "beyond the learner", "gain below 0"]
+    assert rows["arm"].isna().all()
 
 
 def test_cells_are_means_over_runs(tmp_path):
