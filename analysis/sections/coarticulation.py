@@ -138,11 +138,9 @@ def list_signatures(study: Study) -> Rows:
                         **difference_of_means(values, control).columns(f"{column}_difference"),
                         f"{column}_p": bootstrap_test(values, control).p,
                     }
-        runs = study.executed(name, label).runs
-        gains = np.array([-run.ticks for run in runs]) - study.corrective_best[name]
-        made = np.array([run.hands for run in runs])
+        gains = cell.good.reward.to_numpy(float) - study.corrective_best[name]
         for hands, row in rows.items():
-            gained = gains[made == hands] if hands else gains
+            gained = gains[cell.good.hands == hands] if hands else gains
             row |= mean(gained).columns("gain") | {"hands": hands}
             row |= mean(100 * gained / possible).columns("share") if possible > 0 else {}
             key = " ".join(filter(None, (name, label, hands)))
