@@ -330,7 +330,7 @@ def check_cells(db: sqlite3.Connection) -> Iterator[str]:
 
 
 def check_plan(db: sqlite3.Connection) -> Iterator[str]:
-    """What the folder lacks of its plan, a sentence each."""
+    """Yield a sentence for each fault of the plan, and one if its runs are missing."""
     (suites,) = db.execute("SELECT count(*) FROM suite").fetchone()
     if suites != 1:
         yield f"Table suite has {suites} rows, not one: no report can be made."

@@ -161,8 +161,8 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 def unnamed_methods(
     suite: Suite, asked: Iterable[Sequence[str]], registered: Registry
 ) -> list[str]:
-    """Return the ids of the methods of those files of which neither the suite nor ``asked``, ids
-    that a request names, has a method."""
+    """Return the ids of methods from files of which no method is named, by the suite or by a
+    request, whose ids are ``asked``."""
     named = {
         method
         for block in suite.blocks

@@ -1,4 +1,4 @@
-"""What a fit says, in words: models by name, parameters, and the measured coverage of intervals."""
+"""Sentences on a fit: models by name, parameters, and the measured coverage of intervals."""
 
 from pathlib import Path
 
