@@ -22,7 +22,7 @@ import numpy as np
 
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, solved
 from coartic.robot import Array
 
 LEAST_SHARE = 0.1
@@ -58,7 +58,7 @@ def with_control(
     ... # doctest: +SKIP
     """
     of_method = study.signature_by_hands(signature, task, label)
-    total = len(study.cells[task, label].good)
+    total = len(solved(study.cells[task, label]))
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
         if len(values) >= LEAST_SHARE * total:
@@ -74,17 +74,17 @@ def control_of(study: Study, task: str, label: str, hands: str) -> str:
     method = "random-search" if hands else "random-search/hands"
     trials = most_trials(study, task, label)
     for other in study.methods.index[study.methods.base == method]:
-        cell = study.cells.get((task, other))
-        if cell is None or not len(cell.good) or most_trials(study, task, other) != trials:
+        runs = solved(study.cells.get((task, other), study.runs[:0]))
+        if not len(runs) or most_trials(study, task, other) != trials:
             continue
-        if not hands or set(cell.good.hands) == {hands}:
+        if not hands or {*runs.hands} == {hands}:
             return str(other)
     return ""
 
 
 def most_trials(study: Study, task: str, label: str) -> float:
     """Return the most trials that a run of a method made on a task."""
-    return float(study.cells[task, label].runs.trials.fillna(0).max())
+    return float(study.cells[task, label].trials.fillna(0).max())
 
 
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
@@ -142,13 +142,11 @@ def control_suite(study: Study, *, runs: int = 20) -> str:
         The suite as TOML; empty if nothing is missing.
     """
     blocks = dict[tuple[str, str, int], None]()
-    for task, label in study.cells:
-        if study.cells[task, label].good.empty or not selects(study, label):
+    for (task, label), of_method in study.cells.items():
+        if not selects(study, label):
             continue
         trials = int(most_trials(study, task, label))
-        for hands, share in (
-            study.cells[task, label].good.hands.value_counts(normalize=True).items()
-        ):
+        for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
             if share >= LEAST_SHARE and not control_of(study, task, label, str(hands)):
                 blocks[task, str(hands), trials] = None
     lines = ['title = "Random search with the hands of learners"', f"runs = {runs}"]

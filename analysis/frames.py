@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,7 @@ from pandas.api.types import infer_dtype, is_hashable
 
 from coartic import Execution, Movement, Task
 from coartic.analysis.hits import checked_hits
-from coartic.analysis.method_frame import joined_learners
+from coartic.analysis.method_frame import with_joined_learners
 from coartic.analysis.optima import gap_share
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import running_times
@@ -361,17 +360,6 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         })  # fmt: skip
     methods = pd.Index([*by_method], name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
-
-
-def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
-    """Return the rows of each method, and those of the learner over tasks for one arm and for two
-    (:func:`.joined_learners`)."""
-    tasks = {method: {*rows.task} for method, rows in by_method.items()}
-    joined = {
-        label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
-        for label, (one, two) in joined_learners(tasks)
-    }
-    return joined | by_method
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:

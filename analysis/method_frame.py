@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -14,6 +14,7 @@ from coartic.analysis.methods import (
     INFORMED_LEARNERS,
     KNOWN_METHODS,
     LEARNERS,
+    SEARCHES,
     title_of,
 )
 from coartic.internal.text import one_line
@@ -21,7 +22,6 @@ from coartic.learner.conditions import CONDITIONS, METHOD_PREFIX
 from coartic.method import Information
 
 if TYPE_CHECKING:
-    from coartic.analysis.study import CellRuns
     from coartic.runs.method_info import MethodInfo
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
@@ -36,13 +36,13 @@ OWN_COLOR = "brown"
 """Colour of methods from files: no built-in method has it."""
 
 
-def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
-    """Return a row for each method of some cells, in the order of lists and figures.
+def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
+    """Return a row for each method of some runs, in the order of lists and figures.
 
     Parameters
     ----------
-    cells : iterable of CellRuns
-        Runs of the methods, in the order of the suite.
+    runs : DataFrame
+        As :attr:`.Study.runs`, in the order of the suite.
     declared : mapping of str to MethodInfo
         Declaration of each method, by its id without a setting.
 
@@ -51,11 +51,34 @@ def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) ->
     DataFrame
         By the label of the method, with the columns of :attr:`.Study.methods`.
     """
-    by_label: dict[str, list[CellRuns]] = {}
-    for cell in cells:
-        by_label.setdefault(cell.label, []).append(cell)
-    rows = {label: method_row(of_label, declared, by_label) for label, of_label in by_label.items()}
-    rows |= joined_conditions(by_label, rows)
+    rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
+    for label, of_method in by_label.items():
+        base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
+        info = declared[base]
+        facts = KNOWN_METHODS.get(base) if info.is_ours else None
+        default = base if setting else facts.ablation_of if facts else ""
+        under = default if default in by_label else ""
+        rows[label] = {
+            "base": base,
+            "condition": CONDITION_OF.get(base, ""),
+            "setting": setting,
+            "parts": (label,),
+            "title": title_of(base, setting),
+            "algorithm": facts.algorithm if facts else one_line(label),
+            "is_learner": base in LEARNERS,
+            "is_search": base in SEARCHES,
+            "information": group_of(of_method),
+            "built_in": info.is_ours,
+            "stochastic": info.stochastic,
+            "headline": not under and (facts is None or facts.headline),
+            "under": under,
+            "look": tuple(facts.look) if facts and not setting else (),
+        }
+    tasks = {label: {*of_method.task} for label, of_method in by_label.items()}
+    for label, (one, two) in joined_learners(tasks):
+        conditions = label.partition(" ")[2].replace("-informed", "")
+        title = f"{rows[two]['algorithm']} {conditions}"
+        rows[label] = rows[two] | {"parts": (one, two), "title": title}
     for label, look in looks_of(rows):
         rows[label]["look"] = look
     place = {name: number for number, name in enumerate(KNOWN_METHODS)}
@@ -63,56 +86,16 @@ def methods_of(cells: Iterable[CellRuns], declared: Mapping[str, MethodInfo]) ->
     return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
 
 
-def method_row(
-    cells: Sequence[CellRuns], declared: Mapping[str, MethodInfo], labels: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Return the row of a method from its cells; ``labels`` has all methods of the study."""
-    base, setting, label = cells[0].method, cells[0].setting, cells[0].label
-    info = declared[base]
-    facts = KNOWN_METHODS.get(base) if info.is_ours else None
-    default = base if setting else facts.ablation_of if facts else ""
-    under = default if default in labels else ""
-    return {
-        "base": base,
-        "condition": CONDITION_OF.get(base, ""),
-        "setting": setting,
-        "parts": (label,),
-        "title": title_of(base, setting),
-        "algorithm": facts.algorithm if facts else one_line(label),
-        "kind": facts.kind if facts else "",
-        "information": group_of(cells),
-        "built_in": info.is_ours,
-        "stochastic": info.stochastic,
-        "headline": not under and (facts is None or facts.headline),
-        "under": under,
-        "look": tuple(facts.look) if facts and not setting else (),
-    }
-
-
-def group_of(cells: Iterable[CellRuns]) -> str:
-    """Return the group of a method, one of :data:`GROUPS`, from its cells.
+def group_of(runs: pd.DataFrame) -> str:
+    """Return the group of a method, one of :data:`GROUPS`, from its runs.
 
     A method that learns from the reward of its trials is in the first group, whatever else it uses.
     A method that makes a single trial on every task does not use the reward of trials.
     """
-    parts = [cell.runs for cell in cells]
-    information = {each for runs in parts for text in runs.information.unique()
-                   for each in text.split(", ")}  # fmt: skip
-    several = any((runs.trials > 1).any() for runs in parts)
-    if several and Information.REWARD_BY_TRIAL.value in information:
+    information = {each for text in runs.information.unique() for each in text.split(", ")}
+    if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:
         return BY_TRIAL
     return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
-
-
-def joined_conditions(
-    cells: Mapping[str, Sequence[CellRuns]], rows: Mapping[str, dict[str, Any]]
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield label and row of the learner over one-armed and two-armed tasks together."""
-    tasks = {label: {cell.task for cell in of_label} for label, of_label in cells.items()}
-    for label, (one, two) in joined_learners(tasks):
-        conditions = label.partition(" ")[2].replace("-informed", "")
-        row = {"parts": (one, two), "title": f"{rows[two]['algorithm']} {conditions}"}
-        yield label, rows[two] | row
 
 
 def joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
@@ -127,6 +110,17 @@ def joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[
         if two_armed and one_armed - two_armed:
             both = f"{CONDITION_OF[one]}, {CONDITION_OF[two]}"
             yield f"{METHOD_PREFIX.rstrip('/')} ({both})", (one, two)
+
+
+def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
+    """Return the runs of each method, and of the learner over tasks for one arm and for two
+    (:func:`joined_learners`)."""
+    tasks = {method: {*runs.task} for method, runs in by_method.items()}
+    joined = {
+        label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
+        for label, (one, two) in joined_learners(tasks)
+    }
+    return joined | by_method
 
 
 def looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:

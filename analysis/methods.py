@@ -32,7 +32,6 @@ class KnownMethod(NamedTuple):
     name: str
     algorithm: str
     works: Sequence[str]
-    kind: str = ""
     look: Sequence[str] = ()
     headline: bool = False
     ablation_of: str = ""
@@ -44,8 +43,8 @@ KNOWN_METHODS = {
     for name, row in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()
 }
 """Rows of the built-in methods by id, in the order of lists and figures."""
-SEARCHES = [name for name, row in KNOWN_METHODS.items() if row.kind == "optimum search"]
-"""Ids of the searches for the optimum."""
+SEARCHES = ("optimum/search",)
+"""Ids of the searches for the optimum: references rather than methods to compare."""
 _WORDS = {
     "other_arm": "other arm ",
     "noise_sd": "σ ",

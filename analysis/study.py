@@ -10,7 +10,7 @@ import html
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -50,48 +50,6 @@ CellKey = tuple[str, str]
 """Name of a task, and label of a method: its id with its setting."""
 
 
-@dataclass(frozen=True, eq=False)
-class CellRuns:
-    """Runs of a method with its parameters on a task."""
-
-    task: str
-    method: str
-    setting: str
-    runs: pd.DataFrame
-
-    @property
-    def label(self) -> str:
-        """Label: the method with its setting."""
-        return label_of(self.method, self.setting)
-
-    @cached_property
-    def good(self) -> pd.DataFrame:
-        """Runs with a solution."""
-        solved = self.runs["status"] == "ok"
-        return self.runs if solved.all() else self.runs[solved]
-
-    @property
-    def all_good(self) -> bool:
-        """True if there are runs, and all of them have a solution."""
-        return len(self.good) == len(self.runs) > 0
-
-    @cached_property
-    def rewards(self) -> Array:
-        """Rewards of the solved runs, shape ``(n,)``, ticks."""
-        return self.good.reward.to_numpy(dtype=np.float64)
-
-    @cached_property
-    def gaps(self) -> Array:
-        """Gaps of the solved runs to the best known reward, shape ``(n,)``, shares of it."""
-        return self.good.gap.to_numpy(dtype=np.float64)
-
-    @property
-    def gap(self) -> float:
-        """Gap of the mean reward to the best known reward; NaN if one of them is missing."""
-        best = self.good.best_known.dropna().unique()
-        return float(gap_share(self.rewards.mean(), best[0])) if len(best) else math.nan
-
-
 UNITS = {
     **dict.fromkeys(["reward", "replay_reward", "initial_reward", "best_known"], "ticks"),
     **dict.fromkeys(["proven_bound", "movement_ticks"], "ticks"),
@@ -101,10 +59,16 @@ UNITS = {
 """Units of columns of :attr:`Study.runs`, which its ``attrs`` have."""
 
 
-def typical_run(solved: pd.DataFrame) -> str:
-    """Return the id of the run with the reward nearest to the median."""
-    rewards = solved.reward.to_numpy(dtype=np.float64)
-    return str(solved.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
+def solved(runs: pd.DataFrame) -> pd.DataFrame:
+    """Return the runs with a solution."""
+    have_one = runs.status == "ok"
+    return runs if have_one.all() else runs[have_one]
+
+
+def typical_run(runs: pd.DataFrame) -> str:
+    """Return the id of the solved run with the reward nearest to the median."""
+    rewards = runs.reward.to_numpy(dtype=np.float64)
+    return str(runs.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
 
 Asked = ParamSpec("Asked")
@@ -205,8 +169,16 @@ class Study:
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """Best known rewards by task, with proven bounds and sources."""
-        return best_known(self.stored, self.tasks.values())
+        """Best known rewards by task, with proven bounds and sources.
+
+        Where the corrective process alone with its best hands exceeds all runs, its reward.
+        """
+        known = best_known(self.stored, self.tasks.values())
+        for name, best in known.items():
+            if (alone := self.corrective_best[name]) > best.reward:
+                source = "corrective process alone"
+                known[name] = replace(best, reward=int(alone), source=source, run_id="")
+        return known
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
@@ -227,8 +199,9 @@ class Study:
     def runs(self) -> pd.DataFrame:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
-        Further columns: ``family``, ``split``, number of ``goals``, of ``arms`` (1 or 2),
-        ``best_known`` reward of the task and :attr:`corrective_best`; ``gap``, a share of the best
+        Further columns: ``label``, the method with its setting; ``family``, ``split``, number of
+        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task and
+        :attr:`corrective_best`; ``gap``, a share of the best
         known reward; and parameters by name, but for names that are taken: ``trials`` is the
         number of trials made, ``hands`` the hands of the solution.
         """
@@ -246,6 +219,7 @@ class Study:
         ]
         more = pd.DataFrame(rows, runs.index)
         runs = runs.join(more[[name for name in more if name not in runs]])
+        runs["label"] = [*map(label_of, runs.method, runs.setting)]
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: each.reward for name, each in self.optima.items()}
         runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
@@ -265,11 +239,11 @@ class Study:
         - ``base``: id of the method without a setting;
         - ``condition``: exploration condition of the learner; empty for other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
-        - ``parts``: labels of the cells; of several, the last label with a cell on a task counts;
+        - ``parts``: labels of the runs; of several, the last label with runs on a task counts;
         - ``title``: name on the page, in tables and figures;
         - ``algorithm``: algorithm of which the method is a form;
-        - ``kind``: ``"learner"`` (the paper's learner under the paper's conditions), ``"optimum
-          search"``, ``"no learning"`` (trials without learning from them), or empty;
+        - ``is_learner``: True for the paper's learner under the paper's conditions;
+        - ``is_search``: True for searches for the optimum, which are references;
         - ``information``: use of the reward, one of three groups;
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
@@ -277,20 +251,14 @@ class Study:
         - ``under``: label of the method of a setting or ablation, if this method ran; or empty;
         - ``look``: colour and dash in figures.
         """
-        return methods_of(self.cells.values(), self.declared)
+        return methods_of(self.runs, self.declared)
 
     @cached_property
-    def cells(self) -> dict[CellKey, CellRuns]:
+    def cells(self) -> dict[CellKey, pd.DataFrame]:
         """Runs by task and label (method with its setting), in the order of the plan."""
-        names = ["task", "method", "setting"]
         runs = self.runs.copy(deep=False)
         runs.attrs = {}  # which pandas copies with every column that is taken
-        groups = runs.groupby(names, sort=False).indices if len(runs) else {}
-        return {
-            (key[0], cell.label): CellRuns(*key, runs.iloc[groups.get(key, [])])
-            for cell in (job.cell for job in self.plan)
-            for key in [(cell.task.name, cell.method.name, cell.setting)]
-        }
+        return dict([*runs.groupby(["task", "label"], sort=False)])
 
     @cached
     def sequences(self, task: str) -> pd.DataFrame:
@@ -353,7 +321,7 @@ class Study:
             asked = ("method", method, on_task) if on_task else ("task", task, self.tasks)
             raise CoarticError(f"{self.folder}: {unknown(*asked)}")
         stored = self.movements("replay" if replay else "solution")
-        ids = map(str, self.cells[task, method].good.run_id)
+        ids = map(str, solved(self.cells[task, method]).run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
         executed = []
         with explain_errors(self.folder):
@@ -401,9 +369,9 @@ class Study:
         if not is_hashable(name) or name not in SIGNATURES:
             raise CoarticError(unknown("signature", name, SIGNATURES))
         values = pd.Series(np.nan, self.runs.index, name=name)
-        for key, cell in self.cells.items():
+        for key, runs in self.cells.items():
             executed = self.executed(*key, replay=replay)
-            here = cell.runs.index[cell.runs.run_id.isin(executed.run_ids)]
+            here = runs.index[runs.run_id.isin(executed.run_ids)]
             values[here] = SIGNATURES[name].each(executed)
         return values
 

@@ -9,9 +9,10 @@ from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
-from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
 
@@ -53,6 +54,7 @@ class Table:
     """A table of the report: a function of a study."""
 
     id: str
+    caption: str
     columns: tuple[Column, ...]
     """Columns of the CSV file in their order; ``run_ids``, of the runs behind each row, is last."""
     rows: Callable[[Study], Rows]
@@ -76,7 +78,7 @@ class Table:
         raise KeyError(name)
 
 
-def table(columns: str) -> Callable[[Callable[[Study], Rows]], Table]:
+def table(caption: str, columns: str) -> Callable[[Callable[[Study], Rows]], Table]:
     """Return a decorator that turns a function of a study that yields rows into a table.
 
     The id of the table is the name of the function. ``columns`` has the texts of the columns
@@ -85,7 +87,7 @@ def table(columns: str) -> Callable[[Callable[[Study], Rows]], Table]:
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
         every = *columns.split("; "), "run_ids: -"
-        return Table(id_of(rows), tuple(map(column_of, every)), rows)
+        return Table(id_of(rows), caption, tuple(map(column_of, every)), rows)
 
     return as_table
 
@@ -125,24 +127,26 @@ def shown_names(study: Study) -> dict[Hashable | None, Any]:
     }
 
 
-def row_of_cell(study: Study, cell: CellRuns) -> Row:
-    """Return what tables with a row for each cell say: task, method, numbers of runs and of solved
-    runs, mean and SD of the reward, gap, and the ids of the runs.
+def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
+    """Return what tables with a row for each method on each task say: task, method, numbers of runs
+    and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.
 
     A table leaves out what it has no column for.
     """
+    rewards = solved(runs).reward.to_numpy(np.float64)
     return {
-        "task": marked(study.tasks[cell.task]),
-        "method": cell.label,
-        "runs": len(cell.runs),
-        "solved": len(cell.good),
-        "reward": cell.rewards.mean() if len(cell.good) else math.nan,
-        "reward_sd": standard_deviation(cell.rewards),
-        "gap": cell.gap,
-        **runs_of(cell),
+        "task": marked(study.tasks[runs.task.iloc[0]]),
+        "method": runs.label.iloc[0],
+        "runs": len(runs),
+        "solved": len(rewards),
+        "reward": rewards.mean() if len(rewards) else math.nan,
+        "reward_sd": standard_deviation(rewards),
+        "reward_median": np.median(rewards) if len(rewards) else math.nan,
+        "gap": solved(runs).gap.mean(),
+        **run_ids(runs),
     }
 
 
-def runs_of(*cells: CellRuns) -> Row:
-    """Return the ids of the runs of some cells."""
-    return {"run_ids": " ".join(str(run) for cell in cells for run in cell.runs.run_id)}
+def run_ids(*parts: pd.DataFrame) -> Row:
+    """Return the ids of some runs."""
+    return {"run_ids": " ".join(run_id for runs in parts for run_id in runs.run_id)}

@@ -27,7 +27,7 @@ STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
 KEPT = {
     "comparison": (
-        "contexts learning methods runtimes ranking scores signatures",
+        "contexts learning methods runtimes ranking signatures",
         "postures ranking runtimes learning-curves",
     ),
     "families": ("family-gaps", ""),

@@ -44,7 +44,7 @@ def _parts_of_reports_fail_aloud():
     from coartic.analysis.report import about
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(about, "attempt", lambda study, _, make: make(study))
+        patch.setattr(about, "attempt", lambda failures, name, make, *args: make(*args))
         yield
 
 

@@ -12,6 +12,7 @@ from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.learning import learning_curves
 from coartic.analysis.sections.ranking import name_in_figure
+from coartic.analysis.study import solved
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, ROOT
 
@@ -55,7 +56,7 @@ def test_learning_curves_against_a_loop(traced):
     rewards = dict(traced.rewards())
     spread = 0
     for key, rows in data.groupby(["task", "method"]):
-        runs = [rewards[run_id] for run_id in traced.cells[key].good.run_id]
+        runs = [rewards[run_id] for run_id in solved(traced.cells[key]).run_id]
         assert rows.trial.iloc[[0, -1]].tolist() == [1, 150]
         for point in rows.itertuples():
             best = sorted(np.nanmax(run[: point.trial]) for run in runs)

@@ -7,7 +7,8 @@ from coartic import load_task
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, RANDOM_SEARCH
 from coartic.analysis.report import about
 from coartic.analysis.sections import random_tasks
-from coartic.analysis.sections.random_tasks import solved
+from coartic.analysis.sections.random_tasks import on_instances
+from coartic.analysis.standings import reference
 from coartic.analysis.study import one_by_one
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
@@ -55,9 +56,9 @@ RISING = {INITIAL: ALONE, EC1: -540, EC2: -560, EC3: -550, EC4: -540}
 
 def on(study, name, label):
     """Gaps of a method on an instance to the best known reward."""
-    rows = solved(study)
-    rows = rows[(rows.task == name) & (rows.method == label)]
-    return rows.gap.item() if len(rows) else None
+    runs = on_instances(study)
+    runs = runs[(runs.task == name) & (runs.method == label)]
+    return runs.gap.to_numpy() if len(runs) else None
 
 
 def test_gaps_are_to_the_best_known_reward():
@@ -69,7 +70,7 @@ def test_gaps_are_to_the_best_known_reward():
     assert study.optima["two-armed/v1/i001"].proven
     assert on(study, name, EC1) is None
     assert (on(study, name, "dual-process (EC1, EC4)") == gap).all()
-    assert list(solved(study).family.unique()) == [*ONE, *TWO]
+    assert list(on_instances(study).family.unique()) == [*ONE, *TWO]
 
 
 def test_more_than_eight_instances_are_not_shown_singly():
@@ -93,5 +94,5 @@ def test_gaps_have_intervals_in_each_family():
 def test_what_only_a_folder_says_is_not_called_known(name, to):
     runs = (learner(name, label, 9 * ALONE, commit="") for label in (EC4, RANDOM_SEARCH))
     seen = study_of([run for of_label in runs for run in of_label])
-    assert random_tasks.on_random_tasks(seen).startswith(f"Nearest to the {to}: ")
+    assert reference(seen, [name]) == to
     assert len(about.limits(seen)["own"]) == (to == "best of this folder")

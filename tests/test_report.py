@@ -1,6 +1,7 @@
 """Reports: their numbers are those of the runs, their text is escaped, their rows name runs."""
 
 import html
+import math
 import re
 import shutil
 import subprocess
@@ -11,9 +12,8 @@ import pandas as pd
 import pytest
 
 from coartic import CoarticError, Task, load_task
-from coartic.analysis.methods import title_of
 from coartic.analysis.report import about, render
-from coartic.analysis.report.about import answers, attempt, limits
+from coartic.analysis.report.about import attempt, limits
 from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.player import methods_played, player
 from coartic.analysis.sections import TABLES, coarticulation
@@ -159,42 +159,49 @@ def test_a_page_stands_alone(report):
     assert len(text) < 1_500_000
 
 
-def test_answers_name_failed_runs_behind_them(traced):
-    assert not any("failed" in "".join(answer) for _, answer in answers(traced))
-    planner, learner = "trajectory-optimisation/path-length", "dual-process/EC4"
+def test_failed_runs_have_a_table_and_bar_from_the_ranking(traced):
+    assert TABLES["failed"](traced).empty
+    learner = "dual-process/EC4"
     runs = traced.runs.reset_index(drop=True)
     late = runs.index[(runs.method == learner) & (runs.setting == "")][-1:]
-    late = late.append(runs.index[runs.method == planner])
     runs.loc[late, "status"], runs.loc[late, "reward"] = "timeout", pd.NA
     runs.loc[late, "reason"] = "CPU time limit of 600 s exceeded"
     spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
-    information = {
-        section.answer: " ".join(text).partition(" failed") for section, text in answers(spoiled)
-    }
-    of = len(spoiled.cells["two-armed-1", learner].runs)
-    assert not information["Coarticulation"][1]  # the learner's on one-armed tasks
-    assert information["Nearest"][0].endswith(
-        f" 2 of {of + 1} runs of learner EC4 and {title_of(planner)}"
-    )
-    # a planner makes no trials
-    assert information["Cost"][0].endswith(f" 1 of {of} runs of learner EC4")
-    for study in (traced, spoiled):
-        assert len(answers(study)) == 3
-        for _, (card, *_) in answers(study):  # the first line stands on the first screen
-            assert len(re.findall(r"[\w.]+", card)) <= 15, card
+    (row,) = TABLES["failed"](spoiled).to_dict("records")
+    assert (row["method"], row["failed"]) == (learner, 1)
+    assert row["reasons"] == "1 × CPU time limit of 600 s exceeded"
+    ranked = TABLES["ranking"](spoiled).loc[learner]
+    assert (ranked.failed, math.isnan(ranked.gap)) == (1, True)
+
+
+def numbers_in(text):
+    return re.findall(r"−?\d+(?:\.\d+)?", text.replace("\u202f", ""))
+
+
+def test_every_number_of_a_sentence_is_in_the_table_under_it(report):
+    page = (report / "report.html").read_text("utf-8")
+    seen = 0
+    for section in re.findall(r"<section.*?</section>", page, re.DOTALL):
+        lines = re.findall(r'<p class="finding">(.*?)</p>', section)
+        table = section.partition("<table")[2].partition("</table>")[0]
+        cells = {*numbers_in(re.sub("<[^>]+>", " ", html.unescape(table)))}
+        words = html.unescape(" ".join(lines)).replace("95 %", "")
+        counts = {*numbers_in(words.partition("by verdict")[2])}  # how many rows have a verdict
+        seen += len(numbers_in(words))
+        assert {*numbers_in(words)} - counts <= cells, words
+    assert seen > 20
 
 
 def test_few_runs_say_so(tmp_path):
     """One run a cell, and no learner: every answer is true, none is invented."""
     one = cells_of("paper", tasks=["ascending", "descending"])
     few = run_and_write(tmp_path / "few", cells=one, runs=1, trials=30)
-    texts = {section.answer: " ".join(text) for section, text in answers(few)}
-    assert texts["Coarticulation"].startswith("Too few runs to tell")
+    assert TABLES["contexts"](few).verdict.unique().tolist() == ["too few runs"]
     alone = cells_of("comparison", tasks=["ascending"], methods=["corrective-alone/given"])
     without = run_and_write(tmp_path / "without", cells=alone, runs=1)
     files = write_report(without, tmp_path / "report")
-    assert {"report.html", "tables/ranking.tex"} <= set(files)
-    assert any(name.endswith(".pdf") for name in files)
+    assert {"report.html", "tables/ranking.tex"} <= set(files[0])
+    assert any(name.endswith(".pdf") for name in files[0])
     text = (tmp_path / "report" / "report.html").read_text("utf-8")
     assert load_task("ascending").label in text
     assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))
@@ -244,7 +251,7 @@ def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
     monkeypatch.setattr(about, "attempt", attempt)
     code, said, error = coartic("report", tmp_path / "runs")
     assert code == 1
-    assert "Nearest" in said
+    assert "report.html" in said
     assert "Error: Coarticulation could not be made" in error
     assert f"IndexError: list index out of range ({__file__.rpartition('/')[2]}, line" in error
     report = tmp_path / "runs" / "report"

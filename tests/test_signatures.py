@@ -28,7 +28,6 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.baselines.random_search import RandomSearch
 from coartic.method import run_method
 from coartic.robot import HANDS
-from tests.support.golden import golden
 from tests.support.made_up import runs_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED, changed, posture, tiny_task
 
@@ -348,25 +347,34 @@ def beside_random_search(
 
 
 @pytest.mark.parametrize(
-    ("made_up", "answer"),
+    ("made_up", "verdict"),
     [
-        ({"posture_difference": 2.0}, "Yes. The learner hits the same goal"),
-        ({"posture_difference": 0.5}, "Not shown:"),
-        ({"posture_difference": 0.5, "of_random_search": 2.0}, "Not shown:"),
-        ({"posture_difference": 0.0}, "No significant difference:"),
-        ({"posture_difference": 2.0, "runs": 2}, "Too few runs"),
-        ({"posture_difference": 2.0, "random_search_runs": 0}, "Undecided:"),
+        ({"posture_difference": 2.0}, "different postures"),
+        ({"posture_difference": 0.5}, "no more than random search"),
+        ({"posture_difference": 0.5, "of_random_search": 2.0}, "no more than random search"),
+        ({"posture_difference": 0.0}, "no significant difference"),
+        ({"posture_difference": 2.0, "runs": 2}, "too few runs"),
+        (
+            {"posture_difference": 2.0, "random_search_runs": 0},
+            "undecided: too few runs of random search",
+        ),
         # fewer than the learner's
-        ({"posture_difference": 2.0, "random_search_trials": 9}, "Undecided:"),
-        ({"posture_difference": 2.0, "random_search_runs": 1}, "Undecided:"),
+        (
+            {"posture_difference": 2.0, "random_search_trials": 9},
+            "undecided: too few runs of random search",
+        ),
+        (
+            {"posture_difference": 2.0, "random_search_runs": 1},
+            "undecided: too few runs of random search",
+        ),
     ],
 )
-def test_a_method_that_selects_has_to_exceed_random_search(made_up, answer):
+def test_a_method_that_selects_has_to_exceed_random_search(made_up, verdict):
     study = beside_random_search(**made_up)
     contexts = coarticulation.shared_goal(study)
     assert contexts.method == EC1
     assert contexts.posture_difference == pytest.approx(made_up["posture_difference"])
-    assert coarticulation.next_goal(study).startswith(answer)
+    assert coarticulation.verdict_of(study, contexts) == verdict
     compared = control.contexts_of_control(study, contexts)
     if compared is not None:
         assert compared.posture_difference == pytest.approx(made_up.get("of_random_search", 0.5))
@@ -456,11 +464,6 @@ def test_p_of_shared_goals_is_corrected_by_method():
     assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 70] * 2)
 
 
-def test_a_signature_stands_beside_random_search():
-    sentences = coarticulation.next_goal(beside_random_search(2.0))
-    assert sentences == golden("the learner coarticulates beside random search")
-
-
 def beside_corrective(method, posture_difference, *, stochastic, runs):
     """A method whose base differs so much at goal 1 by the next goal, and the corrective
     process."""
@@ -478,36 +481,30 @@ def beside_corrective(method, posture_difference, *, stochastic, runs):
 
 
 @pytest.mark.parametrize(
-    ("made_up", "answer"),
+    ("made_up", "verdict"),
     [
         (
             {"posture_difference": 0.0, "stochastic": False, "runs": 1},
-            "No. mine hits the same goal in the same",
+            "the same posture",
         ),
         (
             {"posture_difference": 0.5, "stochastic": False, "runs": 1},
-            "Yes. mine hits the same goal in diff",
+            "different postures",
         ),
-        ({"posture_difference": 0.5, "stochastic": True, "runs": 1}, "Too few runs"),
+        ({"posture_difference": 0.5, "stochastic": True, "runs": 1}, "too few runs"),
         (
             {"posture_difference": 0.5, "stochastic": True, "runs": 9},
-            "Yes. mine hits the same goal in clearly",
+            "different postures",
         ),
-        ({"posture_difference": 0.0, "stochastic": True, "runs": 9}, "No significant difference:"),
+        ({"posture_difference": 0.0, "stochastic": True, "runs": 9}, "no significant difference"),
     ],
 )
-def test_no_difference_is_significant_or_not_without_a_test(made_up, answer):
+def test_no_difference_is_significant_or_not_without_a_test(made_up, verdict):
     """A method that draws nothing takes none, and one run a context allows none."""
     study = beside_corrective("mine", **made_up)
     assert not control.selects(study, "mine")
-    assert coarticulation.next_goal(study).startswith(answer)
-
-
-def test_the_sentence_is_about_the_learner_or_a_method_from_a_file():
-    """Of another method, which may coarticulate or not by construction, there is none."""
-    study = beside_corrective("trajectory-optimisation/jerk", 0.5, stochastic=False, runs=1)
-    assert coarticulation.shared_goal(study) is not None
-    assert coarticulation.next_goal(study) == ""
+    contexts = coarticulation.shared_goal(study)
+    assert coarticulation.verdict_of(study, contexts) == verdict
 
 
 def test_one_run_beside_many_is_no_test():
@@ -517,4 +514,4 @@ def test_one_run_beside_many_is_no_test():
         for name, x, count in (("ascending", 0.0, 40), ("descending", 0.5, 1))
     ])  # fmt: skip
     study.runs["trials"] = 0
-    assert coarticulation.next_goal(study).startswith("Too few runs")
+    assert TABLES["contexts"](study).verdict.tolist() == ["too few runs"]

@@ -1,6 +1,5 @@
 """How far methods end from the optimum, who is ahead, and what it costs: by hand."""
 
-import itertools
 import math
 import re
 
@@ -14,9 +13,9 @@ from coartic.analysis.method_frame import BY_TRIAL, WITHOUT_REWARD, headline_met
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about
 from coartic.analysis.report.render import columns_of
-from coartic.analysis.sections import FIGURES, TABLES, costs, own, ranking
+from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs, own
 from coartic.analysis.statistics import running_times
-from coartic.estimates import RESAMPLES, SEED
+from coartic.estimates import SEED
 from tests.support.golden import golden
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
@@ -60,40 +59,11 @@ def test_on_one_task_intervals_are_of_the_gaps_themselves():
     ends = stats.bootstrap((gap,), np.mean, n_resamples=9_999, rng=np.random.default_rng(SEED))
     low, high = ends.confidence_interval
     assert high - gap.mean() > 1.3 * (gap.mean() - low) > 0
-    table = standings.main_gaps(seen).set_index("method")[["gap", "gap_low", "gap_high"]]
+    table = standings.board(seen)[["gap", "gap_low", "gap_high"]]
     assert table.loc["dual-process/EC1"].tolist() == pytest.approx(
         [gap.mean(), low, high], rel=0.01
     )
     assert table.loc["mine"].tolist() == pytest.approx([30 / 292] * 3)
-
-
-def test_a_rank_counts_algorithms():
-    setting = {
-        (task, f"{method}-uncorrected"): rewards for (task, method), rewards in LEARNER.items()
-    }
-    seen = study(LEARNER | CMA | setting)
-    rows = standings.leaders(standings.main_gaps(seen), BY_TRIAL)
-    assert rows.algorithm.tolist() == ["CMA-ES", "learner"]
-    # Eight pairs, all in favour of the first: of 2^8 signs two are as extreme.
-    test = standings.paired_difference(seen, *rows.method, standings.common_tasks(seen))
-    assert test.p == pytest.approx(2 / 2**8, abs=0.003)
-
-
-def test_tasks_count_alike_in_a_paired_test():
-    """However many pairs they have: of ticks as shares, -292 and -465 are the optima."""
-    ahead = {"ascending": [5, -3], "two-armed-1": [4, 1, 2, -1, 3, 1, -2, 2]}
-    seen = study({
-        (task, method): [-400 + tick * (method == "mine") for tick in ticks]
-        for task, ticks in ahead.items() for method in ("mine", "yours")
-    })  # fmt: skip
-    parts = [np.array(ticks) / size / len(ticks)
-             for ticks, size in zip(ahead.values(), (292, 465), strict=True)]  # fmt: skip
-    values = np.concatenate(parts)
-    sums = [abs(values @ signs) for signs in itertools.product((1, -1), repeat=len(values))]
-    p = np.mean(np.array(sums) >= abs(values.sum()) - 1e-12)
-    assert standings.paired_difference(
-        seen, "mine", "yours", standings.common_tasks(seen)
-    ).p == pytest.approx(p)
 
 
 def test_two_methods_differ_by_the_difference_of_their_gaps():
@@ -101,20 +71,18 @@ def test_two_methods_differ_by_the_difference_of_their_gaps():
     plan = {(task, "my-plan"): [reward] for task, reward in
             (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
     seen = study(TEN | plan, deterministic=["my-plan"])
-    rows = standings.main_gaps(seen).set_index("method")
+    rows = standings.board(seen)
     both = "dual-process (EC1, EC4)"
-    found = ranking.difference_of_gaps(seen, both, "my-plan")
+    runs = standings.compared(seen)
+    found = own.difference_of_gaps(runs[both], False, runs["my-plan"], True)
     ends = rows.loc[both, ["gap", "gap_low", "gap_high"]] - rows.gap["my-plan"]
     assert [found.value, found.low, found.high] == pytest.approx(list(ends), abs=3e-4)
 
 
-def test_the_learner_stands_by_the_form_that_explores_most():
+def test_the_learner_is_joined_with_each_form():
     better = {("two-armed-1", "dual-process/EC3"): [-470, -471, -470, -471]}
     seen = study(LEARNER | better)
-    assert standings.main_gaps(seen).method.iloc[0] == "dual-process (EC1, EC3)"
-    assert standings.leaders(standings.main_gaps(seen), BY_TRIAL).method.tolist() == [
-        "dual-process (EC1, EC4)"
-    ]
+    assert standings.board(seen).index[0] == "dual-process (EC1, EC3)"
 
 
 def test_a_method_that_makes_one_trial_does_not_use_its_reward():
@@ -162,10 +130,10 @@ def test_a_failed_run_reaches_nothing():
     learner, other = "dual-process/EC1", "posture-based/two-goals"
     rewards = {learner: [-300] * 4, other: [-305, -305, None, None]}
     seen = study({("ascending", method): of for method, of in rewards.items()})
-    assert standings.main_gaps(seen).method.tolist() == [learner]
+    assert [*standings.board(seen).index] == [learner]
     assert TABLES["against-learner"](seen).empty
     assert TABLES["runtimes"](seen).reached[other] == pytest.approx(2 / 4 * 10 / 20)
-    times = costs.times_of(seen, seen.cells["ascending", other], "solve_s")
+    times = costs.times_of(seen, "ascending", other, "solve_s")
     assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
 
 
@@ -173,8 +141,8 @@ def test_a_locked_base_is_another_problem():
     seen = study({("ascending", name): [-300] * 3 for name in ("dual-process/EC1", "mine")})
     locked = seen.runs.assign(parameters=np.where(seen.runs.method == "mine", '{"base": ""}', "{}"))
     again = study_of(locked, optima=seen.optima)
-    assert standings.main_gaps(again).method.tolist() == ["dual-process/EC1"]
-    assert list(costs.cells_with_targets(again)) == ["dual-process/EC1"]
+    assert [*standings.board(again).index] == ["dual-process/EC1"]
+    assert list(costs.runs_with_targets(again)) == ["dual-process/EC1"]
 
 
 SPREAD = np.array([0, 1, -1, 0, 1, -2, 0, 2, -1, 0])
@@ -216,10 +184,6 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     rows = TABLES["against-learner"](seen)
     assert rows.least_p["ascending my-plan"] == pytest.approx(2 / 2**runs)
     row_of = TABLES["ranking"](seen).loc["my-plan"]
-    both = "dual-process (EC1, EC4)"
-    # With every run of the learner.
-    test = standings.paired_difference(seen, "my-plan", both, standings.common_tasks(seen))
-    assert test.least_p == pytest.approx(max(2 / 4**runs, 2 / (1 + RESAMPLES)))
     expected = (2, 0) if runs == 10 else (math.nan, math.nan)
     assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
 
@@ -239,13 +203,13 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     assert columns_of(TABLES["ranking"], ranked)["gap"].startswith(
         "gap to the best of this folder (%)"
     )
-    plot, sentence = FIGURES["ranking"](unknown), ranking.nearest(unknown)
+    plot, sentence = FIGURES["ranking"](unknown), " ".join(said(unknown, "ranking"))
     assert "best of folder" in plot.figure.axes[0].get_xlabel()
     for words in (sentence, plot.alt, *columns_of(TABLES["ranking"], ranked).values()):
         assert not re.search("optimum|known", words)
     assert "Two-armed 1 † is known: gaps there are" in about.notes_of(unknown, ranked)[0]
     assert TABLES["tasks"](unknown).source.tolist() == ["mine", "dual-process/EC4"]
-    one = MadeUp(seen, optima=made_up_optima("ascending"))
+    one = MadeUp(seen, optima=made_up_optima("ascending"), rewards=seen.rewards)
     assert TABLES["ranking"](one).loc["mine", "on ascending"] == pytest.approx(4.5 / 292)
 
 
@@ -280,7 +244,6 @@ def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
     optima |= {"two-armed-2": BestKnown(-300, None, only_here=True)}
     both = MadeUp(both, optima=optima)
     assert standings.common_tasks(both) == ("ascending", "two-armed-1")
-    assert standings.gaps_on(both, ("two-armed-2",)).gap.tolist() == pytest.approx([0, 0.03])
 
 
 ON_ONE = {("ascending", "mine"): [-300, -301, -302]}
@@ -295,9 +258,9 @@ def test_what_a_method_did_not_run_on_leaves_it_its_gap_there():
     assert ranked.tasks[:3].tolist() == [1, 2, 2]
     (axes,) = FIGURES["ranking"](seen).figure.axes
     assert "mine (1 of 2 tasks)" in [text.get_text() for text in axes.get_yticklabels()]
-    cells = costs.cells_with_targets(seen)
-    assert [cell.task for cell in cells["mine"]] == ["ascending"]
-    assert len(cells["cma-es/bandit"]) == 2
+    runs = costs.runs_with_targets(seen)
+    assert {*runs["mine"].task} == {"ascending"}
+    assert runs["cma-es/bandit"].task.nunique() == 2
 
 
 def without_spread(runs):
@@ -314,19 +277,26 @@ def test_runs_without_spread_are_tested_by_their_number(runs, better):
     assert row_of.better == pytest.approx(better, nan_ok=True)
 
 
-def shorter():
-    """A method of more trials than the learner, on one of its tasks."""
-    seen = study(TEN | {("ascending", "mine"): [-309, -301]})
-    seen.runs.loc[seen.runs.method == "mine", "trials"] = 500
-    return seen
-
-
-def test_on_one_task_a_method_stands_beside_the_learners_reward():
-    rows = TABLES["own"](shorter())
-    assert rows.nearest.tolist() == ["dual-process (EC1, EC4)"]
-    assert rows[["gap", "nearest_gap", "learner"]].iloc[0].tolist() == pytest.approx(
-        [13 / 292, 11 / 292, -303]
+def test_an_own_method_stands_next_to_others_on_the_tasks_that_it_solved():
+    seen = study(TEN | CMA | {("ascending", "mine"): [-309, -301]})
+    rows = TABLES["own"](seen)
+    others = ["cma-es/bandit", "dual-process/EC1"]
+    assert rows.index.tolist() == [f"mine {name}" for name in ("mine", *others)]
+    gaps = [13 / 292, 1.5 / 292, 11 / 292]
+    assert rows.gap.tolist() == pytest.approx(gaps)
+    assert rows.difference.tolist()[1:] == pytest.approx([gap - gaps[0] for gap in gaps[1:]])
+    # Of runs that have the same seeds the interval is for independent ones, as in the ranking.
+    drawn = np.random.default_rng(0)
+    learner, mine = (SPREAD - 303.0) / -292, np.array([309.0, 301.0]) / 292
+    assert math.isnan(rows.difference_low.iloc[1])  # of two runs there is no interval
+    four = study(TEN | {("ascending", "mine"): [-309, -301, -305, -304]})
+    row_of, mine = (
+        TABLES["own"](four).loc["mine dual-process/EC1"],
+        np.array([309, 301, 305, 304.0]),
     )
+    means = [drawn.choice(each, (20_000, len(each))).mean(1) for each in (learner, mine / 292)]
+    due = np.quantile(means[0] - means[1], [0.025, 0.975])
+    assert [row_of.difference_low, row_of.difference_high] == pytest.approx(due.tolist(), abs=2e-3)
 
 
 def with_parameters():
@@ -403,56 +373,34 @@ def test_learners_over_all_tasks_stand_for_their_conditions():
     assert [*both.methods.index] == learner  # EC1 adds no task
 
 
-def alike(**better):
-    """Methods by their beginnings, with -300 and so many ticks more on ascending."""
-    names = {"learner": "dual-process/EC1", "cma": "cma-es/bandit",
-             "random_search": "random-search", "climbing": "hill-climbing",
-             "alone": "corrective-alone/given"}  # fmt: skip
-    return study({("ascending", names[n]): [-300 + more] * 3 for n, more in better.items()})
-
-
 def beside(*methods, runs=10, **more):
     return study(TEN | strangers(*methods, runs=runs) | more)
 
 
-NEAREST = {
-    "the learner is second of three": lambda: beside(("mine", 2), ("yours", -3)),
-    "the learner is last of two": lambda: beside(("mine", 2)),
-    "three are alike": lambda: alike(learner=0, cma=0, random_search=0),
-    "two are alike, and one is behind": lambda: alike(learner=0, cma=0, climbing=-1),
-    "two are alike, and two are ahead": lambda: alike(
-        learner=0, cma=0, climbing=1, random_search=1
-    ),
-    "who tries hands alone does not learn": lambda: alike(learner=0, cma=1, alone=0),
-    "a method ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
-    "a method from a file has parameters": with_parameters,
-    "the learner is alone": lambda: study(TEN),
-}
-OWN = {
-    "it ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
-    "it is alone on a task": lambda: study(LEARNER | CMA | {("two-armed-2", "mine"): [-310, -308]}),
-    "two ran on all": lambda: beside(("mine", 2), ("yours", 3)),
-    "one run of each, and no learner": lambda: study(
-        {key: rewards[:1] for key, rewards in (CMA | strangers(("mine", 2), runs=1)).items()}
-    ),
-    "there is none": lambda: study(TEN),
-    "a run failed": lambda: study(
-        LEARNER | {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
-    ),
-    "three runs without spread": lambda: without_spread(3),
-    "ten runs without spread": lambda: without_spread(10),
-    "on one task, with more trials": shorter,
-    "on one task, once": lambda: study(TEN | {("ascending", "mine"): [-309]}),
-    "it has parameters": with_parameters,
-}
 SENTENCES = {
-    name: (words, made)
-    for words, of in ((ranking.nearest, NEAREST), (own.own_in_words, OWN))
-    for name, made in of.items()
+    "ranking": {
+        "the learner is second of three": lambda: beside(("mine", 2), ("yours", -3)),
+        "a method ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
+        "a method from a file has parameters": with_parameters,
+        "the learner is alone": lambda: study(TEN),
+    },
+    "own": {
+        "it ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
+        "two ran on all": lambda: beside(("mine", 2), ("yours", 3)),
+        "there is none": lambda: study(TEN),
+        "a run failed": lambda: study(
+            LEARNER | {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
+        ),
+    },
+    "cost": {"the learner and CMA-ES": lambda: study(LEARNER | CMA)},
 }
 
 
-@pytest.mark.parametrize("name", SENTENCES)
-def test_sentences_are_those_of_the_golden_page(name):
-    words, study_for = SENTENCES[name]
-    assert words(study_for()) == golden(name)
+def said(seen, section):
+    """The sentence of a section, its lines."""
+    return about.finding(seen, next(each for each in SECTIONS if each.id == section))
+
+
+@pytest.mark.parametrize(("section", "name"), [(s, n) for s in SENTENCES for n in SENTENCES[s]])
+def test_sentences_are_those_of_the_golden_page(section, name):
+    assert "\n".join(said(SENTENCES[section][name](), section)) == golden(f"{section}: {name}")

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import pandas as pd
+from jinja2 import Environment, StrictUndefined
+
+from coartic.analysis.method_frame import GROUPS
+from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH
 from coartic.analysis.sections import SECTIONS, Section
+from coartic.analysis.standings import common_tasks, reference
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.words import NO_BREAK, listed, marked
+from coartic.analysis.words import NO_BREAK, interval, listed, marked, number, p_value, tally
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
 
 Made = TypeVar("Made")
+LEARNER = "dual-process (EC1, EC4)"
+"""Label of the paper's learner over tasks for one arm and for two."""
 RUNS = 20
 """Number of runs of every experiment of the paper."""
 
@@ -30,40 +39,49 @@ def visible_sections(study: Study) -> list[Section]:
     return [section for section in SECTIONS if one_by_one(study) or not section.single]
 
 
-@cached
-def failures(study: Study) -> dict[str, str]:
-    """Return the errors of :func:`attempt` so far, in words, by the name of the failed part."""
-    return {}
-
-
-def attempt(study: Study, name: str, make: Callable[[Study], Made]) -> Made | None:
+def attempt(
+    failures: dict[str, str], name: str, make: Callable[..., Made], *args: Any
+) -> Made | None:
     """Make a part of a report, and return None if this raises an exception.
 
-    :func:`failures` then has the error, with file and line, by the ``name`` of the part. A
-    CoarticError, which is an error of the folder, is raised.
+    ``failures`` then has the error, with file and line, by the ``name`` of the part. Raises a
+    CoarticError, which is an error of the folder.
     """
     try:
-        return make(study)
+        return make(*args)
     except CoarticError:
         raise
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(place.filename).name}, line {place.lineno}"
-        failures(study).setdefault(name, f"{error_line(error)} ({where})")
+        failures.setdefault(name, f"{error_line(error)} ({where})")
         return None
 
 
-@cached
 def finding(study: Study, section: Section) -> list[str]:
-    """Return the lines of a section's sentence; none without a finding."""
-    text = attempt(study, section.short, section.sentence) if section.sentence else ""
-    return [shown(line.strip()) for line in text.strip().split("\n")] if text else []
+    """Return the lines of a section's sentence; none without rows in its first table."""
+    frame = section.tables[0](study)
+    label = frame.method if "method" in frame else frame.index.to_series()
+    under = frame.attrs["under"]
+    main = ~label.map(lambda method: under.get(method) in {*label}).astype(bool)
+    rows = frame.assign(title=label.map(study.methods.title))[main]
+    if not section.sentence or not len(rows):
+        return []
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"number": number, "counts": lambda each: tally(Counter(each))}
+    environment.globals |= {
+        "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
+        "uses": GROUPS, "reference": reference(study, common_tasks(study)),
+    }  # fmt: skip
+    text = environment.from_string(section.sentence).render(rows=rows)
+    return [shown(line.strip()) for line in text.split("\n") if line.strip()]
 
 
-def answers(study: Study) -> list[tuple[Section, list[str]]]:
-    """Return the sections with a short answer, and the lines of their findings."""
-    answering = [section for section in visible_sections(study) if section.answer]
-    return [(each, lines) for each in answering if (lines := finding(study, each))]
+def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
+    """Return the first two rows, and the rows of the paper's learner and of random search."""
+    label = rows.method if "method" in rows else rows.index.to_series()
+    kept = label.isin([*label[:2], LEARNER, *LEARNERS[::3], RANDOM_SEARCH])
+    return rows[kept].to_dict("records")
 
 
 @cached
@@ -71,11 +89,9 @@ def limits(study: Study) -> dict[str, Any]:
     """Return facts that limit the conclusions from these runs, for the page."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
-    algorithm, kind = study.methods.algorithm, study.methods.kind
-    learners = [cell for cell in study.cells.values() if algorithm[cell.label] == "learner"]
-    trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
-    papers = [len(cell.runs) for cell in learners if kind[cell.label] == "learner"]
-    fewest = min(papers, default=RUNS)
+    algorithm, papers = study.methods.algorithm, study.methods.is_learner
+    trials = {int(n) for n in runs[runs.label.map(algorithm) == "learner"].trials.dropna()}
+    fewest = min((len(of) for (_, label), of in study.cells.items() if papers[label]), default=RUNS)
     tasks = list(one_by_one(study).values())
     optima = [(task, study.optima.get(task.name)) for task in tasks]
     reasons = Counter(map(str, failed.reason.fillna(""))).most_common(3)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import os
-from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from shlex import quote
@@ -25,7 +24,6 @@ from coartic.analysis.report.render import (
     table_csv,
 )
 from coartic.analysis.sections import SECTIONS, TABLES, Section
-from coartic.analysis.sections.ranking import differences
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Table
 from coartic.analysis.words import listed, number
@@ -34,16 +32,17 @@ from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of
 
 HERE = Path(__file__).parent
-NO_PARTS: dict[str, Any] = {"rows": 0, "settings": 0, "finding": [], "figure": None}
-"""Values of :func:`parts_of` for a section that failed."""
 
 
-def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[str]:
+def write_report(
+    study: Study, folder: Path, *, for_paper: bool = True
+) -> tuple[list[str], dict[str, str]]:
     """Write a report into ``folder``, in the place of an earlier report.
 
     ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF. Returns the paths of the
-    files. Raises CoarticError if the folder holds the results themselves, the report of other
-    results, or other files.
+    files, and the errors of parts that could not be made, by the name of the part. Raises
+    CoarticError if the folder holds the results themselves, the report of other results, or other
+    files.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
@@ -59,34 +58,36 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
             head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
         if head and f'-results" content="{home}"' not in html.unescape(head):
             raise CoarticError(f"{folder} holds the report of other results: choose another folder")
-    files = {"report.html": page(study, home).encode()}
-    captions = {section.table.id: (section.short, section.caption) for section in SECTIONS}
+    failures: dict[str, str] = {}
+    files = {"report.html": page(study, home, failures).encode()}
+    names = {table.id: section.title for section in SECTIONS for table in section.tables}
     for name, table in TABLES.items():
-        where, caption = captions.get(name, (name, ""))
-        make = partial(files_of_table, table, caption, for_paper)
-        files |= about.attempt(study, where, make) or {}
+        made = about.attempt(
+            failures, names.get(name, name), files_of_table, study, table, for_paper
+        )
+        files |= made or {}
     for section in about.visible_sections(study) if for_paper else ():
-        files |= about.attempt(study, section.short, partial(files_of_figure, section)) or {}
+        files |= about.attempt(failures, section.title, files_of_figures, study, section) or {}
     publish(folder, files)
-    return list(files)
+    return list(files), failures
 
 
-def files_of_table(table: Table, caption: str, for_paper: bool, study: Study) -> dict[str, bytes]:
+def files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
     """Return the files of a table by path: CSV, and LaTeX ``for_paper``; none without rows."""
     frame = table(study)
     if not len(frame):
         return {}
     files = {f"tables/{table.id}.csv": table_csv(frame).encode()}
     if for_paper and table.id in IN_LATEX:
-        text = latex_table(table, frame, caption, about.notes_of(study, frame.columns))
+        text = latex_table(table, frame, table.caption, about.notes_of(study, frame.columns))
         files[f"tables/{table.id}.tex"] = text.encode()
     return files
 
 
-def files_of_figure(section: Section, study: Study) -> dict[str, bytes]:
-    """Return the files of a section's figure by path: SVG and PDF; none without a figure."""
+def files_of_figures(study: Study, section: Section) -> dict[str, bytes]:
+    """Return the files of a section's figures by path: SVG and PDF."""
     files = {}
-    if (plot := plot_of(study, section)) is not None:
+    for plot in plots_of(study, section):
         for ending in (".svg", ".pdf"):
             files[f"figures/{plot.id}{ending}"] = picture(plot.figure, ending)
             plot.figure.set_layout_engine("none")  # the next is laid out alike
@@ -94,34 +95,25 @@ def files_of_figure(section: Section, study: Study) -> dict[str, bytes]:
 
 
 @cached
-def plot_of(study: Study, section: Section) -> Plot | None:
-    """Return the figure of a section; None if the section or the folder has none."""
-    return section.figure(study) if section.figure else None
+def plots_of(study: Study, section: Section) -> list[Plot]:
+    """Return the figures of a section for which the folder has runs."""
+    return [plot for draw in section.figures if (plot := draw(study)) is not None]
 
 
-def sections(study: Study) -> list[dict[str, Any]]:
-    """Return the sections with a table or figure, as :func:`parts_of` does, and the sections that
-    failed, with their ``failure`` in words."""
-    allowed = []
-    for section in about.visible_sections(study):
-        parts = about.attempt(study, section.short, partial(parts_of, section)) or NO_PARTS
-        failure = about.failures(study).get(section.short, "")
-        if failure or parts["figure"] or parts["rows"]:
-            allowed.append({**vars(section), **parts, "failure": failure})
-    return allowed
-
-
-def parts_of(section: Section, study: Study) -> dict[str, Any]:
-    """Return the values of a section for the template: table, figure and finding."""
-    table, frame, plot = section.table, section.table(study), plot_of(study, section)
+def parts_of(study: Study, section: Section) -> dict[str, Any]:
+    """Return the values of a section for the template: finding, figures and tables."""
+    tables = []
+    for table in section.tables:
+        if len(frame := table(study)):
+            settings = sum("setting" in names for names in classes_of(table, frame))
+            tables.append({
+                "id": table.id, "caption": table.caption, "rows": len(frame),
+                "settings": settings, "html": html_table(table, frame, table.caption),
+            })  # fmt: skip
     return {
-        "table": table.id,
-        "rows": len(frame),
-        "settings": sum("setting" in names for names in classes_of(table, frame)),
-        "html": html_table(table, frame, section.caption) if len(frame) else "",
         "finding": about.finding(study, section),
-        "figure": plot,
-        "svg": for_page(plot) if plot else "",
+        "figures": [(plot, for_page(plot)) for plot in plots_of(study, section)],
+        "shown": tables,
     }
 
 
@@ -130,11 +122,19 @@ def stamp(runs: pd.DataFrame) -> str:
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
-def page(study: Study, home: str) -> str:
+def page(study: Study, home: str, failures: dict[str, str]) -> str:
     """Return the page in HTML, which needs no other file and no network.
 
-    ``home`` is the path from the page's folder to the results.
+    ``home`` is the path from the page's folder to the results. ``failures`` gets the errors of
+    parts that could not be made.
     """
+    sections = []
+    for section in about.visible_sections(study):
+        parts = about.attempt(failures, section.title, parts_of, study, section)
+        parts = parts or {"finding": [], "figures": [], "shown": []}
+        failure = failures.get(section.title, "")
+        if failure or parts["figures"] or parts["shown"]:
+            sections.append({**vars(section), **parts, "failure": failure})
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
@@ -145,21 +145,20 @@ def page(study: Study, home: str) -> str:
         finalize=lambda value: about.shown(value) if type(value) is str else value,
     )
     environment.filters |= {"number": number, "listed": listed}
+    there = [section["id"] for section in sections]
+    stage = next((name for name in ("coarticulation", "ranking", "tasks") if name in there), "")
     try:
         links = metadata("coartic").get_all("Project-URL") or []
     except PackageNotFoundError:
         links = []
     made_with = study.made_with
-    cards = [(section, lines[0]) for section, lines in about.answers(study)]
     return environment.get_template("page.html.jinja").render(
         title=f"Coarticulation of a simulated robot: suite {study.suite}",
-        description=" ".join(text for _, text in cards),
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
-        player=about.attempt(study, "Film", player) or "",
+        player=about.attempt(failures, "Film", player, study) or "",
         script=(HERE / "page.js").read_text("utf-8"),
-        cards=cards,
-        differences=about.attempt(study, "Differences of gaps", differences) or {},
-        sections=sections(study),
+        sections=sections,
+        stage=stage,
         suite=study.suite,
         home=home,
         stamp=stamp(study.runs),
@@ -168,6 +167,6 @@ def page(study: Study, home: str) -> str:
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         limits=about.limits(study),
-        failures=about.failures(study),
+        failures=failures,
         links=dict(link.split(", ", 1) for link in links),
     )

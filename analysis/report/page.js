@@ -66,15 +66,6 @@
     show();
   });
 
-  document.querySelectorAll("[data-differences]").forEach((tools) => {
-    const texts = JSON.parse(tools.dataset.differences);
-    const [first, second] = tools.querySelectorAll("select");
-    const show = () => { tools.querySelector("output").textContent = texts[first.value][second.value] || "0"; };
-    tools.addEventListener("change", show);
-    tools.hidden = false;
-    show();
-  });
-
   /* A link to a row unfolds its table, and a link to a claim its evidence. */
   const reveal = () => {
     const target = document.querySelector(":target");
@@ -85,5 +76,9 @@
     target.scrollIntoView({ block: "center", inline: "start" });
   };
   window.addEventListener("hashchange", reveal);
+  /* Figures and short tables are printed, folded or not. */
+  window.addEventListener("beforeprint", () => document.querySelectorAll("details.folded").forEach((each) => {
+    each.open ||= each.querySelector("figure") || each.querySelectorAll("tr").length <= 11;
+  }));
   reveal();
 })();

@@ -14,7 +14,7 @@ from coartic.analysis.control import contexts_of_control
 from coartic.analysis.sections.coarticulation import shared_goal
 from coartic.analysis.sections.own import own_methods
 from coartic.analysis.standings import compared
-from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, typical_run
+from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, solved, typical_run
 from coartic.analysis.table import SHORT_ID
 from coartic.play.page import player_figure, preset_of
 from coartic.robot import HANDS
@@ -56,10 +56,10 @@ def player(study: Study) -> str:
         folder=quote(str(study.folder)),
         first=begin,
         cells=[
-            (method, f"on {task}", {"preset": where[task], "who": cell.label})
-            for method, cells in compared(study).items()
-            for task, cell in cells.items()
-            if task in where and cell.label in {run["id"] for run in alone[task]["runs"]}
+            (method, f"on {task}", {"preset": where[task], "who": label})
+            for method, runs in compared(study).items()
+            for task, label in runs[["task", "label"]].drop_duplicates().to_numpy()
+            if task in where and label in {run["id"] for run in alone[task]["runs"]}
         ],
     )
 
@@ -98,9 +98,9 @@ def film_of(study: Study, key: CellKey) -> dict[str, Any]:
 
     Empty if the cell has no solution, or a solution that follows a path.
     """
-    if key not in study.cells or not len(study.cells[key].good):
+    good = solved(study.cells.get(key, study.runs[:0]))[:MOST_EXECUTED]
+    if not len(good):
         return {}
-    good = study.cells[key].good[:MOST_EXECUTED]
     run, stored = typical_run(good), study.movements("solution")
     if any(movement.kind == "path" for each in good.run_id for movement in stored[each]):
         return {}

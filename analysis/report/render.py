@@ -27,9 +27,9 @@ from coartic.analysis.words import (
 from coartic.internal.text import one_line
 
 IN_LATEX = {
-    "own": "task, method, runs, reward, gap, nearest, nearest_gap",
+    "own": "own, method, gap, difference, share, trials_to_half, tasks",
     "contexts": "place, method, runs, distance, p_holm, control, p_random_search",
-    "ranking": "method, gap, on *",
+    "ranking": "method, gap, share, on *",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "learning": "task, method, runs, after_*, trials_to_half_gain",
     "signatures": "task, method, hands, runs, first, first_control, first_p, arm, arm_p",

@@ -14,7 +14,6 @@ from coartic.analysis.sections import (
     own,
     random_tasks,
     ranking,
-    scores,
     tasks,
 )
 from coartic.analysis.study import Study
@@ -24,165 +23,160 @@ from coartic.analysis.words import id_of
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page, left out if the folder has neither its table nor its figure."""
+    """A section of the page, left out if the folder has neither its tables nor its figures."""
 
     id: str
-    short: str
-    """Name among the contents."""
     title: str
-    table: Table
-    caption: str
-    """Caption of the table."""
-    figure: Callable[[Study], Plot | None] | None = None
-    """Function that draws the figure, or returns None if the folder has no runs for it."""
-    sentence: Callable[[Study], str] | None = None
-    """Function that returns the finding in words, also for too few runs, with the number of failed
-    runs; empty without a finding. The first line is an answer for the first screen."""
-    answer: str = ""
-    """Word before the answer on the terminal; empty for sections without a short answer."""
+    tables: tuple[Table, ...]
+    figures: tuple[Callable[[Study], Plot | None], ...] = ()
+    """Functions that draw the figures, or return None if the folder has no runs for one. The page
+    folds all figures but the first."""
+    sentence: str = ""
+    """Jinja template of the finding in words, from ``rows``: the first table, without settings and
+    ablations, and with the ``title`` of each method. Every number is a cell of the table."""
     note: str = ""
-    """Explanation of figure and table."""
+    """Explanation of figures and tables."""
     single: bool = True
     """True for sections about single tasks, left out for many random tasks."""
     folded: bool = False
-    """True if the page folds the table."""
+    """True if the page folds the tables."""
 
 
 SECTIONS = (
     Section(
         "own",
         "Own methods",
-        "How good are your own methods?",
-        table=own.list_own,
-        caption="Methods from files on each task (rewards in ticks)",
-        sentence=own.own_in_words,
-        answer="Own",
-        note="Nearest: the built-in method with the smallest gap on the task. p is of the test "
-        "that the mean reward differs from the learner's, corrected for the tasks of the method "
-        "(Holm). A gap over several tasks is on those on which the method solved every run.",
+        (own.list_own,),
+        sentence="""\
+{% for name, group in rows.groupby("own", sort=False) %}
+{% for row in group.to_dict("records") %}
+{% if loop.first %}
+{{ row.title }}: gap {{ interval(row, "gap", scale=100, unit=" %") }} (tasks: {{ row.tasks }})
+{%- else %}
+{{ ". On the same tasks: " if loop.index == 2 else "; " }}{{ row.title }} \
+{{ interval(row, "gap", scale=100, unit=" %") }}, difference \
+{{ interval(row, "difference", scale=100) }} percentage points
+{%- endif %}
+{% endfor %}
+.
+{% endfor %}""",
+        note="On the tasks on which the own method solved every run: the nearest built-in method "
+        "with the same use of the reward, the learner and CMA-ES. What an own method uses is as "
+        "its author declares.",
         single=False,
-        folded=True,
+    ),
+    Section(
+        "ranking",
+        "Ranking",
+        (ranking.list_ranking,),
+        (ranking.draw_ranking,),
+        sentence="""\
+{% set complete = rows[rows.tasks == rows.tasks.max()] %}
+{% for use in uses %}
+{% for row in leading(complete[complete.information == use]) %}
+{% if loop.first %}
+Gap to the {{ reference }}, {{ use }}: \
+{% endif %}
+{{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
+{%- endfor %}
+
+{% endfor %}""",
+        note="Methods are grouped by their use of the reward: its value after each trial, its "
+        "formula, or nothing. The gap is from the mean reward to the optimum, or the best known "
+        "reward, as a share of it. Share of the gain: 0 % is the corrective process alone with its "
+        "best hands (with the task's initial hands where there are over 4096 hand sequences), "
+        "100 % the best known reward; tasks on which both are equal have none. Intervals describe "
+        "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
+        "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
+        "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
+        "against-learner). Empty: the runs are too few, or too alike, to tell. A method with "
+        "missing tasks or failed runs has no gap over all tasks.",
+        single=False,
     ),
     Section(
         "coarticulation",
         "Coarticulation",
-        "Does the next goal change the movement?",
-        table=coarticulation.list_contexts,
-        caption="Postures at a goal that two tasks share",
-        figure=coarticulation.draw_postures,
-        sentence=coarticulation.next_goal,
-        answer="Coarticulation",
-        note="Postures are compared in length units and rad. Random search is "
-        "the learner without its memory: the best of as many trials is selected. All runs count.",
-    ),
-    Section(
-        "nearest",
-        "Ranking",
-        "Who comes nearest?",
-        table=ranking.list_ranking,
-        caption="Gap of the mean reward, over all tasks and on each",
-        figure=ranking.draw_ranking,
-        sentence=ranking.nearest,
-        answer="Nearest",
-        note="Methods are grouped by their use of the reward: its value after each trial, its "
-        "formula, or nothing. In the sentence the best method of each algorithm counts, with its "
-        "default setting if it ran with it. Intervals describe "
-        "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
-        "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
-        "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
-        "against-learner). Empty: the runs are too few, or too alike, to tell.",
-    ),
-    Section(
-        "scores",
-        "Share of the gain",
-        "How much of the possible gain?",
-        table=scores.list_scores,
-        caption="Share of the possible gain, over all tasks, by arms, and after 1000 trials",
-        note="0 % is the corrective process alone with its best hands (with the task's initial "
-        "hands where there are over 4096 hand sequences), 100 % the best known reward. A task on "
-        "which both are equal has no share and is counted. The gap alone weighs tasks by how bad "
-        "the corrective process is on them. Methods that make no trials have their result after "
-        "any number of trials.",
-        single=False,
-        folded=True,
-    ),
-    Section(
-        "runtimes",
-        "Cost",
-        "What does it cost?",
-        table=costs.list_runtimes,
-        caption="Cost of reaching shares of the targets",
-        figure=costs.draw_runtimes,
-        sentence=costs.what_it_costs,
-        answer="Cost",
-        note="The figure shows methods that learn, random search and the best planner. The number "
-        "of forward-kinematics evaluations is a cost that is the same on every machine. ∞: "
-        "not reached within the budget of trials.",
-    ),
-    Section(
-        "learning",
-        "Learning",
-        "How fast is it learned?",
-        table=learning.list_learning,
-        caption="Best reward so far, mean over runs (ticks)",
-        figure=learning.draw_learning_curves,
-        sentence=learning.how_fast,
-        note="Gain: improvement over the corrective process alone. ∞: never improved.",
-        folded=True,
-    ),
-    Section(
-        "signatures",
-        "Signatures",
-        "Which signatures of coarticulation does each method show?",
-        table=coarticulation.list_signatures,
-        caption="Signatures of coarticulation, means over runs, next to random search",
-        figure=coarticulation.draw_coarticulation,
-        sentence=coarticulation.joints_or_hand,
-        note="Ticks are compared with those of the corrective process with the same hands. A first "
-        "movement that gets slower while the whole task gets faster is sacrificed for it. Idle "
-        "hand nearer: share of the path to its next goal that a hand covers while idle. A row has "
-        "the runs with one hand sequence (of at least a tenth of a method's runs); random search, "
-        "the learner without its memory, has the same hands and as many trials, and all its runs "
+        (coarticulation.list_contexts, coarticulation.list_signatures),
+        (coarticulation.draw_postures, coarticulation.draw_coarticulation),
+        sentence="""\
+{% for row in rows.head(1).to_dict("records") %}
+{{ row.title }}, {{ row.place }}: {{ row.verdict }}. Posture difference \
+{{ row.distance | number(2) }} ({{ row.runs }} runs); \
+random search: {{ row.control | number(2) }}{{ " (%s)" % p_value(row.p_random_search) \
+if row.p_random_search >= 0 }}.
+{% endfor %}
+Methods and shared goals by verdict: {{ rows.verdict | counts }}.""",
+        note="Postures are compared in length units and rad. Ticks are compared with those of the "
+        "corrective process with the same hands. A first movement that gets slower while the whole "
+        "task gets faster is sacrificed for it. Idle hand nearer: share of the path to its next "
+        "goal that a hand covers while idle. Random search is the learner without its memory: the "
+        "best of as many trials is selected. A row has the runs with one hand sequence (of at "
+        "least a tenth of a method's runs); random search has the same hands, and all its runs "
         "count. The choice of hands, in rows without a sequence, is compared with random search "
-        "that tries every sequence. p is one-tailed, uncorrected; a dash: no such random search.",
+        "that tries every sequence. p is one-tailed, and uncorrected unless it says so; a dash: no "
+        "such random search.",
         folded=True,
     ),
     Section(
-        "families",
+        "cost",
+        "Cost",
+        (costs.list_runtimes, learning.list_learning),
+        (costs.draw_runtimes, learning.draw_learning_curves),
+        sentence="""\
+Reward targets reached, and trials to half of them: \
+{% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
+ascending=False)) %}
+{{ row.title }} {{ (100 * row.reached) | number(0) }} % \
+({{ interval(row, "trials_to_half", 0) if row.trials_to_half < infinite else "not half" }})\
+{{ "." if loop.last else "; " }}
+{%- endfor %}""",
+        note="The empirical distribution (ECDF) of the costs of reaching reward targets. The "
+        "figure shows methods that learn, random search and the best planner. The number of "
+        "forward-kinematics evaluations is a cost that is the same on every machine. ∞: not "
+        "reached within the budget of trials. Gain: improvement over the corrective process alone.",
+        folded=True,
+    ),
+    Section(
+        "random-tasks",
         "Random tasks",
-        "What holds on random tasks?",
-        table=random_tasks.list_family_gaps,
-        caption="Gap to the best known reward, in per cent of it: mean over instances",
-        figure=random_tasks.draw_gaps_by_family,
-        sentence=random_tasks.on_random_tasks,
-        answer="Random tasks",
+        (random_tasks.list_family_gaps,),
+        (random_tasks.draw_gaps_by_family,),
+        sentence="""\
+{% for row in leading(rows.dropna(subset="gap")) %}
+{{ "Mean gap over families with two arms: " if loop.first }}\
+{{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
+{%- endfor %}""",
+        note="Intervals describe other tasks of the families.",
         single=False,
     ),
     Section(
         "tasks",
         "Tasks",
-        "What are the tasks?",
-        table=tasks.list_tasks,
-        caption="Tasks with their initial and best possible rewards (ticks)",
-        figure=tasks.draw_tasks,
-        sentence=tasks.how_long,
+        (tasks.list_tasks,),
+        (tasks.draw_tasks,),
         note="Initial, best hands: the corrective process alone, with the task's initial hands and "
         "with the best of all hand sequences. Best known: the optimum where the proven bound "
         "equals it. Proven bound: a reward that no solution can exceed.",
     ),
     Section(
         "methods",
-        "All methods",
-        "What did every method do on every task?",
-        table=methods.list_methods,
-        caption="Reward, gap to the optimum, hands with their runs, and costs of a run (medians)",
+        "All methods and runs",
+        (methods.list_methods,),
         note="Every method works on the same robot. Its movements are scored by one function, "
         "which no method can reach. Times are seconds of solving.",
         folded=True,
     ),
+    Section(
+        "failed",
+        "Failed runs",
+        (methods.list_failed,),
+        note="A failed run bars its method from means over tasks.",
+        single=False,
+        folded=True,
+    ),
 )
-TABLES = {each.table.id: each.table for each in SECTIONS}
+TABLES = {table.id: table for section in SECTIONS for table in section.tables}
 TABLES["against-learner"] = ranking.list_against_learner
 """Tables by id; the last is a CSV file without a section."""
-FIGURES = {id_of(each.figure): each.figure for each in SECTIONS if each.figure}
+FIGURES = {id_of(draw): draw for section in SECTIONS for draw in section.figures}
 """Figures by id."""

@@ -18,20 +18,18 @@ from coartic.analysis.control import contexts_of_control, selects, with_control
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import headline_methods
-from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH
+from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.standings import common_tasks, failed_runs, is_learner
+from coartic.analysis.standings import common_tasks
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
-from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.table import Row, Rows, row_of_cell, runs_of, table
-from coartic.analysis.words import number, p_value
+from coartic.analysis.study import Study, cached, one_by_one, solved
+from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
+from coartic.analysis.words import number
 from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL, difference_of_means, mean
-from coartic.internal.text import counted
 from coartic.robot import HANDS
-from coartic.runs.plan import label_of
 
 SAME = 1e-9
 """Largest posture difference that is rounding, length unit and rad mixed."""
@@ -58,7 +56,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
     None if no method has solved runs on two such tasks.
     """
     rows = study.methods
-    subjects = rows.index[is_subject(rows) & rows.built_in], rows.index[~rows.built_in]
+    subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]
     single = rows[rows.parts.map(len) == 1]
     order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(single), *rows.index]
     every = (shared_goals(study, label) for label in dict.fromkeys(order))
@@ -66,12 +64,13 @@ def shared_goal(study: Study) -> TwoContexts | None:
 
 
 @table(
-    "method; place: shared goal; runs; distance: posture difference .2; "
+    "Postures at a goal that two tasks share",
+    "method; place: shared goal; verdict; runs; distance: posture difference .2; "
     "standardised_difference: standardised posture difference (SD of the runs) .1; "
     "p_holm: p (corrected) .p; control: random search .2; control_runs: its runs; "
     "p_random_search: p beyond random search .p; "
     "equivalent: difference that keeps the hand in place (null space, per dimension) .3; "
-    "other: difference that moves the hand (per dimension) .3"
+    "other: difference that moves the hand (per dimension) .3",
 )
 def list_contexts(study: Study) -> Rows:
     """List posture differences at shared goals; p is corrected over a method's goals (Holm)."""
@@ -90,14 +89,16 @@ def list_contexts(study: Study) -> Rows:
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
                 **beside_control(study, shared),
+                "verdict": verdict_of(study, shared),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
-                **runs_of(*(study.cells[task.name, label] for task in shared.tasks)),
+                **run_ids(*(study.cells[task.name, label] for task in shared.tasks)),
             }
             yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
 
 
 @table(
+    "Signatures of coarticulation, means over runs, next to random search",
     "task; method; hands; runs; gain[]: gain (ticks) .1; "
     "share[]: share of the possible gain (%) .0; control_runs: runs of random search; "
     + "; ".join(
@@ -110,7 +111,7 @@ def list_contexts(study: Study) -> Rows:
             ("other_arm", "idle hand nearer to its next goal (share)", 2),
             ("hand", "goals with the slower hand for them alone (share)", 2),
         )
-    )
+    ),
 )
 def list_signatures(study: Study) -> Rows:
     """List the signatures of every method on every task, next to those of random search.
@@ -119,10 +120,10 @@ def list_signatures(study: Study) -> Rows:
     the choice of hands (``hands`` empty). Means over runs; p is one-tailed and uncorrected.
     ``gain``: ticks by which a run is faster than the corrective process alone with its best hands.
     """
-    labels = study.methods.index[study.methods.kind != "optimum search"]
+    labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
-        cell = study.cells.get((name, label))
-        if cell is None or not len(cell.good):
+        good = solved(study.cells.get((name, label), study.runs[:0]))
+        if not len(good):
             continue
         rows: dict[str, Row] = {}
         best = study.optima.get(name)
@@ -138,13 +139,13 @@ def list_signatures(study: Study) -> Rows:
                         **difference_of_means(values, control).columns(f"{column}_difference"),
                         f"{column}_p": bootstrap_test(values, control).p,
                     }
-        gains = cell.good.reward.to_numpy(float) - study.corrective_best[name]
+        gains = good.reward.to_numpy(float) - study.corrective_best[name]
         for hands, row in rows.items():
-            gained = gains[cell.good.hands == hands] if hands else gains
+            gained = gains[good.hands == hands] if hands else gains
             row |= mean(gained).columns("gain") | {"hands": hands}
             row |= mean(100 * gained / possible).columns("share") if possible > 0 else {}
             key = " ".join(filter(None, (name, label, hands)))
-            yield key, row_of_cell(study, cell) | row
+            yield key, row_of_cell(study, study.cells[name, label]) | row
 
 
 AGAINST_GAIN = {
@@ -163,15 +164,12 @@ def against_gain(study: Study) -> pd.DataFrame:
     ``trials``, ``tasks``, ``gain`` (ticks) and a column for each signature of
     :data:`AGAINST_GAIN`.
     """
-    runs = study.runs[study.runs.status == "ok"]
-    runs = runs.assign(
-        gain=runs.reward.astype(float) - runs.task.map(study.corrective_best),
-        **{name: study.signature(name) for name in AGAINST_GAIN},
-    )
-    labels = pd.Series([*map(label_of, runs.method, runs.setting)], runs.index)
+    gain = study.runs.reward.astype(float) - study.runs.task.map(study.corrective_best)
+    signatures = {name: study.signature(name) for name in AGAINST_GAIN}
+    runs = solved(study.runs.assign(gain=gain, **signatures))
     columns, tasks, rows = ["gain", *AGAINST_GAIN], common_tasks(study), []
-    for method, parts in study.methods.parts[study.methods.kind != "optimum search"].items():
-        of_method = runs[labels.isin(parts)]
+    for method, parts in study.methods.parts[~study.methods.is_search].items():
+        of_method = runs[runs.label.isin(parts)]
         of_tasks = of_method.groupby("task")[columns].mean().reindex([*tasks])
         if of_tasks.gain.notna().all():
             row: Row = {"method": method, "base": re.sub(r"(, )?trials=\w+", "", str(method))}
@@ -211,6 +209,27 @@ def draw_coarticulation(study: Study) -> Parts | None:
     style.legend(drawing, handles, 3)
     words = spoken(lasts.join(study.methods.title, on="method"), "{title}: gain {gain:.0f}")
     return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
+
+
+def verdict_of(study: Study, shared: TwoContexts) -> str:
+    """Return in words whether the posture at a shared goal depends on the next goal.
+
+    Stochastic methods need a test; methods that select from trials need random search, too.
+    """
+    method: Any = study.methods.loc[shared.method]
+    can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
+    if method.stochastic and not can_tell:
+        return "too few runs"
+    if not method.stochastic and shared.posture_difference <= SAME:
+        return "the same posture"
+    if method.stochastic and not shared.p < LEVEL:
+        return "no significant difference"
+    if not selects(study, shared.method):
+        return "different postures"
+    beyond = beside_control(study, shared).get("p_random_search", math.nan)
+    if math.isnan(beyond):
+        return "undecided: too few runs of random search"
+    return "different postures" if beyond < LEVEL else "no more than random search"
 
 
 def beside_control(study: Study, shared: TwoContexts) -> Row:
@@ -306,77 +325,3 @@ def draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     here = f"goal {shared.goal},\nthe same"
     axes.annotate(here, at, (7, 0), va="center", weight="bold", **words)
     return parts
-
-
-def next_goal(study: Study) -> str:
-    """Say whether the posture at the goal that two tasks share depends on the next goal.
-
-    About the learner, or else a method from a file: many other methods coarticulate, or do not,
-    by construction.
-    """
-    shared = shared_goal(study)
-    if shared is None or not is_subject(study.methods.loc[shared.method]):
-        return ""
-    method: Any = study.methods.loc[shared.method]
-    # Stochastic methods need a test; methods that select from trials need random search.
-    cells = [study.cells[task.name, shared.method] for task in shared.tasks]
-    needed, control = selects(study, shared.method), contexts_of_control(study, shared)
-    beyond = beside_control(study, shared).get("p_random_search", math.nan)
-    drawn, who = method.stochastic, "The learner" if is_learner(method) else method.title
-    runs, p = counted(shared.n, "run"), p_value(shared.p)
-    difference = number(shared.posture_difference, 2)
-    chance = f"random search: {number(control.posture_difference, 2)}" if control else ""
-    both = f"{difference} ({chance})" if chance else difference
-    if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):
-        text = "Too few runs to tell whether the next goal changes the posture."
-    elif not drawn and shared.posture_difference <= SAME:
-        text = f"No. {who} hits the same goal in the same posture."
-    elif drawn and not shared.p < LEVEL:
-        text = f"No significant difference: the posture difference is {both}."
-    elif not needed or beyond < LEVEL:
-        different = "clearly different" if drawn else "different"
-        shown = "; ".join(filter(None, (difference, chance)))
-        text = f"Yes. {who} hits the same goal in {different} postures (difference {shown})."
-    elif control is None:
-        text = (
-            f"Undecided: the posture difference is {difference}, and no random search with as many "
-            "trials ran."
-        )
-    elif math.isnan(beyond):
-        text = (
-            f"Undecided: the posture difference is {difference}, and too few runs of random search "
-            "to compare."
-        )
-    else:
-        text = f"Not shown: the posture difference is {both}, which is not significantly more."
-    text += (
-        f"\nBetween next goals, the posture difference of {method.title} at goal "
-        f"{shared.goal} is {difference} (length units and rad; "
-        f"{', '.join(filter(None, (runs, p)))})"
-    )
-    if control is not None:
-        text += f", that of random search {number(control.posture_difference, 2)}"
-        text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
-    elif needed:
-        text += f". To compare, run {RANDOM_SEARCH} on both tasks with as many trials"
-    return f"{text}.{failed_runs(study, cells, ' and are not counted')}"
-
-
-def is_subject(rows: Any) -> Any:
-    """Return whether rows of :attr:`.Study.methods`, or a row, are the learner or from files."""
-    return (rows.kind == "learner") | ~rows.built_in
-
-
-def joints_or_hand(study: Study) -> str:
-    """Say in how many methods the next goal moves the joints more than the hand."""
-    rows = list_contexts(study)
-    is_main = rows.method.map(study.methods.under) == ""
-    rows = rows[is_main & (rows.distance > 0.01)]
-    if not len(rows):
-        return ""
-    larger = int((rows.equivalent > rows.other).sum())
-    which = f"all {len(rows)}" if larger == len(rows) else f"{larger} of {len(rows)}"
-    return (
-        f"In {which} methods in which the next goal changes the posture, it moves the joints more "
-        "than the hand."
-    )

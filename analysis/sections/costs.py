@@ -14,10 +14,10 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import BY_TRIAL, headline_methods
 from coartic.analysis.statistics import running_times
-from coartic.analysis.study import CellRuns, Study, cached, load
-from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import capital, interval, number
+from coartic.analysis.study import Study, cached, load, solved
+from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.errors import CoarticError
+from coartic.estimates import Estimate
 from coartic.internal.limits import brief_value
 from coartic.robot import Array
 
@@ -64,9 +64,10 @@ def spans(study: Study) -> dict[str, tuple[float, int]]:
 
 @cached
 def times_of(
-    study: Study, cell: CellRuns, spend: str, shares: tuple[float, ...] = TARGETS
+    study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
-    """Return the cost at which each run of a cell reached each target, shape ``(runs, targets)``.
+    """Return the cost at which each run of a method on a task reached each target, shape ``(runs,
+    targets)``.
 
     Infinite for a target that the run did not reach. A planner reaches its targets at its end.
     Forward-kinematics evaluations and time are totals of a run, spread evenly over its trials, an
@@ -74,12 +75,12 @@ def times_of(
     their even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. Times are of
     :func:`solve_times`; a run without a known cost has no row.
     """
-    initial, optimum = spans(study)[cell.task]
+    initial, optimum = spans(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
-    runs, learned, rows = cell.runs, improvements(study), []
+    runs, learned, rows = study.cells[task, label], improvements(study), []
     totals = runs[spend]
     if spend == "solve_s":
-        totals = solve_times(cell.good).reindex(runs.index)
+        totals = solve_times(solved(runs)).reindex(runs.index)
     for run_id, status, made, total, reward in zip(
         runs.run_id, runs.status, runs.trials, totals, runs.reward, strict=True
     ):
@@ -105,21 +106,37 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     return times[warm] if warm.any() else times
 
 
-def cells_with_targets(study: Study) -> dict[str, list[CellRuns]]:
-    """Return the cells of each method on the tasks of :func:`.common_tasks` that have targets.
+@cached
+def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
+    """Return the runs of each method on the tasks of :func:`.common_tasks` that have targets.
 
     Methods that did not run on all these tasks are left out, or, if they are from files, have their
-    cells on all tasks with targets.
+    runs on all tasks with targets.
     """
     common = [task for task in standings.common_tasks(study) if task in spans(study)]
     of_methods = {}
-    for method, of_method in standings.compared(study).items():
-        cells = standings.cells_on(study, method, common)
-        if not (cells or study.methods.built_in[method]):
-            cells = [cell for task, cell in of_method.items() if task in spans(study)]
-        if cells:
-            of_methods[method] = cells
+    for method, every in standings.compared(study).items():
+        runs = standings.runs_on(study, method, common) if common else every[:0]
+        if not (len(runs) or study.methods.built_in[method]):
+            runs = every[every.task.isin(spans(study).keys())]
+        if len(runs):
+            of_methods[method] = runs
     return of_methods
+
+
+def times_on_tasks(
+    study: Study, runs: pd.DataFrame, spend: str, shares: tuple[float, ...] = TARGETS
+) -> list[Array]:
+    """Return :func:`times_of` of some runs of a method, for each of their tasks."""
+    pairs = runs[["task", "label"]].drop_duplicates().to_numpy()
+    return [times_of(study, task, label, spend, shares) for task, label in pairs]
+
+
+def half_of_targets(study: Study, runs: pd.DataFrame) -> Estimate:
+    """Return the trials within which some runs of a method reach half of the targets of their
+    tasks; NaN without targets."""
+    times = times_on_tasks(study, runs[runs.task.isin(spans(study).keys())], "trials")
+    return running_times.budget_for(times, 0.5) if times else Estimate(math.nan)
 
 
 def runtimes(
@@ -164,9 +181,9 @@ def runtimes(
     if not spans(study):
         raise CoarticError("no task has a best known reward above the corrective process alone")
     rows = []
-    for name, cells in cells_with_targets(study).items():
+    for name, runs in runs_with_targets(study).items():
         for spend in SPENDS:
-            times = [times_of(study, cell, spend, tuple(shares.tolist())) for cell in cells]
+            times = times_on_tasks(study, runs, spend, tuple(shares.tolist()))
             if all(map(len, times)):
                 steps = zip(*running_times.share_by_budget(times), strict=True)
                 rows += [(name, spend, *step) for step in steps]
@@ -174,11 +191,12 @@ def runtimes(
 
 
 @table(
+    "Cost of reaching shares of the targets",
     "method; reached: targets reached (%) .0; tasks: number of tasks; "
     "trials_to_quarter[]: trials to a quarter of the targets; "
     "trials_to_half[]: trials to half of the targets; "
     "forward_kinematics_to_half[]: forward-kinematics evaluations to half of the targets; "
-    "seconds_to_half[]: seconds to half of the targets; half on *: -"
+    "seconds_to_half[]: seconds to half of the targets; half on *: -",
 )
 def list_runtimes(study: Study) -> Rows:
     """List the costs of reaching a quarter and half of the targets.
@@ -186,21 +204,21 @@ def list_runtimes(study: Study) -> Rows:
     ``half on``: median trials to the target halfway, by task, infinite if most runs do not reach
     this target.
     """
-    for method, cells in cells_with_targets(study).items():
-        times = {spend: [times_of(study, cell, spend) for cell in cells] for spend in SPENDS}
+    for method, runs in runs_with_targets(study).items():
+        times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
         if not all(map(len, times["trials"])):
             continue
         reached = running_times.share_reached(times["trials"])
-        row: Row = {"method": method, "reached": reached, "tasks": len(cells)}
+        row: Row = {"method": method, "reached": reached, "tasks": runs.task.nunique()}
         for name, spend, share in COSTS:
             if all(map(len, times[spend])):
                 row |= running_times.budget_for(times[spend], share).columns(name)
         if study.methods.information[method] == BY_TRIAL:
-            of_method = standings.compared(study)[method]
-            for task in (task for task in spans(study) if task in of_method):
-                half = times_of(study, of_method[task], "trials", (0.5,))
+            pairs = standings.compared(study)[method][["task", "label"]].drop_duplicates()
+            for task, label in pairs[pairs.task.isin(spans(study).keys())].to_numpy():
+                half = times_of(study, task, label, "trials", (0.5,))
                 row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
-        yield method, row | runs_of(*cells)
+        yield method, row | run_ids(runs)
 
 
 @figure(
@@ -231,11 +249,10 @@ def draw_runtimes(study: Study) -> Parts | None:
     for (label, spend), curve in data.groupby(["method", "spend"], sort=False):
         # No more than are seen.
         curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 150).round()).astype(int)]
-        cells = cells_with_targets(study)[str(label)]
-        times = [times_of(study, cell, str(spend)) for cell in cells]
+        runs = runs_with_targets(study)[str(label)]
+        times = times_on_tasks(study, runs, str(spend))
         low, high = running_times.interval_by_budget(times, curve.budget.to_numpy())
-        runs = sum(len(cell.runs) for cell in cells)
-        steps.append(curve.assign(share_low=low, share_high=high, runs=runs))
+        steps.append(curve.assign(share_low=low, share_high=high, runs=len(runs)))
     data = pd.concat(steps, ignore_index=True)
     looks = looks_in(study, data.method.unique())
     spends = [spend for spend in PANELS if (data.spend == spend).any()]
@@ -280,36 +297,3 @@ def draw_runtimes(study: Study) -> Parts | None:
     shares = spoken(ends.join(study.methods.title, on="method"), "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()
-
-
-def what_it_costs(study: Study) -> str:
-    """Say how many trials the learner and the best other learning method need for half of the
-    targets."""
-    table = list_runtimes(study)
-    methods = study.methods.loc[[*table.index]]
-    main = methods.loc[headline_methods(methods)]
-    learners = main.index[standings.is_learner(main)]
-    if not len(learners):
-        return ""
-    learns = (methods.information == BY_TRIAL) & (methods.kind == "") & (methods.under == "")
-    # The other method that learns from the reward of trials and reaches most targets.
-    rival = [str(table.reached[learns].idxmax())] if learns.any() else []
-    rows = table.loc[[learners[0], *rival]].to_dict("records")
-    names = ["the learner", *methods.title[rival]]
-    named = list(zip(names, rows, strict=True))
-    ends = "; ".join(f"{name} reaches {number(100 * row['reached'], 0)} %" for name, row in named)
-    text = f"{capital(ends)} of the reward targets.\n"
-    if len(rows) == 2 and all(math.isfinite(row["trials_to_half"]) for row in rows):
-        ours, theirs = (number(row["trials_to_half"], 0) for row in rows)
-        needs = "; ".join(f"{name} {interval(row, 'trials_to_half', 0)}" for name, row in named)
-        text = (
-            f"For half of the reward targets the learner needs {ours} trials; {names[1]} needs "
-            f"{theirs}.\nWith intervals: {needs} trials. {text}"
-        )
-    cells = (
-        cell
-        for method, by_task in standings.compared(study).items()
-        if study.methods.information[method] == BY_TRIAL
-        for cell in by_task.values()
-    )
-    return text + standings.failed_runs(study, cells, " and count as reaching nothing")

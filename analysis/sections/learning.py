@@ -11,11 +11,11 @@ import pandas as pd
 from coartic.analysis import standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.methods import EC1, LEARNERS, most_exploring
+from coartic.analysis.methods import EC1, LEARNERS
 from coartic.analysis.sections.costs import improvements
-from coartic.analysis.study import Study, one_by_one
+from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Rows, row_of_cell, table
-from coartic.analysis.words import marked, number
+from coartic.analysis.words import marked
 
 BUDGETS = (100, 1_000, 10_000)
 """Numbers of trials after which the table has rewards."""
@@ -24,27 +24,27 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 
 
 @table(
+    "Best reward so far, mean over runs (ticks)",
     "task; method; runs; corrective_best: corrective process, best hands .1; "
     "after_100: after 100 trials .1; "
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1; "
-    "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]"
+    "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]",
 )
 def list_learning(study: Study) -> Rows:
     """List the best reward after some numbers of trials (mean over runs), and the trial at which a
     run has half of its gain over the corrective process with its best hands (median and quartiles;
     ∞ without gain)."""
-    for (task, label), cell in study.cells.items():
-        learned = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
-        runs = [run for run in learned if run is not None]
-        if task not in one_by_one(study) or study.methods.kind[label] == "optimum search":
+    for (task, label), every in study.cells.items():
+        runs = [improvements(study)[run] for run in every.run_id if run in improvements(study)]
+        if task not in one_by_one(study) or study.methods.is_search[label]:
             continue
-        if not len(learned) == len(runs) == len(cell.good) > 0:
+        if not len(every) == len(runs) == len(solved(every)):
             continue
-        if cell.runs.trials.min() < BUDGETS[0]:  # a try or two, no learning
+        if every.trials.min() < BUDGETS[0]:  # a try or two, no learning
             continue
         zero = study.corrective_best[task]
-        row = row_of_cell(study, cell) | {"corrective_best": zero}
-        for budget in (each for each in BUDGETS if each <= cell.runs.trials.min()):
+        row = row_of_cell(study, every) | {"corrective_best": zero}
+        for budget in (each for each in BUDGETS if each <= every.trials.min()):
             best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
             row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan
         gained = [
@@ -124,15 +124,15 @@ def learning_curves(study: Study) -> pd.DataFrame:
     drawn = methods.index[methods.headline & (methods.base.isin(CURVES) | ~methods.built_in)]
     for task in one_by_one(study):
         keys = [(task, label) for label in drawn if (task, label) in study.cells]
-        labels = [label for _, label in keys if len(study.cells[task, label].good)]
+        labels = [label for _, label in keys if len(solved(study.cells[task, label]))]
         two_armed = {*LEARNERS} & {*labels} - {EC1}
         shown += [(task, label) for label in labels if not (two_armed and label == EC1)]
-    wanted = {run for key in shown for run in study.cells[key].good.run_id}
+    wanted = {run for key in shown for run in solved(study.cells[key]).run_id}
     trials_of = {run: rewards for run, rewards in study.rewards() if run in wanted}
     curves = [pd.DataFrame()]
     for task, label in shown:
-        good = study.cells[task, label].good
-        runs = [trials_of[run_id] for run_id in map(str, good.run_id) if run_id in trials_of]
+        good = solved(study.cells[task, label]).run_id
+        runs = [trials_of[run_id] for run_id in good if run_id in trials_of]
         if not runs:
             continue
         length = min(map(len, runs))
@@ -145,16 +145,3 @@ def learning_curves(study: Study) -> pd.DataFrame:
         named = {"task": task, "method": label, "runs": len(runs)}
         curves.append(pd.DataFrame(named | curve))
     return pd.concat(curves[1:] or curves, ignore_index=True)
-
-
-def how_fast(study: Study) -> str:
-    """Say after how many trials the learner that explores most has half of its gain, by task."""
-    half = list_learning(study).trials_to_half_gain
-    after = [
-        f"{number(float(f'{half[row]:.2g}'))} trials on {marked(task)}"
-        for name, task in study.tasks.items()
-        if half.get(row := f"{name} {most_exploring(task)}", math.inf) < math.inf
-    ]
-    if not after:
-        return ""
-    return f"The learner makes half of its gain in about {', '.join(after)} (median run)."

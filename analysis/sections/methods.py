@@ -1,4 +1,4 @@
-"""Section on every method on every task: rewards, hands and costs."""
+"""Section on every method on every task: rewards, hands, costs and failed runs."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import math
 from collections import Counter
 
 from coartic.analysis.sections.costs import solve_times
-from coartic.analysis.study import CellRuns, Study, one_by_one, typical_run
-from coartic.analysis.table import SHORT_ID, Rows, row_of_cell, table
-from coartic.analysis.words import tally
+from coartic.analysis.study import Study, one_by_one, solved, typical_run
+from coartic.analysis.table import SHORT_ID, Row, Rows, row_of_cell, run_ids, table
+from coartic.analysis.words import marked, tally
 
 
 @table(
+    "Reward, gap to the optimum, hands with their runs, and costs of a run (medians)",
     "task; method; runs; solved: -; reward± .1; reward_median: -; gap: gap (%) .1; hands; trials; "
-    "forward_kinematics: forward-kinematics evaluations; solve_s: solving time (s); median_run"
+    "forward_kinematics: forward-kinematics evaluations; solve_s: solving time (s); median_run",
 )
 def list_methods(study: Study) -> Rows:
     """List every method on every task: mean reward, gap, hands and costs (medians).
@@ -21,23 +22,35 @@ def list_methods(study: Study) -> Rows:
     Within a task, searches for the optimum come first, then methods by mean reward. ``median_run``
     is the beginning of the id of the run with the reward nearest to the median.
     """
-    places = {task: place for place, task in enumerate(one_by_one(study))}
-    cells = [cell for cell in study.cells.values() if cell.task in places]
-    is_search = study.methods.kind == "optimum search"
-
-    def place(cell: CellRuns) -> tuple[int, bool, float]:
-        mean = cell.rewards.mean() if len(cell.good) else -math.inf
-        return places[cell.task], not is_search[cell.label], -mean
-
-    for cell in sorted(cells, key=place):
-        good, runs = cell.good, cell.runs
-        row = row_of_cell(study, cell) | {
+    places, rows = {task: place for place, task in enumerate(one_by_one(study))}, []
+    for (task, label), runs in study.cells.items():
+        if task not in places:
+            continue
+        good = solved(runs)
+        row = row_of_cell(study, runs) | {
             "hands": tally(Counter(good.hands)) if len(good) > 1 else "".join(good.hands),
             "trials": runs.trials.astype(float).median(),
             "forward_kinematics": runs.forward_kinematics.astype(float).median(),
             "solve_s": solve_times(good).astype(float).median(),
+            "median_run": typical_run(good)[:SHORT_ID] if len(good) else None,
         }
-        if len(good):
-            row["median_run"] = typical_run(good)[:SHORT_ID]
-            row["reward_median"] = good.reward.astype(float).median()
-        yield f"{cell.task} {cell.label}", row
+        below = -row["reward"] if len(good) else math.inf
+        rows.append(((places[task], not study.methods.is_search[label], below), label, row))
+    for (place, *_), label, row in sorted(rows, key=lambda each: each[0]):
+        yield f"{[*places][place]} {label}", row
+
+
+@table(
+    "Runs without a solution",
+    "task; method; failed: failed runs; runs; reasons",
+)
+def list_failed(study: Study) -> Rows:
+    """List the numbers of failed runs of each method on each task, with their reasons."""
+    for (task, label), runs in study.cells.items():
+        failed = runs[runs.status != "ok"]
+        if len(failed):
+            reasons = Counter(map(str, failed.reason.fillna(""))).most_common(3)
+            row: Row = {"task": marked(study.tasks[task]), "method": label}
+            row |= {"failed": len(failed), "runs": len(runs), **run_ids(failed)}
+            row["reasons"] = "; ".join(f"{count} × {reason}" for reason, count in reasons)
+            yield f"{task} {label}", row

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import Any
 
@@ -11,60 +10,55 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.method_frame import headline_methods
-from coartic.analysis.optima import gap_share
-from coartic.analysis.standings import best_of_instances, called, compared, is_learner, reference
+from coartic.analysis.standings import best_of_instances, compared
 from coartic.analysis.statistics.instances import Scores, other_tasks
-from coartic.analysis.study import Study, cached
-from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import listed, number, percent
+from coartic.analysis.study import Study, cached, solved
+from coartic.analysis.table import Row, Rows, run_ids, table
 
 
 @cached
-def solved(study: Study) -> pd.DataFrame:
-    """Return a row for each compared method on each instance with a solved run, by family.
-
-    Columns ``method``, ``family``, ``task``, ``cell``, and ``gap``: the gaps of the solved runs to
-    the best known reward, as shares of it, shape ``(n,)``.
-    """
-    instances = best_of_instances(study)
-    families = dict.fromkeys(str(study.tasks[name].family) for name in instances)
-    rows = []
-    for family, (method, cells) in itertools.product(families, compared(study).items()):
-        for name in instances:
-            cell = cells.get(name)
-            if study.tasks[name].family == family and cell is not None and len(cell.good):
-                rows.append((method, family, name, cell, cell.gaps))
-    return pd.DataFrame(rows, columns=["method", "family", "task", "cell", "gap"])
+def on_instances(study: Study) -> pd.DataFrame:
+    """Return the solved runs of compared methods on instances of families, with the label of the
+    row of the method in column ``method``."""
+    names = [*best_of_instances(study)]
+    parts = [solved(runs).assign(method=method) for method, runs in compared(study).items()]
+    every = pd.concat([*parts, study.runs[:0]], ignore_index=True)
+    place = every.task.map({name: number for number, name in enumerate(names)})
+    return every[place.notna()].assign(place=place).sort_values("place", kind="stable")
 
 
-def by_family(rows: pd.DataFrame) -> Scores:
-    """Return the gaps of instances by family."""
+def by_family(runs: pd.DataFrame) -> Scores:
+    """Return the gaps of the runs on each instance, by family."""
     return {
-        str(family): [*of_family.gap] for family, of_family in rows.groupby("family", sort=False)
+        str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
+        for family, of_family in runs.groupby("family", sort=False)
     }
 
 
-@table("method; instances; gap[]: gap (%) .1; in *: {} (%) .1")
+@table(
+    "Gap to the best known reward, in per cent of it: mean over instances",
+    "method; instances; gap[]: gap (%) .1; in *: {} (%) .1",
+)
 def list_family_gaps(study: Study) -> Rows:
     """List gaps to the best known reward over families with two arms, and in each family, with
     intervals about other tasks."""
-    every, rows = solved(study), list[tuple[str, Row]]()
+    every, rows = on_instances(study), list[tuple[str, Row]]()
     families = every.family.unique()
-    hands = every.task.map({name: len(task.hands) for name, task in study.tasks.items()})
-    two_armed = {*every.family[hands > 1]}
-    for method, of_method in every.groupby("method", sort=False):
-        row: Row = {"method": method, "instances": len(of_method), "gap": math.nan}
-        if (of_two_arms := of_method.family.isin(two_armed)).any():
-            row["instances"] = int(of_two_arms.sum())  # the gap is a mean over these
-        scores = by_family(of_method)
+    two_armed = {*every.family[every.arms > 1]}
+    for method in compared(study):
+        runs = every[every.method == method]
+        if not len(runs):
+            continue
+        of_two_arms = runs[runs.family.isin(two_armed)]
+        counted = of_two_arms if len(of_two_arms) else runs  # the gap is a mean over these
+        row: Row = {"method": method, "instances": counted.task.nunique(), "gap": math.nan}
+        scores = by_family(runs)
         if two_armed and two_armed <= scores.keys():
-            both = {family: part for family, part in scores.items() if family in two_armed}
-            row |= other_tasks(both).columns("gap")
+            row |= other_tasks(by_family(of_two_arms)).columns("gap")
         row |= {f"in {family}": math.nan for family in families}
         for family, part in scores.items():
             row |= other_tasks({family: part}).columns(f"in {family}")
-        rows.append((str(method), row | runs_of(*of_method.cell)))
+        rows.append((method, row | run_ids(runs)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
 
@@ -78,16 +72,17 @@ def list_family_gaps(study: Study) -> Rows:
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Draw gaps to the best known rewards of instances, by method and family."""
     methods = study.methods[(study.methods.under == "") & (study.methods.parts.map(len) == 1)]
-    rows = solved(study)
-    rows = rows[rows.method.isin(methods.index)]
-    if not len(rows):
+    runs = on_instances(study)
+    runs = runs[runs.method.isin(methods.index)]
+    if not len(runs):
         return None
-    columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
     parts = []
-    for _, part in rows.groupby(["method", "family"], sort=False):
+    for (method, family), part in runs.groupby(["method", "family"], sort=False):
         mean = other_tasks(by_family(part)).columns("mean")
-        parts.append(part.assign(gap=part.gap.map(np.mean), **mean, instances=len(part))[columns])
-    data = pd.concat(parts, ignore_index=True)
+        dots = part.groupby("task", sort=False).gap.mean().reset_index()
+        dots = dots.assign(method=str(method), family=str(family), **mean, instances=len(dots))
+        parts.append(dots)
+    data = pd.concat(parts, ignore_index=True).astype({"gap": float})
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
     looks = looks_in(study, order)
     families = list(dict.fromkeys(data.family))
@@ -116,41 +111,3 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     first = data.drop_duplicates(["method", "family"]).join(methods.title, on="method")
     means = spoken(first, "{title}, {family}: {mean:.1%}")
     return drawing, data, f"Gaps of instances by method and family. {means}.", ()
-
-
-def on_random_tasks(study: Study) -> str:
-    """Say the gaps of the nearest methods to the best known reward, over families with two arms."""
-    best = best_of_instances(study)
-    gaps = list_family_gaps(study).dropna(subset="gap")
-    gaps = gaps[gaps.index.isin(headline_methods(study.methods.loc[gaps.index]))].head(4)
-    if not len(gaps):
-        return ""
-    rows = study.methods.loc[gaps.index].to_dict("records")
-    families = gaps.filter(regex="^in .*/v[0-9]+$")
-    ranges = [
-        f" ({number(100 * least, 1)} to {percent(most)} by family)" if least < most else ""
-        for least, most in zip(families.min(axis=1), families.max(axis=1), strict=True)
-    ]
-    ends = [
-        f"{called(row)} {percent(gap)}{by}"
-        for row, gap, by in zip(rows, gaps.gap, ranges, strict=True)
-    ]
-    first, *others = ends
-    learner = [end for row, end in zip(rows[1:], others, strict=True) if is_learner(row)]
-    second = learner or others[:1]
-    unproven = [
-        (str(study.tasks[name].family).partition("/")[0], 100 * gap_share(each.reward, each.bound))
-        for name, each in best.items()
-        if each.bound is not None and not each.proven
-    ]
-    loose = pd.DataFrame(unproven, columns=["family", "gap"]).groupby("family", sort=False).median()
-    medians = [f"{family} {number(gap, 0)} %" for family, gap in loose.gap.items()]
-    elsewhere = "; elsewhere its median distance to the proven bound is "
-    proven = sum(each.proven for each in best.values())
-    to = reference(study, best)
-    return (
-        f"Nearest to the {to}: {'; '.join([first, *second])}.\n"
-        f"Gaps to the {to} on {len(best)} random tasks (means over families with two "
-        f"arms): {', '.join(ends)}. On {proven or 'none'} of them this reward is the proven "
-        f"optimum{elsewhere + listed(medians) if medians else ''}."
-    )

@@ -16,13 +16,14 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, table
-from coartic.analysis.words import marked, number, titled_apart
+from coartic.analysis.words import marked, titled_apart
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
 @table(
+    "Tasks with their initial and best possible rewards (ticks)",
     "task; arms; base; initial .1; best_hands .1; optimum: best known; "
-    "source: best known from; bound: proven bound"
+    "source: best known from; bound: proven bound",
 )
 def list_tasks(study: Study) -> Rows:
     """List the tasks with their best known rewards, and the rewards of the corrective process alone
@@ -42,22 +43,6 @@ def list_tasks(study: Study) -> Rows:
             "run_ids": best.run_id if best else "",
         }
         yield name, row
-
-
-def how_long(study: Study) -> str:
-    """Say the ticks of the corrective process alone and of the best known solutions."""
-    rows = list_tasks(study).dropna(subset=["best_hands", "initial", "optimum"])
-    if not len(rows):
-        return ""
-    alone, initial, best = (
-        " to ".join(dict.fromkeys(number(end, 0) for end in (-values.max(), -values.min())))
-        for values in (rows[name].astype(float) for name in ("best_hands", "initial", "optimum"))
-    )
-    proven = f"proven optimal on {number((rows.optimum == rows.bound).sum())} of {len(rows)}"
-    return (
-        f"The corrective process alone takes {alone} ticks with its best hands, {initial} with the "
-        f"initial ones, the best known {best} ({proven})."
-    )
 
 
 @figure(

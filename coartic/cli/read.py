@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.terminal import complain, say, say_pairs
+from coartic.cli.terminal import complain, say, say_pairs, say_table
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
 from coartic.internal.limits import MOST_RUNS
@@ -37,7 +37,7 @@ def report(
     started = time.monotonic()
     study = load(folder)
     with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
-        files = write_report(study, out, for_paper=for_paper)
+        files, failures = write_report(study, out, for_paper=for_paper)
     tables = sum(name.endswith(".csv") for name in files)
     figures = sum(name.endswith(".svg") for name in files)
     what = f"CSV and LaTeX) and {counted(figures, 'figure')} (SVG and PDF" if for_paper else "CSV"
@@ -45,36 +45,40 @@ def report(
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
         f"{counted(tables, 'table')} ({what})."
     )
-    say_answers(study)
     if not for_paper:
         say_pairs(
             [("More", "coartic report --for-paper adds figures as SVG and PDF and tables as LaTeX")]
         )
-    exit_if_parts_failed(study)
+    for part, reason in failures.items():
+        complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
+    if failures:
+        sys.exit(1)
 
 
-def say_answers(study: Study, *more: tuple[str, str]) -> None:
-    """Print the answers of a study, the reasons of failed runs, and further pairs of word and
-    text."""
-    from coartic.analysis.report.about import answers, limits
+def say_ranking(study: Study, *more: tuple[str, str]) -> None:
+    """Print the first ten rows of the ranking, coarticulation and cost in a line each, the failed
+    runs, and further pairs of word and text."""
+    from coartic.analysis.report.about import finding, limits
+    from coartic.analysis.sections import SECTIONS, TABLES
+    from coartic.analysis.words import interval, number
 
-    pairs = [(section.answer, " ".join(lines)) for section, lines in answers(study)]
+    rows = TABLES["ranking"](study).dropna(subset="gap")
+    rows = rows[~rows.method.isin(study.methods.index[study.methods.under != ""])].head(10)
+    say_table(
+        ("method", "gap (%)", "share of the gain (%)", "runs"),
+        [
+            (study.methods.title[row["method"]], interval(row, "gap", scale=100),
+             interval(row, "share", 0, 100), number(row["runs"]))
+            for row in rows.to_dict("records")
+        ],
+    )  # fmt: skip
+    shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
+    pairs = [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
     if what["failed"]:
         failed = f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"
         pairs.append(("Failed", failed))
     say_pairs([*pairs, *more])
-
-
-def exit_if_parts_failed(study: Study) -> None:
-    """Print the parts of the report that could not be made, and exit with code 1 if there are
-    any."""
-    from coartic.analysis.report.about import failures
-
-    for part, reason in failures(study).items():
-        complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
-    if failures(study):
-        sys.exit(1)
 
 
 def verify(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.read import exit_if_parts_failed, say_answers
+from coartic.cli.read import say_ranking
 from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
@@ -144,8 +144,7 @@ def perform_and_say(
         say_pairs([("Next", part)])
         sys.exit(1 if progress.crashed else 0)
     study = load(out)
-    say_answers(study, ("Next", f"coartic report {out}"))
-    exit_if_parts_failed(study)
+    say_ranking(study, ("Next", f"coartic report {out}"))
     if progress.crashed:
         sys.exit(1)
 

@@ -6,7 +6,7 @@ import shutil
 import sys
 import textwrap
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from coartic.internal.text import counted, one_line
@@ -41,6 +41,16 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
         lines = textwrap.wrap(together, width - indent, break_on_hyphens=False) or [""]
         for number, line in enumerate(lines):
             say(f"{'' if number else word:{indent}}{line}".replace("\xa0", " ").rstrip())
+
+
+def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print rows of text below their headings, the first column to the left; nothing without
+    rows."""
+    if rows:
+        widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
+        for first, *others in (headings, *rows):
+            cells = [f"{text:>{width}}" for text, width in zip(others, widths[1:], strict=True)]
+            say("  ".join([f"{first:{widths[0]}}", *cells]))
 
 
 class Display:

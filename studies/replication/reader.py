@@ -68,16 +68,14 @@ class Reader:
 
     def runs(self, task, label):
         """Return the runs of a method on a task, if all of them have a solution."""
-        cell, title = self.study.cells.get((task, label)), self.title(task)
-        if cell is None or not len(cell.runs):
+        runs, title = self.study.cells.get((task, label)), self.title(task)
+        if runs is None:
             raise MissingError(f"this folder has no runs of {label} on {title}")
-        if not cell.all_good:
-            failed = len(cell.runs) - len(cell.good)
+        if failed := (runs.status != "ok").sum():
             raise MissingError(
-                f"{failed} of {len(cell.runs)} runs of {label} on {title} failed, so "
+                f"{failed} of {len(runs)} runs of {label} on {title} failed, so "
                 "the mean of the others would mislead"
             )
-        runs = cell.good
         if self.study.methods.algorithm[label] in ("learner", "random search"):
             trials = sorted(runs.trials.unique())
             if trials != [TRIALS]:

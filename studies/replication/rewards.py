@@ -37,8 +37,9 @@ def compare_rewards(study):
     deviation (``p_sd``) and as a standard error (``p_se``).
     """
     rows = {}
-    for (task, label), cell in study.cells.items():
-        condition, hands = label.removeprefix(LEARNER), cell.good.hands
+    for (task, label), every in study.cells.items():
+        runs = every[every.status == "ok"]
+        condition, hands = label.removeprefix(LEARNER), runs.hands
         published = published_cell(task, condition)
         if published is None:
             continue
@@ -47,7 +48,7 @@ def compare_rewards(study):
         initial = published_alone(task, "initial hands")
         ours = map(str, hands.value_counts().index) if several else ()
         for name in dict.fromkeys(["", *published, *ours]):
-            with_hands = cell.good[hands == name] if name else cell.good
+            with_hands = runs[hands == name] if name else runs
             rewards, summary = with_hands.reward.to_numpy(np.float64), published.get(name)
             row = {
                 "task": study.tasks[task].label + " †" * bool(study.tasks[task].reconstructed),
@@ -56,11 +57,11 @@ def compare_rewards(study):
                 "published_runs": 0 if complete else None,
                 "pooled": False,
                 "runs": len(rewards),
-                "of_runs": len(cell.good),
+                "of_runs": len(runs),
                 "ours": rewards.mean() if len(rewards) else math.nan,
                 "ours_sd": standard_deviation(rewards),
                 "published_initial": initial and initial.mean,
-                "ours_initial": cell.good.initial_reward.dropna().mean(),
+                "ours_initial": runs.initial_reward.dropna().mean(),
                 "several": len(published) > 2,  # with that of the whole cell
                 "run_ids": " ".join(with_hands.run_id),
             }
@@ -78,7 +79,7 @@ def compare_rewards(study):
                 if summary.sd is not None and not summary.derived:
                     row["p_sd"] = spread_p(rewards, summary.sd, summary.runs)
                     row["p_se"] = spread_p(rewards, summary.sd, summary.runs, of_mean=True)
-                if (cell.good.trials == TRIALS).all():
+                if (runs.trials == TRIALS).all():
                     row["verdict"] = equivalence(difference, row["margin"])
             rows[" ".join(filter(None, (task, condition, name)))] = row
     return pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS).rename_axis("row")

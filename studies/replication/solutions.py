@@ -23,9 +23,11 @@ def measure_solutions(study):
     rows = []
     for name, task in study.tasks.items():
         cells = {
-            label.removeprefix(LEARNER): cell
-            for (on, label), cell in sorted(study.cells.items())
-            if on == name and published_cell(name, label.removeprefix(LEARNER)) and len(cell.good)
+            label.removeprefix(LEARNER): label
+            for on, label in sorted(study.cells)
+            if on == name
+            and published_cell(name, label.removeprefix(LEARNER))
+            and (study.cells[on, label].status == "ok").any()
         }
         runs = {}
         if cells:
@@ -33,10 +35,11 @@ def measure_solutions(study):
                 runs["initial"] = Reader(study).initial_execution(name)
             except MissingError:
                 continue
-        for condition, cell in cells.items():
-            executed = study.executed(name, cell.label)
+        for condition, label in cells.items():
+            executed, every = study.executed(name, label), study.cells[name, label]
+            median = np.median(every[every.status == "ok"].reward.astype(float))
             rewards = -np.array([run.ticks for run in executed.runs])
-            runs[condition] = executed.runs[np.abs(rewards - np.median(cell.rewards)).argmin()]
+            runs[condition] = executed.runs[np.abs(rewards - median).argmin()]
         for condition, run in runs.items():
             for goal, (q, ticks) in enumerate(
                 zip(run.configurations, run.ticks_by_goal(), strict=True)

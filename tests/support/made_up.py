@@ -87,6 +87,7 @@ def study_of(rows, tasks=(), *, deterministic=(), **parts):
         task = by_name.get(name) or load_task(name)
         cell = Cell(task, declared(method, deterministic), parameters)
         plan.append(Job(cell, 0, range(3), suite="paper"))
+    parts = {"rewards": lambda: iter(()), **parts}
     return MadeUp(Study(Path("made-up"), plan, MADE_WITH, runs), **parts)
 
 
@@ -94,7 +95,7 @@ def study_of_rewards(rewards, **parts):
     """A study of ``{(task, method): rewards}``, None for a failed run; optima are proven."""
     rows = [run for cell, of in rewards.items() for run in runs_of(*cell, of)]
     optima = made_up_optima(*{task for task, _ in rewards})
-    return study_of(rows, **{"optima": optima, "rewards": lambda: iter(()), **parts})
+    return study_of(rows, **{"optima": optima, **parts})
 
 
 def study_of_trials(trials, plans, **more):

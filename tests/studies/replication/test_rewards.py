@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 
 from coartic import corrective_trial, initial_hands, load_task
+from coartic.analysis.study import solved
 from coartic.estimates import Estimate
 from tests.support.made_up import runs_of, study_of
 from tests.support.processes import program
@@ -26,8 +27,8 @@ def test_solutions_are_of_the_run_with_the_median_reward(traced):
         if condition == "initial":
             assert of_run == corrective_trial(name, initial_hands(name)).ticks
         else:
-            rewards = traced.cells[name, f"dual-process/{condition}"].rewards
-            assert -of_run in rewards
+            rewards = solved(traced.cells[name, f"dual-process/{condition}"]).reward.astype(float)
+            assert -of_run in rewards.to_list()
             assert (rewards < -of_run).sum() <= len(rewards) / 2 >= (rewards > -of_run).sum()
     for hit in data.to_dict("records"):
         task = load_task(hit["task"])
