@@ -70,15 +70,6 @@ TENTHS = 10
 Flags = NDArray[np.bool_]
 
 
-class Informed(NamedTuple):
-    """Information of a condition: drift, pull and direction, as the kernel reads them."""
-
-    drifts: Array
-    """Values of κ, shape ``(K,)``; of several each trial draws one."""
-    pull: float
-    direction: int
-
-
 class LearnerParameters(NamedTuple):
     """Learner parameters: a task and an exploration condition, as the kernel reads them."""
 
@@ -103,8 +94,10 @@ class LearnerParameters(NamedTuple):
     by_subtask: bool
     discount: float
     counts_earlier: bool
-    informed: Informed | None
-    """None under conditions without information, whose kernel has no code for any."""
+    drifts: Array
+    """Values of κ, shape ``(K,)``; of several each trial draws one."""
+    pull: float
+    direction: int
 
 
 class Results(NamedTuple):
@@ -177,11 +170,9 @@ def learner_parameters(
         by_subtask=condition.credit == "subtask",
         discount=float(condition.discount),
         counts_earlier=condition.counted == "all",
-        informed=Informed(
-            np.array(condition.drifts), float(condition.pull), _DIRECTION[condition.direction]
-        )
-        if condition.is_informed or condition.hand_exploration == "nearest-posture"
-        else None,
+        drifts=np.array(condition.drifts if condition.is_informed else (0.0,)),
+        pull=float(condition.pull),
+        direction=_DIRECTION[condition.direction],
     )
 
 
@@ -222,27 +213,25 @@ def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
 
 
 @inner
-def nearest_posture(informed: Any, n: int, robot: Any, learner: Any, workspace: Any) -> int:
+def nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
     """Find the hand of run ``n`` whose corrective posture for the goal is nearest in joint space.
 
     A hand with which **A** fails is farthest; of equal ones the first.
     """
-    nearest = learner.hands[0]
-    if informed is not None:
-        batch, least = workspace.batch, math.inf
-        run = batch.runs[n]
-        for hand in learner.hands:
-            run.hand = hand
-            fill_row(run.target, run.q)
-            load(batch.at[0], 0, n, run, arm_of(robot, hand))
-            correct_slots(batch, 1, robot)
-            workspace.counts[n, ITERATIONS] += run.iterations
-            square = 0.0
-            for j in range(len(run.q)):
-                square += (run.target[j] - run.q[j]) ** 2
-            if run.converged and square < least:
-                nearest, least = hand, square
+    nearest, batch, least = learner.hands[0], workspace.batch, math.inf
+    run = batch.runs[n]
+    for hand in learner.hands:
+        run.hand = hand
         fill_row(run.target, run.q)
+        load(batch.at[0], 0, n, run, arm_of(robot, hand))
+        correct_slots(batch, 1, robot)
+        workspace.counts[n, ITERATIONS] += run.iterations
+        square = 0.0
+        for j in range(len(run.q)):
+            square += (run.target[j] - run.q[j]) ** 2
+        if run.converged and square < least:
+            nearest, least = hand, square
+    fill_row(run.target, run.q)
     return int(nearest)
 
 
@@ -267,7 +256,7 @@ def choose_hand(
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:
-            return nearest_posture(learner.informed, n, robot, learner, workspace)
+            return nearest_posture(n, robot, learner, workspace)
         nearest, draws = hands[0], learner.exploration == _RANDOM
         if not draws:
             least = distance_to_goal(run, nearest, robot, workspace)
@@ -288,75 +277,63 @@ def find_mean(run: Any, stored: Any, learner: Any) -> None:
         run.target[j] = run.q[j] if learner.follows[run.hand, j] else stored.target[j]
 
 
-@inner
-def draw_drift(informed: Any, run: Any, rng: Any) -> None:
+@inlined
+def draw_drift(run: Any, learner: Any, rng: Any) -> None:
     """Set the drift κ of a run for a trial."""
-    if informed is not None:
-        number = len(informed.drifts)
-        run.drift = informed.drifts[int(rng.random() * number) if number > 1 else 0]
-        run.pull = informed.pull
+    number = len(learner.drifts)
+    run.drift = learner.drifts[int(rng.random() * number) if number > 1 else 0]
+    run.pull = learner.pull
 
 
 @inner
-def prefer(informed: Any, run: Any, number: int, table: Any, learner: Any) -> None:
+def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
     """Set the preferred posture p of a run, which has chosen its hand for a goal.
 
     *next goal*: (q + t') / 2 with the stored target t' of the next goal for the hand that is best
     there, given this one; q for joints that the movement to it would not explore, and where nothing
     is stored.
     """
-    if informed is not None:
-        fill_row(run.preferred, run.q)
-        if informed.direction == _NEXT_GOAL:
-            if number + 1 < len(table):
-                hand = best_hand(table[number + 1, run.hand], learner.hands)
-                following = table[number + 1, run.hand, hand]
-                if following.value > -math.inf:
-                    for j in range(len(run.q)):
-                        if learner.explored[hand, j]:
-                            run.preferred[j] = 0.5 * (run.q[j] + following.target[j])
-        elif informed.direction != _STAY:
-            fill_row(run.preferred, learner.start)
+    if run.drift == 0.0 and run.pull == 0.0:
+        return
+    fill_row(run.preferred, run.q)
+    if learner.direction == _NEXT_GOAL:
+        if number + 1 < len(table):
+            hand = best_hand(table[number + 1, run.hand], learner.hands)
+            following = table[number + 1, run.hand, hand]
+            if following.value > -math.inf:
+                for j in range(len(run.q)):
+                    if learner.explored[hand, j]:
+                        run.preferred[j] = 0.5 * (run.q[j] + following.target[j])
+    elif learner.direction != _STAY:
+        fill_row(run.preferred, learner.start)
 
 
 @inner
-def drift(informed: Any, run: Any, robot: Any, learner: Any, workspace: Any) -> None:
+def drift(run: Any, robot: Any, learner: Any, workspace: Any) -> None:
     """Move the mean t of exploration by κ N(t) (p − t), and an explored idle arm by κ (p − t)."""
-    if informed is not None and run.drift > 0.0:
-        x, y, v = workspace.jacobian
-        arm = arm_of(robot, run.hand)
-        tip = len(arm.links)
-        joint_chain(run.target, arm, workspace.xs, workspace.ys)
-        for j in range(len(run.q)):
-            x[j], y[j], v[j] = 0.0, 0.0, 0.0
-            k = j - arm.first
-            if learner.explored[run.hand, j]:
-                away = run.preferred[j] - run.target[j]
-                if j == 0:
-                    x[j], v[j] = 1.0, away
-                elif j == 1:
-                    y[j], v[j] = 1.0, away
-                elif 0 <= k < tip:
-                    x[j], y[j] = joint_lever(workspace.xs, workspace.ys, k, tip)
-                    v[j] = away
-                else:
-                    run.target[j] += run.drift * away
-        project(v, x, y)
-        for j in range(len(run.q)):
-            run.target[j] += run.drift * v[j]
-
-
-@inner
-def correct_as(informed: Any, first: bool, count: int, robot: Any, batch: Any) -> None:
-    """Phase 4 with the pull of an informed condition, which trial 0 does without."""
-    if informed is None:
-        correct(count, robot, batch)
-    else:
-        if first or informed.pull == 0.0:
-            correct(count, robot, batch)
-        else:
-            find_pulled_corrections(count, robot, batch)
-            make_corrections(count, robot, batch)
+    if run.drift == 0.0:
+        return
+    x, y, v = workspace.jacobian
+    arm = arm_of(robot, run.hand)
+    tip = len(arm.links)
+    joint_chain(run.target, arm, workspace.xs, workspace.ys)
+    for j in range(len(run.q)):
+        x[j], y[j], v[j] = 0.0, 0.0, 0.0
+        k = j - arm.first
+        if learner.explored[run.hand, j]:
+            away = run.preferred[j] - run.target[j]
+            if j == 0:
+                x[j], v[j] = 1.0, away
+            elif j == 1:
+                y[j], v[j] = 1.0, away
+            elif 0 <= k < tip:
+                x[j], y[j] = joint_lever(workspace.xs, workspace.ys, k, tip)
+                v[j] = away
+            else:
+                run.target[j] += run.drift * away
+    project(v, x, y)
+    for j in range(len(run.q)):
+        run.target[j] += run.drift * v[j]
 
 
 @inlined
@@ -376,12 +353,12 @@ def aim(
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
-    prefer(learner.informed, run, number, table, learner)
+    prefer(run, number, table, learner)
     if stored.value > -math.inf:
         run.action, run.corrects = MOVE, learner.corrects
         find_mean(run, stored, learner)
         if explore:
-            drift(learner.informed, run, robot, learner, workspace)
+            drift(run, robot, learner, workspace)
         for j in range(len(run.q)):
             if explore and learner.explored[run.hand, j]:
                 run.target[j] += learner.noise_sd * rng.standard_normal()
@@ -404,7 +381,7 @@ def make_trial(
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
         if explore and not first:
-            draw_drift(learner.informed, batch.runs[n], generator_at(rngs, n))
+            draw_drift(batch.runs[n], learner, generator_at(rngs, n))
         for k in range(counts.shape[1]):
             counts[n, k] = 0
     for number in range(len(learner.goals)):
@@ -424,7 +401,11 @@ def make_trial(
             trial[n, number].moved[0] = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
                 fill_row(trial[n, number].target[0], batch.runs[n].target)
-        correct_as(learner.informed, first, runs, robot, batch)
+        if first or learner.pull == 0.0:
+            correct(runs, robot, batch)
+        else:
+            find_pulled_corrections(runs, robot, batch)
+            make_corrections(runs, robot, batch)
         for n in range(runs):
             account(batch.runs[n], trial[n, number])
             count_goal(trial[n, number], counts[n])
