@@ -2,7 +2,7 @@
 
 Samples are rewards (or any score) of independent runs; a plain number in the place of a sample is
 taken as known without error. Intervals are of the BCa bootstrap, and the edge cases of that are
-all in :func:`bootstrap_estimate`. Resampling has one seed, :data:`SEED`, which has nothing to do
+all in :func:`mean_of_means`. Resampling has one seed, :data:`SEED`, which has nothing to do
 with the seeds of the runs.
 
 scipy imports its modules where they are first used: scipy.stats takes longer than a figure.
@@ -13,15 +13,14 @@ Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, ch
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from coartic.internal.limits import refuse_mask
 from coartic.robot import Array
@@ -102,35 +101,28 @@ def centred(values: Array) -> Array:
 
 
 def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
-    """Mean with its interval, as :func:`bootstrap_estimate` makes it."""
+    """Mean with its interval, as :func:`mean_of_means` makes it."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
 
 @lru_cache(maxsize=500)  # claims state the same means
 def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
-    return bootstrap_estimate((np.array(values),), np.mean, resamples)
+    return mean_of_means([np.array(values)], [1.0], resamples)
 
 
 def difference_of_means(
     first: ArrayLike, second: ArrayLike, *, resamples: int = RESAMPLES
 ) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples."""
-
-    def difference(a: Array, b: Array, axis: int) -> Array:
-        return np.asarray(a.mean(axis) - b.mean(axis))
-
-    return bootstrap_estimate((vector(first), vector(second)), difference, resamples)
+    return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
 
 
-def bootstrap_estimate(
-    samples: tuple[Array, ...],
-    statistic: Callable[..., Any],
-    resamples: int = RESAMPLES,
+def mean_of_means(
+    samples: Sequence[Array], weights: Sequence[float], resamples: int = RESAMPLES
 ) -> Estimate:
-    """A statistic of one or more independent samples with its BCa interval.
+    """A weighted sum of the means of independent samples, with its BCa interval.
 
-    ``statistic(*samples, axis)`` is vectorised over leading axes. Each sample is resampled
-    within itself, so samples that are strata stay so. The edge cases:
+    Each sample is resampled within itself, so samples that are strata stay so. The edge cases:
 
     - a sample of fewer than :data:`FEWEST` values: no interval;
     - no spread in any sample: the interval is that point, which says that the samples have no
@@ -138,31 +130,51 @@ def bootstrap_estimate(
     - a sample of more than :data:`LARGE` values, or one for which BCa is not defined: the
       percentile interval.
     """
-    value, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
+    parts = [*zip(samples, weights, strict=True)]
+    value = float(sum(weight * sample.mean() for sample, weight in parts))
+    n = tuple(map(len, samples))
     if min(n) < FEWEST:
         return Estimate(value, n=n)
     if not any(map(varies, samples)):
         return Estimate(value, value, value, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
-    with warnings.catch_warnings():
-        # scipy warns where BCa is undefined; that case is dealt with below.
-        warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)
-        warnings.simplefilter("ignore", RuntimeWarning)
-        result = scipy.stats.bootstrap(
-            samples,
-            statistic,
-            n_resamples=resamples,
-            batch=max(1, min(100, 1_000_000 // max(n))) if large else 1_000,
-            vectorized=True,
-            confidence_level=CONFIDENCE,
-            method="percentile" if large else "BCa",
-            rng=np.random.default_rng(SEED),
-        )
-    low, high = map(float, result.confidence_interval)
-    if large or not (math.isfinite(low) and math.isfinite(high)):
-        low, high = map(float, np.quantile(result.bootstrap_distribution, TAILS))
+    kept = sum(n) <= LARGE
+    batches: Iterable[list[Any]] = (drawn_once if kept else drawn)(n, resamples)
+    resampled = np.concatenate([
+        sum(weight * sample[places].mean(axis=1)
+            for (sample, weight), places in zip(parts, batch, strict=True))
+        for batch in batches
+    ])  # fmt: skip
+    ends = np.array(TAILS)
+    if not large:
+        # How much each value moves the sum: of a mean the jackknife is known.
+        moves = [weight * (sample - sample.mean()) / len(sample) for sample, weight in parts]
+        cubes, squares = (sum((each**power).sum() for each in moves) for power in (3, 2))
+        acceleration = cubes / squares**1.5 / 6
+        below = ((resampled < value).sum() + (resampled <= value).sum()) / 2 / resamples
+        bias = scipy.special.ndtri(below)
+        away = bias + scipy.special.ndtri(ends)
+        corrected = scipy.special.ndtr(bias + away / (1 - acceleration * away))
+        ends = corrected if np.isfinite(corrected).all() else ends
+    low, high = map(float, np.quantile(resampled, ends))
     return Estimate(value, low, high, n=n)
+
+
+def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
+    """Yield the places of values that resamples of samples draw, shape ``(batch, size)`` for each
+    sample, a thousand resamples at a time or as many as fit."""
+    rng, batch = np.random.default_rng(SEED), 1_000
+    if max(sizes) > LARGE:
+        batch = max(1, min(100, 1_000_000 // max(sizes)))
+    for part in slices(resamples, batch):
+        yield [rng.integers(size, size=(part.stop - part.start, size)) for size in sizes]
+
+
+@lru_cache(maxsize=8)  # most samples have as many values as another
+def drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.int16]]]:
+    """Return the places of :func:`drawn`, which are kept for further samples of these sizes."""
+    return [[each.astype(np.int16) for each in batch] for batch in drawn(sizes, resamples)]
 
 
 def standard_deviation(values: Array) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pandas as pd
 
@@ -14,7 +12,7 @@ from coartic.analysis.sections.ranking import SCORES
 from coartic.analysis.standings import board, compared, runs_on, solved_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, run_ids, table
-from coartic.estimates import FEWER_RESAMPLES, Estimate, bootstrap_estimate
+from coartic.estimates import FEWER_RESAMPLES, Estimate, mean_of_means
 from coartic.robot import Array
 
 
@@ -72,20 +70,16 @@ def difference_of_gaps(
     The interval is for other runs of both methods on the same tasks; gaps of deterministic methods
     are exact.
     """
-    exact, signs, drawn = 0.0, list[float](), list[Array]()
+    exact, weights, drawn = 0.0, list[float](), list[Array]()
     for sign, runs, is_exact in ((1, first, first_is_exact), (-1, second, second_is_exact)):
         for _, of_task in runs.groupby("task"):
             weight, gaps = sign / runs.task.nunique(), of_task.gap.to_numpy(np.float64)
             if is_exact:
                 exact += weight * gaps.mean()
             else:
-                signs.append(weight)
+                weights.append(weight)
                 drawn.append(gaps)
-
-    def difference(*samples: Array, axis: int) -> Array:
-        parts = zip(signs, samples, strict=True)
-        return np.asarray(exact + sum(sign * each.mean(axis) for sign, each in parts))
-
     if not drawn:
-        return Estimate(exact, math.nan, math.nan)
-    return bootstrap_estimate(tuple(drawn), difference, FEWER_RESAMPLES)
+        return Estimate(exact)
+    found = mean_of_means(drawn, weights, FEWER_RESAMPLES)
+    return Estimate(found.value + exact, found.low + exact, found.high + exact)

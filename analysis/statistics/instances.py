@@ -31,10 +31,8 @@ Scores = Mapping[str, Sequence[Array]]
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     """Return the mean over tasks of the mean over runs, with its stratified BCa interval."""
 
-    def statistic(*strata: Array, axis: int = -1) -> Array:
-        return np.asarray(sum(runs.mean(axis) for runs in strata) / len(strata))
-
-    return estimates.bootstrap_estimate(tuple(map(estimates.vector, values)), statistic)
+    strata = [*map(estimates.vector, values)]
+    return estimates.mean_of_means(strata, [1 / len(strata)] * len(strata))
 
 
 def other_tasks(scores: Scores) -> Estimate:
