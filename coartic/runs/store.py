@@ -665,12 +665,13 @@ def explain(path: Path, error: Exception) -> str:
             return said
     elif isinstance(error, OSError):
         path, said = Path(error.filename or path), error.strerror or said
-    elif name := getattr(error, "sqlite_errorname", ""):
+    elif isinstance(error, sqlite3.Error):
+        name = getattr(error, "sqlite_errorname", "")
         said = _WORDS.get(name, _WORDS.get("_".join(name.split("_")[:2]), said))
         if name.startswith("SQLITE_CANTOPEN"):
             said = why_not_opened(path) or said
-    elif isinstance(error, sqlite3.DatabaseError):  # of Python: a text is no UTF-8
-        said = _DAMAGED
+        if "decode to UTF-8" in said:
+            said = _DAMAGED
     else:
         wrong = explain_inline(error, []) if isinstance(error, ValidationError) else said
         said = f"it holds what coartic does not write ({plain(wrong, 200)})"
