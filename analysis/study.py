@@ -52,7 +52,7 @@ CellKey = tuple[str, str]
 
 UNITS = {
     **dict.fromkeys(["reward", "replay_reward", "initial_reward", "best_known"], "ticks"),
-    **dict.fromkeys(["proven_bound", "movement_ticks"], "ticks"),
+    "movement_ticks": "ticks",
     **dict.fromkeys(["build_s", "solve_s", "wall_s", "cpu_s", "time_limit_s"], "s"),
     **{"gap": "share of the best known reward", "other_arm_travel": "rad", "process_peak_mb": "MB"},
 }
@@ -279,7 +279,7 @@ class Study:
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
-        """A row for each movement of the solutions."""
+        """A row for each movement of the solutions (docs/results.md)."""
         with open_results(self.folder) as store:
             return store.solutions()
 
@@ -397,7 +397,7 @@ class Study:
     def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` of executed runs, by run id."""
         with open_results(self.folder) as store:
-            return store.movements(part, self.tasks, MOST_EXECUTED)
+            return store.movements(part, MOST_EXECUTED)
 
 
 @cached

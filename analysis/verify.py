@@ -24,13 +24,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import re
 import sqlite3
 import sys
 import zlib
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import closing
+from itertools import chain, count
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -39,23 +38,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-DATABASE = "runs.sqlite?mode=ro"
+DATABASE = "runs.sqlite?mode=rw"  # SQLite checks no values of a file that it opens as read-only
 STATED = {  # of table results: what is said of each solution that is stored of a run
     "solution": ("reward", "hands", "solution_corrections", "other_arm_travel"),
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
-SCHEMA = "01ba2a1326692168"  # of format 5: see schema
+SCHEMA = "4be4698e3d72c02c"  # of format 6: see schema
 OURS = (  # of tables, then of views
-    *("suite", "plan", "cells", "environments", "results", "movements", "waypoints", "learning"),
-    *("asked", "solved", "runs", "solutions", "paths"),
+    *("suite", "plan", "cells", "environments", "results", "movements", "learning"),
+    *("asked", "runs", "solutions"),
+)
+EMPTY = zlib.compress(bytes(4))  # no rewards
+PLANNED = (  # all that a plan says
+    """SELECT name, seed, time_limit_s, command, date, content FROM suite
+    JOIN environments ON environments.id = environment""",
+    "SELECT * FROM plan JOIN cells ON cells.id = cell ORDER BY position",
 )
 # Whatever a file says, it is checked in bounded time and memory.
-MOST_GOALS, LONGEST_TEXT = 256, 100_000  # of a task, and of what is stored of it in characters
+MOST_GOALS, LONGEST_TEXT, LONGEST_PATH = 256, 100_000, 10_000_000  # characters of tasks, paths
 MOST_TRIALS, MOST_TICKS, MOST_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run, movement
 UNCHECKED = (
-    "Times, dates, reasons, counts of what was spent, proven bounds, and where and with what it "
-    "was run are taken as stored; so is what methods declare, and what the suite was called.",
+    "Times, dates, reasons, counts of what was spent, and where and with what it was run are taken "
+    "as stored; so is what methods declare, and what the suite was called.",
     "That tasks are those of the paper or of a family, and that the plan is that of the suite.",
     "No method is run: `coartic verify --again N` sees whether it finds these solutions again.",
 )
@@ -115,8 +120,6 @@ def stored_task(definition: str, model: str) -> Any:
         "left": (slice(2, middle), robot.left_links, robot.left_shoulder),
         "right": (slice(middle, None), robot.right_links, robot.right_shoulder),
     }
-    names = [f"{hand}_{k + 1}" for hand, arm in task.arms.items() for k in range(len(arm[1]))]
-    task.columns = ", ".join(["base_x", "base_y", *names])
     return task
 
 
@@ -129,22 +132,22 @@ class MoveRow(NamedTuple):
     kind: str  # learned, planned, corrective, path
     ticks: int
     target: Floats
-    waypoints: list[Floats]  # of a path
+    waypoints: Floats  # of a path, a row each
 
 
 def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """The points of a straight movement, in columns; ``most`` of them and one more."""
+    """The points of a straight movement, in columns; ``most`` of them and one more. The last is
+    the target, also of a longer movement."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
     fractions = np.arange(min(last, most) + 1) * model.step / (distance or 1.0)
     points: Floats = q[:, None] + fractions * difference[:, None]
-    if last <= most:
-        points[:, -1] = target
+    points[:, -1] = target
     return points
 
 
-def path(q: Floats, waypoints: list[Floats], model: Any, most: int = MOST_TICKS) -> Floats:
+def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
     """The points of a path, in columns; ``most`` of them and one more. Point k lies k steps along
     it, the last at its end."""
     corners = np.array([q, *waypoints])
@@ -164,13 +167,12 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     _, goal, hand, kind, most, target, waypoints = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
     points = path(q, waypoints, model, most) if on_path else line(q, target, model, most)
-    x, y = hand_at(np.column_stack([points, target]), arm, on_path)
-    x, y, end_x, end_y = x[:-1], y[:-1], x[-1], y[-1]
+    x, y = hand_at(points, arm, on_path)
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
     hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
     stops = hits.copy()
     if kind in ("learned", "planned"):
-        dx, dy = end_x - x, end_y - y
+        dx, dy = x[-1] - x, y[-1] - y
         stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
     stops[-1] = True
     k = int(np.argmax(stops))  # the first
@@ -183,17 +185,17 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
     check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
-        to_goal, before = [movement for movement in movements if movement.goal == goal], q
-        stand = to_goal[0]._replace(kind="planned", target=q)  # the others are made in any case
-        hit = to_goal[0].kind == "corrective" and make(task, q, stand)[2]
+        to_goal, before, hit = [each for each in movements if each.goal == goal], q, False
         for movement in to_goal:
             which, is_corrective = f"movement {movement.order}", movement.kind == "corrective"
-            if hit and (is_corrective or movement is not to_goal[0]):
+            end, ticks, hits = make(task, q, movement)
+            if hit or (is_corrective and hits and ticks == 1):
                 # Nothing is to be done. A movement of no ticks to where it is names the hand.
                 is_none = len(to_goal) == 1 and not movement.ticks and (movement.target == q).all()
                 need(is_none, f"{which} is made after goal {goal} is hit")
+                hit = True
                 continue
-            q, ticks, hit = make(task, q, movement)
+            q, hit = end, hits
             words = f"{which} takes {'at least ' * (ticks > movement.ticks)}{ticks} ticks"
             need(ticks == movement.ticks, f"{words}, not {movement.ticks}")
             reward, corrections = reward - ticks, corrections + is_corrective
@@ -210,15 +212,14 @@ def check_rules(task: Any, movements: list[MoveRow]) -> None:
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
     need(goals == sorted(goals), f"its goals are out of order: {goals}")
     need([goal for goal, _ in hands] == [*range(1, len(task.goals) + 1)], "a goal has not one hand")
-    for place, (order, _, hand, kind, _, target, waypoints) in enumerate(movements):
-        which, corners = f"movement {order}", np.array([*waypoints, target])
-        need(order == place, f"movement {place} is missing")
+    for order, _, hand, kind, _, target, _ in movements:
+        which = f"movement {order}"
+        need(target.shape == task.q0.shape, f"{which} has not a number for each joint")
         need(hand in task.hands, f"{which} uses the {hand} hand, which the task does not have")
         need(kind in ("learned", "planned", "corrective", "path"), f"{which} is of no known kind")
-        need(bool(waypoints) == (kind == "path"), f"{which}: a path, and no other, has waypoints")
-        need((np.abs(corners) <= 1e5).all(), f"{which} has an entry that is no number up to 1e5")
-        need((corners[-2:] == target).all(), f"{which} does not end at its last waypoint")
-        need((corners == task.q0)[:, task.locked].all(), f"{which} moves a locked base")
+    corners = np.array([corner for each in movements for corner in (*each.waypoints, each.target)])
+    need((np.abs(corners) <= 1e5).all(), "a movement has an entry that is no number up to 1e5")
+    need((corners == task.q0)[:, task.locked].all(), "a movement moves a locked base")
 
 
 class Report(NamedTuple):
@@ -238,23 +239,27 @@ def check_runs(folder: Path) -> Report:
 
 
 def check_all(db: sqlite3.Connection) -> Report:
-    """Check the runs one by one, and that none is better than another proves possible."""
+    """Check the plan, the cells, and the runs one by one."""
     db.execute("PRAGMA trusted_schema = OFF")
+    db.execute("PRAGMA query_only = ON")
     if hash_of(schema(db))[:16] != SCHEMA:
         foreign = "Tables or views are not as coartic makes them, so that they may say anything."
         return Report(0, 0, [foreign], ["The runs."])
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
-    wrong += [*check_cells(db), *check_plan(db)]
+    tasks = dict[int, Any]()
+    wrong += [*check_cells(db, tasks), *check_plan(db)]
     runs = movements = unsolved = spent = 0
-    rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
     query = """SELECT results.id AS number, * FROM results
         LEFT JOIN cells ON cells.id = cell LEFT JOIN learning ON result_id = results.id"""
     for row in db.execute(query):
-        run, same, bound = row["run_id"], (row["definition"], row["model"]), row["proven_bound"]
-        where, runs, unsolved = f"Run {run}", runs + 1, unsolved + (row["status"] != "ok")
+        run, runs, unsolved = row["run_id"], runs + 1, unsolved + (row["status"] != "ok")
+        where = f"Run {run}"
         try:
-            task, chosen = stored_task(*same), json.loads(row["parameters"])
-            parts = read_parts(db, row["number"], task.columns)
+            task = tasks.get(row["cell"], "its cell is not there")
+            need(not isinstance(task, str), task)
+            check_identity(row)
+            rewards, stored = check_rewards(row), read_movements(db, row["number"])
+            parts = {part: [*map(move_row, count(), stored[part])] for part in STATED}
             need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
             spent += sum(move.ticks for moves in parts.values() for move in moves)
             spent += row["trials"] or 0
@@ -265,45 +270,27 @@ def check_all(db: sqlite3.Connection) -> Report:
                 for name, now in zip(STATED[part], outcome, strict=False):
                     close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
                     need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
-                rewards[same] += [(outcome[0], run)] if moves else []
-            # A search of fewer movements than the task allows proves nothing of the others.
-            if chosen.get("base", "task") == "task" and chosen.get("other_arm") != "still":
-                bounds[same] += [(int(bound), run)] if bound is not None else []
-            need(row["result"] == fingerprint(row, parts), "a joint or a trial was changed")
-            check_identity(row)
+            content = json.dumps([row["status"], *chain(*stored.values())])
+            result = hashlib.sha256(content.encode() + rewards).hexdigest()[:16]
+            need(row["result"] == result, "a joint or a trial was changed")
         except Exception as problem:  # whatever keeps a run from being executed
             wrong.append(f"{where}: {problem}.")
-    for same, proofs in bounds.items():
-        bound, proof = min(proofs, default=(0, ""))
-        words = f"is better than bound {bound} of run {proof}"
-        wrong += [f"Run {run} {words}." for reward, run in rewards[same] if reward > bound]
     empty = [f"Runs without a solution: {unsolved}."] if unsolved else []
     (asked,) = db.execute("SELECT count(*) FROM asked").fetchone()
     others = [f"If the plan should ask for {runs - asked} other runs, which no report shows."]
     return Report(runs, movements, wrong, [*UNCHECKED, *empty, *others * (runs > asked)])
 
 
-def schema(db: sqlite3.Connection) -> list[list[str]]:
-    """Tables and views of coartic, without columns of joints, and all triggers."""
-    query = f"""SELECT type, name, tbl_name, sql FROM sqlite_master
+def schema(db: sqlite3.Connection) -> list[str]:
+    """Statements that make the tables and views of coartic, and all triggers."""
+    query = f"""SELECT sql FROM sqlite_master
         WHERE type = 'trigger' OR name IN ({", ".join("?" for _ in OURS)}) ORDER BY type, name"""
-    rows = db.execute(query, OURS)
-    joint = re.compile(r", (base_[xy]|(left|right)_[0-9]+) REAL")
-    of = {"movements": joint, "waypoints": joint}
-    return [
-        [kind, name, table, " ".join(re.sub(of.get(table, "$^"), "", sql or "").split())]
-        for kind, name, table, sql in rows
-    ]
+    return [sql for (sql,) in db.execute(query, OURS) if sql]
 
 
 def check_identity(row: Any) -> None:
-    """Raises ValueError where a run is not that of its cell: its id is a hash of task, method,
-    parameters, constants, budget, seed of the suite and number, and ends with that of the code."""
-    cell = {name: json.loads(row[name]) for name in ("parameters", "model")}
-    cell |= {"task": json.loads(row["definition"])}
-    cell |= {name: row[name] for name in ("method", "trial_budget")}
-    need(row["digest"] == hash_of(cell), "its task, method, parameters or model were changed")
-    need(row["task"] == cell["task"]["name"], f"its task is not {row['task']}")
+    """Raises ValueError where a run is not that of its cell: its id is a hash of the cell, the seed
+    of the suite and the number of the run, and ends with the hash of the code."""
     suite_seed, run = row["suite_seed"], row["run"]
     digits = hashlib.sha256(f"{row['digest']} {suite_seed} {run}".encode()).hexdigest()[:16]
     need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
@@ -312,74 +299,105 @@ def check_identity(row: Any) -> None:
     need(row["seed"] == int(state) >> 1, f"its seed is not {row['seed']}")
 
 
-def check_cells(db: sqlite3.Connection) -> Iterator[str]:
-    """Cells that show other runs than they say, and runs that none shows, a sentence each."""
+def check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
+    """Yield a sentence for each row that names no row, shows other runs than it says or cannot be
+    read. ``tasks`` gets the task of each cell by id, or the words of what is wrong with the cell:
+    the digest of a cell is a hash of its task, method, parameters, constants and budget."""
     for table, number, missing, _ in db.execute("PRAGMA foreign_key_check"):
         yield f"Row {number} of table {table} names a row of {missing} that is not there."
     for row in db.execute("SELECT * FROM cells"):
         try:
-            parameters, defaults = json.loads(row["parameters"]), json.loads(row["defaults"])
+            tasks[row["id"]] = task = stored_task(row["definition"], row["model"])
+            names = ("definition", "model", "parameters", "defaults")
+            definition, model, parameters, defaults = (json.loads(row[name]) for name in names)
+            cell = {"task": definition, "model": model, "parameters": parameters}
+            cell |= {name: row[name] for name in ("method", "trial_budget")}
+            same = row["digest"] == hash_of(cell)
+            need(same, "its task, method, parameters or model were changed")
+            need(row["task"] == task.name, f"its task is not {row['task']}")
             changed = {k: v for k, v in parameters.items() if k not in defaults or v != defaults[k]}
             setting = ", ".join(f"{k}={v}" for k, v in changed.items())
             need(row["setting"] == setting, f"its parameters are not {row['setting']}")
         except Exception as problem:
+            tasks[row["id"]] = str(problem)
             yield f"Row {row['id']} of table cells: {problem}."
+    for row in db.execute("SELECT * FROM environments"):
+        try:
+            content = json.loads(row["content"])
+            packages = hash_of([content.get("python"), content.get("packages")])[:8]
+            need(row["packages"] == packages, f"its packages are not {row['packages']}")
+        except Exception as problem:
+            yield f"Row {row['id']} of table environments: {problem}."
     query = """SELECT task FROM plan JOIN cells ON cells.id = cell
         GROUP BY task HAVING count(DISTINCT definition) > 1"""
     yield from (f"Two tasks are called {name}." for (name,) in db.execute(query))
 
 
 def check_plan(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence for each fault of the plan, and one if its runs are missing."""
-    (suites,) = db.execute("SELECT count(*) FROM suite").fetchone()
-    if suites != 1:
-        yield f"Table suite has {suites} rows, not one: no report can be made."
-    for (position,) in db.execute("SELECT position FROM plan WHERE runs < 1"):
-        yield f"Row {position} of table plan asks for no runs of its cell."
-    (planned,) = db.execute("SELECT coalesce(sum(runs), 0) FROM plan").fetchone()
-    (there,) = db.execute("SELECT count(*) FROM asked").fetchone()
-    if there != planned:
+    """Yield a sentence if the plan was changed, and one if its runs are missing."""
+    hashes = [row[0] for row in db.execute("SELECT plan_hash FROM suite")]
+    if hashes != [hash_of([[*row] for query in PLANNED for row in db.execute(query)])]:
+        words = "what suite, plan, cells and environments say of it was changed"
+        yield f"The plan is not as it was written: {words}. No report can be made."
+    query = """SELECT runs, count(run), min(run) FROM plan LEFT JOIN asked USING (position)
+        GROUP BY position"""
+    counts = db.execute(query).fetchall()
+    planned, there = (sum(row[k] for row in counts) for k in (0, 1))
+    firsts = {first if first == runs - count else None for runs, count, first in counts}
+    if len(firsts) == 1 and (first := firsts.pop()):
+        yield f"It has a part of the runs, from run {first} on: `--include` joins all parts."
+    elif there != planned:
         yield f"The plan asks for {planned} runs, of which the folder has {there}."
 
 
 def hash_of(content: Any) -> str:
     """SHA-256 of plain data."""
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), default=repr)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def fingerprint(row: Any, parts: dict[str, list[MoveRow]]) -> str:
-    """Hash of status, bound, rewards and solutions. Raises ValueError for another best trial."""
-    size = 4 * min(row["trials"] or 0, MOST_TRIALS)
-    unpacked = zlib.decompressobj().decompress(row["rewards"] or zlib.compress(b""), size + 1)
-    need(len(unpacked) <= size, f"it has more rewards than {row['trials']} trials")
-    kept = [None if r == -(2**31) else r for r in np.frombuffer(unpacked, "<i4").tolist()]
-    best = kept.index(row["reward"]) if row["reward"] in kept and row["status"] == "ok" else None
-    need(row["best_trial"] == best, f"best_trial is {best}, not {row['best_trial']}")
-    content = [row["status"], row["proven_bound"], kept]
-    for part, moves in parts.items():
-        for _, *facts, q, waypoints in moves:
-            content.append([part, *facts, q.tolist(), [p.tolist() for p in waypoints] or None])
-    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+def check_rewards(row: Any) -> bytes:
+    """The rewards of a run as bytes: the best one, then by how much each trial is worse, plus 1, or
+    0 without a reward; all lowest bytes come first, then the next. Raises ValueError for damage,
+    and for another best trial."""
+    size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
+    try:
+        content = zlib.decompressobj().decompress(row["rewards"] or EMPTY, size + 1)
+        need(len(content) <= size, "")
+        numbers = np.frombuffer(content, "u1").reshape(4, -1)
+        best = int.from_bytes(numbers[:, 0].tobytes(), "little", signed=True)
+    except (zlib.error, ValueError, TypeError):
+        raise ValueError(f"the rewards of its {row['trials']} trials are damaged") from None
+    worse = max(best + 1 - (row["reward"] or 0), 0) % 2**32
+    wanted = np.frombuffer(worse.to_bytes(4, "little"), "u1")
+    found = np.flatnonzero((numbers[:, 1:] == wanted[:, None]).all(axis=0))[:1].tolist()
+    first = found[0] if found and worse and row["status"] == "ok" else None
+    need(row["best_trial"] == first, f"best_trial is {first}, not {row['best_trial']}")
+    return content
 
 
-def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list[MoveRow]]:
-    """The movements of a run, by the solution that they belong to."""
-    parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
-    waypoints = defaultdict[int, list[Floats]](list)
-    where = 'WHERE result_id = ? ORDER BY "order"'
-    query = f'SELECT "order", waypoint, {columns} FROM waypoints {where}, waypoint'
-    for order, number, *q in db.execute(query, [run]):
-        need(number == len(waypoints[order]), f"movement {order} lacks a waypoint")
-        waypoints[order].append(np.array(q, dtype=np.float64))
-    query = f'SELECT part, "order", goal, hand, kind, ticks, {columns} FROM movements {where}'
-    for part, order, goal, hand, kind, ticks, *q in db.execute(query, [run]):
-        count = type(ticks) is int and 0 <= ticks <= MOST_TICKS
-        need(count, f"movement {order} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
-        points = waypoints.pop(order, []) if part == "solution" else []
-        parts[part].append(MoveRow(order, goal, hand, kind, ticks, np.array(q, float), points))
-    need(not waypoints, "it has waypoints of no movement")
+def read_movements(db: sqlite3.Connection, run: int) -> dict[str, list[Any]]:
+    """The movements of a run as they are stored, by the solution that they belong to."""
+    parts: dict[str, list[Any]] = {part: [] for part in STATED}
+    query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
+        WHERE result_id = ? ORDER BY "order\""""
+    for part, order, *facts in db.execute(query, [run]):
+        need(order == len(parts[part]), f"movement {len(parts[part])} is missing")
+        parts[part].append([part, *facts])
     return parts
+
+
+def move_row(order: int, stored: list[Any]) -> MoveRow:
+    """A movement from its place in a solution and from what is stored of it."""
+    _, goal, hand, kind, ticks, text = stored
+    is_count = type(ticks) is int and 0 <= ticks <= MOST_TICKS
+    need(is_count, f"movement {order} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
+    need(len(text) <= LONGEST_PATH, f"movement {order} is too long")
+    points = np.array(json.loads(text), dtype=np.float64)
+    is_path = kind == "path"
+    need(points.ndim == 1 + is_path and len(points), f"movement {order}: {kind} has no such points")
+    target, waypoints = (points[-1], points) if is_path else (points, points[:0])
+    return MoveRow(order, goal, hand, kind, ticks, target, waypoints)
 
 
 def main() -> int:

@@ -159,7 +159,7 @@ def compare_runs(a: Run, b: Run) -> list[str]:
     first, second = a.to_row(), b.to_row()
     changes = [
         f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"
-        for name in ("status", "reason", "proven_bound", "details", *Meter.COUNTS)
+        for name in ("status", "reason", "details", *Meter.COUNTS)
         if first[name] != second[name]
     ]
     for part in PARTS:

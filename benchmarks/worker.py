@@ -22,7 +22,6 @@ from pydantic import TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.limits import real_array
 from coartic.internal.text import error_line
 from coartic.method import (
     Information,
@@ -32,25 +31,12 @@ from coartic.method import (
     UndeclaredError,
     outline_of,
 )
-from coartic.motion.solution import Movement
 from coartic.motion.trial import trials_outside
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job
-from coartic.runs.record import PARTS, Outcome, Times
+from coartic.runs.record import PARTS, Outcome, Times, movement_data, movement_from
 
 _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
-
-
-def plain_movement(movement: Movement) -> Movement:
-    """Return a movement of plain numbers, texts and arrays."""
-    target, waypoints = movement.target, movement.waypoints
-    return Movement(
-        int(movement.goal),
-        str(movement.hand),  # type: ignore[arg-type]
-        str(movement.kind),  # type: ignore[arg-type]
-        None if target is None else real_array("a target", target),
-        waypoints=None if waypoints is None else real_array("a path", waypoints),
-    )
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
@@ -72,21 +58,10 @@ def fail(
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
     """Return outcomes as JSON. Raises TypeError or ValueError for data that JSON cannot hold."""
 
-    def numbers(array: Any) -> Any:
-        return None if array is None else array.tolist()
-
     def plain(outcome: Outcome) -> dict[str, Any]:
-        return vars(outcome) | {
-            "meter": outcome.meter and vars(outcome.meter),
-            "times": vars(outcome.times),
-            "parts": {
-                part: [
-                    (m.goal, m.hand, m.kind, numbers(m.target), m.ticks, numbers(m.waypoints))
-                    for m in movements
-                ]
-                for part, movements in outcome.parts.items()
-            },
-        }
+        parts = {part: [*map(movement_data, made)] for part, made in outcome.parts.items()}
+        meter, times = outcome.meter and vars(outcome.meter), vars(outcome.times)
+        return vars(outcome) | {"meter": meter, "times": times, "parts": parts}
 
     return json.dumps(list(map(plain, outcomes))).encode()
 
@@ -97,15 +72,13 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
     try:
         content = json.loads(answer)
         for each in content:
-            each["parts"] = {
-                part: [plain_movement(Movement(*movement)) for movement in movements]
-                for part, movements in each["parts"].items()
-            }
+            parts = each["parts"].items()
+            each["parts"] = {part: [*map(movement_from, made)] for part, made in parts}
         outcomes = _OUTCOMES.validate_python(content)
         if len(outcomes) == len(job.numbers):
             return outcomes
         why = f"{len(outcomes)} for {len(job.numbers)} runs"
-    except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
@@ -246,11 +219,9 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
     stored."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
-    if result.bound is not None:
-        raise SolutionError("it states a bound; bounds are proven outside of runs")
     try:
         parts = {
-            part: [plain_movement(movement) for movement in getattr(result, part)]
+            part: [movement_from(movement_data(movement)) for movement in getattr(result, part)]
             for part in PARTS
             if part == "solution" or getattr(result, part)
         }

@@ -188,8 +188,6 @@ class Result:
     """Movements of a learner's first trial, if it hit every goal. None follows a path."""
     replay: tuple[Movement, ...] = ()
     """Movements of a learner's noiseless greedy trial after learning. None follows a path."""
-    bound: int | None = None
-    """None: bounds of rewards are proven outside of runs."""
 
 
 class Outline(NamedTuple):

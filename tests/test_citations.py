@@ -12,7 +12,7 @@ from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.method_files import METHOD_NAME
 from coartic.benchmarks.registry import NAMES, built_in, registry
 from coartic.runs.method_info import MethodInfo
-from tests.support.suites import BROKEN, cell_on, edit, run_and_write
+from tests.support.suites import BROKEN, cell_on, edit_plan, run_and_write
 
 ROOT = Path(__file__).parent.parent
 
@@ -117,7 +117,7 @@ def test_command(tmp_path, coartic):
     run_and_write(tmp_path / "results", cells, runs=1)
     commit = '{"id": "0123456789abcdef", "dirty": true}'
     change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
-    edit(tmp_path / "results", change, commit)
+    edit_plan(tmp_path / "results", change, commit)
     code, text, _ = coartic("cite", tmp_path / "results")
     assert code == 0
     assert ", commit 0123456789abcdef with changes}," in text

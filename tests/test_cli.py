@@ -23,7 +23,7 @@ from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session
 from tests.support.strategies import metres_task, tiny_task
-from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, cell_on, edit
+from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, cell_on, edit, edit_plan, moved
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
@@ -124,7 +124,7 @@ def test_reproduce(coartic, tmp_path):
     code, text, _ = coartic("verify", out, "--again", 2)
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
     first_movement = """WHERE "order" = 0 AND part = 'replay'"""
-    edit(out, f"UPDATE movements SET right_1 = right_1 + 1e-15 {first_movement}")
+    edit(out, f"UPDATE movements SET path = {moved('$[6]', 1e-12)} {first_movement}")
     code, text, _ = coartic("reproduce", second, "--in", out)
     assert code == 1
     assert "- movement_ticks: " in text
@@ -132,7 +132,7 @@ def test_reproduce(coartic, tmp_path):
     code, _, error = coartic("reproduce", "", "--in", out)
     assert code == 2
     assert "is not a run id" in error
-    edit(out, "UPDATE cells SET code = 'other'")
+    edit_plan(out, "UPDATE cells SET code = 'other'")
     code, _, error = coartic("verify", out, "--again", 1)
     assert code == 2
     assert "has no run of a method whose code is the same here" in error

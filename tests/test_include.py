@@ -28,6 +28,8 @@ from tests.support.suites import (
     InProcess,
     cell_on,
     edit,
+    edit_plan,
+    moved,
     planned,
     run_and_write,
     same_results,
@@ -80,6 +82,9 @@ def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
     assert "with all other parts, joins them" in " ".join(text.split())
     with pytest.raises(CoarticError, match="has 2 of 4 runs: it was interrupted, or has a part"):
         load(places[1])
+    assert check_runs(places[1]).wrong == [
+        "It has a part of the runs, from run 2 on: `--include` joins all parts."
+    ]
     includes = ("--include", places[0], "--include", places[1])
     code, _, error = coartic(*command, "--runs", "2..3", *includes, "--out", places[2])
     assert (code, "include the folders of all parts afterwards" in error) == (2, True)
@@ -107,7 +112,7 @@ def test_what_no_folder_has_is_performed(parts, tmp_path):
 def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, tmp_path):
     """Whatever it was asked for itself: nobody else's plan says how much is performed here."""
     left = shutil.copytree(parts[0], tmp_path / "left")
-    edit(left, "UPDATE plan SET runs = 1000000 WHERE position = 0")
+    edit_plan(left, "UPDATE plan SET runs = 1000000 WHERE position = 0")
     with pytest.warns(UserWarning, match=f"left is not finished: it lacks runs of {EC1} on asc"):
         progress = joined([left], tmp_path / "more", RIGHT[2:])
     assert (progress.present, progress.done, progress.total) == (2 + 1, 1, 4)
@@ -152,7 +157,7 @@ CHEATS = {
     "hands is RRR, not RRL": "UPDATE results SET hands = 'RRL'",
     "initial_reward is -": f"UPDATE results SET initial_reward = -9 WHERE id = {OF_EC1}",
     "a joint, a tick": f"UPDATE movements SET ticks = ticks + 1 WHERE result_id = {OF_EC1}",
-    "tick or a trial": "UPDATE movements SET left_1 = left_1 + 1e-12",
+    "tick or a trial": f"UPDATE movements SET path = {moved('$[2]', 1e-12)}",
     "travel": "UPDATE results SET other_arm_travel = other_arm_travel + 1",
     "its id": "UPDATE results SET seed = seed + 1",
 }
@@ -329,7 +334,7 @@ def test_results_are_packed_again_where_they_have_not_changed(
     assert pack(tmp_path / "1", "--changed")[0] == 0
     with shipped.open_shipped("paper") as store:
         assert (store.runs().trials == load(tmp_path / "1").runs.trials).all()
-    edit(same, "UPDATE cells SET code = '0123456789ab' WHERE method = 'dual-process/EC1'")
+    edit_plan(same, "UPDATE cells SET code = '0123456789ab' WHERE method = 'dual-process/EC1'")
     with pytest.raises(SystemExit):  # whatever has changed
         pack(same, "--changed")
     assert "other code of dual-process/EC1 made it" in capsys.readouterr().err

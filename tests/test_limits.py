@@ -6,8 +6,8 @@ import pytest
 import coartic
 from coartic import Movement, SolutionError, execute, load_task
 from coartic.analysis import mean, mean_beyond, other_tasks
-from coartic.benchmarks.worker import plain_movement
 from coartic.motion.solution import movements_of
+from coartic.runs.record import movement_data
 from tests.support.strategies import make_trials
 
 MASKED = np.ma.array([0.0] * 10, mask=[False] * 9 + [True])
@@ -43,7 +43,7 @@ DOORS = {
     "a Jacobian": lambda: TASK.robot.jacobian(MASKED, "right"),
     "a movement": lambda: coartic.move(TASK.robot, TASK.q0, MASKED, "right", (5, 1), 0.1),
     "a correction": lambda: coartic.correct(TASK.robot, MASKED, "right", (5, 1)),
-    "a stored movement": lambda: plain_movement(Movement(1, "right", "planned", MASKED)),
+    "a stored movement": lambda: movement_data(Movement(1, "right", "planned", MASKED)),
     "a mean": lambda: mean(MASKED),
     "a masked number": lambda: mean([1.0, 2.0, np.ma.masked]),
     "a mean over tasks": lambda: mean_beyond("{}", MASKED),

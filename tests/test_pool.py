@@ -104,7 +104,9 @@ HANDLED = {
     "many": ("return Result(corrected(session) * 9999)", "solver-failed", "movements; at most"),
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be kept: TypeError"),
-    "bound": ("return Result(corrected(session), bound=-1)", "solver-failed", "states a bound"),
+    "two_ends": ("way = Movement(1, 'right', 'path', session.q0 + 1, waypoints=[session.q0])\n"
+                 "        return Result((way, *corrected(session)[1:]))",
+                 "solver-failed", "its target is the last of them"),
     "paths": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
               "        return Result(corrected(session), initial=way)",
               "solver-failed", "movements in 'initial' follow a path"),

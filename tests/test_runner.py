@@ -28,7 +28,7 @@ from coartic.benchmarks.worker import fail, perform_job
 from coartic.method import Meter
 from coartic.motion.batch import SLOTS
 from coartic.runs.plan import Job, run_seed
-from coartic.runs.record import Outcome, Times, movements_from, too_long
+from coartic.runs.record import Outcome, Times, movement_from, too_long
 from tests.support.strategies import tiny_task
 from tests.support.suites import (
     BROKEN,
@@ -231,7 +231,7 @@ def test_the_runs_of_a_batch_are_scored():
     information = {"parts": {"solution": movements}, "times": times}
     outcomes = [
         Outcome("ok", details={"corrections": corrections}, rewards=[None, -330, -319, -319],
-                meter=Meter(trials=4), bound=-300, **information),
+                meter=Meter(trials=4), **information),
         Outcome("ok", details={"corrections": corrections[:-1]}, **information),
         Outcome("ok", times=times),
         Outcome("ok", parts={"solution": movements, "replay": movements[:1]}),
@@ -240,11 +240,11 @@ def test_the_runs_of_a_batch_are_scored():
     runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]
     columns = ["run", "status", "reward", "hands", "best_trial",
                "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
-               "replay_reward", "proven_bound", "together", "wall_s", "cpu_s"]  # fmt: skip
-    nothing = [None] * 9
+               "replay_reward", "together", "wall_s", "cpu_s"]  # fmt: skip
+    nothing = [None] * 8
     assert [[run.to_row()[name] for name in columns] for run in runs] == [
-        [0, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, -300, 4, 2.0, 1.0],
-        [1, "ok", -319, "RRR", None, None, None, 3, 0.0, None, None, 4, 2.0, 1.0],
+        [0, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, 4, 2.0, 1.0],
+        [1, "ok", -319, "RRR", None, None, None, 3, 0.0, None, 4, 2.0, 1.0],
         [2, "solver-failed", *nothing, 4, 2.0, 1.0],
         [3, "solver-failed", *nothing, 1, None, None],
         [0, "timeout", *nothing, 4, 2.0, None],
@@ -288,12 +288,12 @@ def test_robots_of_different_size_share_a_table(tmp_path):
     )  # fmt: skip
     cells = [cell_on(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
     study = run_and_write(tmp_path, cells, trials=20)
-    arms = {f"left_{k}" for k in range(1, 5)} | {f"right_{k}" for k in range(1, 9)}
-    assert set(study.solutions.columns[6:]) == {"base_x", "base_y"} | arms
+    names = ["goal", "hand", "kind", "ticks", "path"]
     for run in study.runs.itertuples():
         rows = study.solutions[study.solutions.run_id == run.run_id]
         task = study.tasks[run.task]
-        assert execute(task, movements_from(task, rows.to_dict("records"))).reward == run.reward
+        movements = map(movement_from, rows[names].to_numpy().tolist())
+        assert execute(task, movements).reward == run.reward
 
 
 def test_some_runs_of_every_cell_are_performed_again(results, monkeypatch):

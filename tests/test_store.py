@@ -1,5 +1,6 @@
 """What is kept of runs: read back to the last bit, whatever interrupts or damages it."""
 
+import json
 import multiprocessing
 import random
 import shutil
@@ -33,6 +34,7 @@ from tests.support.suites import (
     InProcess,
     cell_on,
     edit,
+    moved,
     paper_cells,
     planned,
     run_and_write,
@@ -103,11 +105,9 @@ def test_what_is_written_is_read_back(written):
             of_run = partial(read_values, plain_sql, run_id)
             assert of_run("reward FROM runs WHERE run_id = ?") == [run.solution.reward]
             solution = run.scores["solution"].movements if run.scores else ()
-            ends = of_run('right_4 FROM solutions WHERE run_id = ? ORDER BY "order"')
-            assert ends == [m.target[-1] for m in solution]
-            points = [q[6] for m in solution if m.waypoints is not None for q in m.waypoints]
-            query = 'right_1 FROM paths WHERE run_id = ? ORDER BY "order", waypoint'
-            assert of_run(query) == points
+            paths = of_run('path FROM solutions WHERE run_id = ? ORDER BY "order"')
+            points = [m.target if m.waypoints is None else m.waypoints for m in solution]
+            assert [*map(json.loads, paths)] == [each.tolist() for each in points]
 
 
 def read_values(plain_sql, run_id, query):
@@ -116,7 +116,7 @@ def read_values(plain_sql, run_id, query):
 
 def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
-    movements = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
+    movements = (Movement(1, "left", "path", edges, 3, np.array([edges / 7, edges])),)
     solution = Score(-3, "L", movements)
     first = next(iter(written[0].values()))
     outcome = replace(first.outcome, environment={"commit": {"id": "c0de", "dirty": True}})
@@ -134,9 +134,9 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
         for _ in range(2):  # the second one replaces the first
             store.write([run])
             assert len(store.ids()) == 1
-        unlike = replace(run, scores={"solution": solution, "initial": solution})
-        with pytest.raises(CoarticError, match="cannot be stored: UNIQUE"):
-            store.write([unlike])  # paths of two parts
+        unlike = replace(run, scores={"solution": solution._replace(reward=3)})
+        with pytest.raises(CoarticError, match="cannot be stored: CHECK"):
+            store.write([unlike])
     with open_store(tmp_path) as store:
         assert plain(store.run(run.id)) == plain(run)
     with closing(sqlite3.connect(tmp_path / RUNS_FILE)) as plain_sql:
@@ -285,7 +285,7 @@ def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lo
             lose(tmp_path / "out")
 
     plan = planned(ONE, **FEW)
-    with pytest.raises(CoarticError, match="out was removed, renamed or replaced while the suite"):
+    with pytest.raises(CoarticError, match="out/.* was removed, renamed or replaced while"):
         perform(plan, tmp_path / "out", executor=InProcess(2), watch=watch)
 
 
@@ -367,40 +367,39 @@ def behind_a_link(path):
     path.symlink_to(path.rename(path.with_name("elsewhere.sqlite")))
 
 
-def journal_of_several(path):
-    """SQLite would delete the file that it names."""
-    thesis = path.with_name("thesis.tex")
-    thesis.write_text("mine")
-    name = str(thesis).encode()
-    end = [len(name).to_bytes(4), sum(name).to_bytes(4), bytes.fromhex("d9d505f920a163d7")]
-    path.with_name(f"{RUNS_FILE}-journal").write_bytes(b"".join([bytes(512), name, *end]))
-
-
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
         (sql(f"PRAGMA user_version = {FORMAT + 1}"), "later version.*update coartic"),
-        (sql("PRAGMA user_version = 2"), "2.0.0 or earlier.*version 2.0.0 reads.*another --out"),
+        *(
+            (
+                sql(f"PRAGMA user_version = {n}"),
+                "3.0.0 or earlier: version 3.0.0 reads.*other --out",
+            )
+            for n in (2, FORMAT - 1)
+        ),
         (foreign, "is not a file of coartic"),
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
         (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),
         (lambda path: path.rename(path.with_name("notes.txt")), "(not|no) .*results"),
-        (sql("DROP VIEW paths"), "view paths"),
-        (sql("DROP TABLE learning"), "table learning"),
-        (sql("ALTER TABLE movements ADD COLUMN left_x"), "table movements"),
-        (
-            sql(
-                "CREATE TRIGGER t AFTER INSERT ON results BEGIN UPDATE results SET reward = -1; END"
-            ),
-            "trigger t ",
+        *(
+            (change, "its tables and views are not as coartic makes them")
+            for change in (
+                sql("DROP VIEW solutions"),
+                sql("DROP TABLE learning"),
+                sql("ALTER TABLE movements ADD COLUMN left_x"),
+                sql(
+                    "CREATE TRIGGER t AFTER INSERT ON results BEGIN "
+                    "UPDATE results SET reward = -1; END"
+                ),
+                other_reward,
+            )
         ),
-        (other_reward, "view runs is missing or is not ours"),
         (behind_a_link, "runs.sqlite is a link: name the folder that holds the file, /"),
         (lambda path: path.with_name(f"{RUNS_FILE}-wal").mkdir(), "-wal is a folder, not a file"),
-        (pointer, "is a pointer of Git LFS, not the file: `git lfs pull`"),
-        (dumped, "is a dump of a database as text: copy the file itself"),
+        (pointer, "is damaged.*a pointer of Git LFS, for which `git lfs pull`"),
+        (dumped, "is damaged.*the file itself, no dump"),
         (restored, "was restored from a dump.*copy the file itself"),
-        (journal_of_several, "-journal was not written by coartic"),
     ],
 )
 def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, words):
@@ -442,15 +441,33 @@ def read_all(folder):
 @pytest.mark.parametrize(
     "change",
     [
-        "results SET reward = -291.5",
-        "results SET reward = 1",
-        "results SET reward = NULL",
-        "results SET hands = 'RX'",
-        "results SET status = 'great'",
-        "results SET trials = -1",
-        "results SET wall_s = 9e999",
-        "results SET warm = 2",
-        "results SET run_id = randomblob(9), seed = 'x'",
+        "reward = -291.5",
+        "reward = 1",
+        "reward = NULL",
+        "hands = 'RX'",
+        "status = 'great'",
+        "trials = -1",
+        "wall_s = 9e999",
+        "warm = 2",
+        "reason = randomblob(9)",
+        "seed = 'x'",
+    ],
+)
+def test_a_value_that_no_run_can_have(undisturbed, tmp_path, change):
+    """SQLite refuses it; where it was made not to check, the check of the folder finds it."""
+    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
+    statement = f"UPDATE results SET {change} WHERE run = 0"
+    with pytest.raises(sqlite3.IntegrityError, match="CHECK"):
+        sql(statement)(tmp_path / RUNS_FILE)
+    with closing(sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)) as db:
+        db.execute("PRAGMA ignore_check_constraints = ON")
+        db.execute(statement)
+    assert "Damage: CHECK constraint failed in results." in check_runs(tmp_path).wrong
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
         "cells SET definition = '{'",
         "cells SET definition = json_set(definition, '$.radius', 0.2)",
         "cells SET defaults = '[1]'",
@@ -458,38 +475,46 @@ def read_all(folder):
         "cells SET method = 'other'",
         "cells SET trial_budget = 5",
         "environments SET content = json_set(content, '$.packages', 1)",
+        "environments SET content = 'x'",
+        "suite SET name = NULL",
         "suite SET date = NULL",
         "suite SET seed = 'x'",
         "suite SET time_limit_s = 9e999",
         "plan SET runs = -1",
         "plan SET runs = 0",
         "cells SET setting = 'x'",
-        "movements SET left_1 = 9e999",
-        "movements SET left_1 = left_1 + 0.1",
+        "movements SET path = '[Infinity]'",
+        "movements SET path = '[]'",
+        "movements SET path = 'x'",
+        f"movements SET path = {moved('$[6]', 0.1)}",
         "movements SET goal = 7",
         "movements SET ticks = 1e300",
         "movements SET ticks = ticks + 1",
         "movements SET hand = 'both'",
         "movements SET kind = 'path'",
         "learning SET rewards = 'x'",
-        f"learning SET rewards = x'{zlib.compress(bytes(4 * 21)).hex()}'",
+        f"learning SET rewards = x'{zlib.compress(bytes(4 * 22)).hex()}'",
+        f"learning SET rewards = x'{zlib.compress(bytes(7)).hex()}'",
     ],
 )
 def test_content_of_another_kind_is_one_sentence(undisturbed, tmp_path, change):
+    """Whatever cannot be read, the check of the folder finds as well, in words."""
     (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
     sql(f"UPDATE {change}")(tmp_path / RUNS_FILE)
     with pytest.raises(CoarticError) as caught:
         read_all(tmp_path)
     assert str(tmp_path) in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+    assert (wrong := check_runs(tmp_path).wrong)
+    assert not any(words in each for each in wrong for words in ("Error -3", "zlib", "object"))
 
 
 def test_a_folder_that_only_its_owner_can_put_right(tmp_path):
-    """No right to write, and then an interrupted transaction as well."""
-    for words in ("cannot use .*: attempt to write", "runs.sqlite was left .* Copy"):
-        with pytest.raises(CoarticError, match=words), explain_errors(tmp_path):
-            raise sqlite3.OperationalError("attempt to write a readonly database")
-        (tmp_path / f"{RUNS_FILE}-journal").touch()
+    error = sqlite3.OperationalError("attempt to write a readonly database")
+    error.sqlite_errorname = "SQLITE_READONLY_ROLLBACK"
+    words = "its folder cannot be written.*copy the whole folder"
+    with pytest.raises(CoarticError, match=words), explain_errors(tmp_path):
+        raise error
 
 
 def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, tmp_path):
@@ -506,5 +531,5 @@ def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, t
         open_store(tmp_path / "sick") as sick,
     ):
         whole.plan(), sick.plan()
-    assert str(caught.value).startswith(f"{tmp_path / 'sick' / RUNS_FILE} holds what")
+    assert str(caught.value).startswith(f"cannot use {tmp_path / 'sick' / RUNS_FILE}: it holds")
     assert "ove it away" not in str(caught.value)

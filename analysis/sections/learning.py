@@ -127,19 +127,17 @@ def learning_curves(study: Study) -> pd.DataFrame:
         labels = [label for _, label in keys if len(solved(study.cells[task, label]))]
         two_armed = {*LEARNERS} & {*labels} - {EC1}
         shown += [(task, label) for label in labels if not (two_armed and label == EC1)]
-    wanted = {run for key in shown for run in solved(study.cells[key]).run_id}
-    trials_of = {run: rewards for run, rewards in study.rewards() if run in wanted}
-    curves = [pd.DataFrame()]
+    learned, curves = improvements(study), [pd.DataFrame()]
     for task, label in shown:
-        good = solved(study.cells[task, label]).run_id
-        runs = [trials_of[run_id] for run_id in good if run_id in trials_of]
-        if not runs:
+        good = solved(study.cells[task, label])
+        runs = good[good.run_id.isin(learned)]
+        if runs.empty:
             continue
-        length = min(map(len, runs))
-        rewards = np.array([run[:length] for run in runs])
+        length = int(runs.trials.min())
         at = np.unique(np.round(np.geomspace(1, length, 120)).astype(np.int64))
         # Until every run has a solution (NaN before) there is no mean of them.
-        best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
+        steps = [learned[run_id] for run_id in map(str, runs.run_id)]
+        best = np.array([np.append(np.nan, b)[np.searchsorted(t, at, "right")] for t, b in steps])
         low, high = np.quantile(best, [0.25, 0.75], axis=0)
         curve = {"trial": at, "best": best.mean(axis=0), "best_low": low, "best_high": high}
         named = {"task": task, "method": label, "runs": len(runs)}

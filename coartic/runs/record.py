@@ -5,11 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -17,11 +16,13 @@ import numpy as np
 from pydantic import Field, InstanceOf
 
 from coartic.errors import SolutionError
+from coartic.internal.limits import real_array
 from coartic.learner.learning_run import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.motion.trial import compiled_task
+from coartic.robot import Array
 from coartic.runs.plan import Cell, Job
 from coartic.tasks.task import Task
 
@@ -76,8 +77,6 @@ class Outcome:
     """The reason why the run is not ok; empty if the run is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
     """Movements by part (:data:`PARTS`), still to be executed and scored."""
-    bound: int | None = None
-    """Proven reward that no solution exceeds; in runs of version 3.0.0 and earlier alone."""
     details: dict[str, Any] = field(default_factory=dict)
     """Further data that the method keeps, such as corrective movements by trial."""
     used: tuple[str, ...] = ()
@@ -186,26 +185,18 @@ class Run:
 
     @cached_property
     def result(self) -> str:
-        """Hash of status, bound, rewards of all trials, and every joint of every movement.
+        """Hash of status, every joint of every movement, and rewards of all trials.
 
         Two runs with the same outcome have the same hash, whatever time and evaluations they took.
         """
-        content: list[Any] = [self.outcome.status, self.outcome.bound, self.outcome.rewards]
-        for part in PARTS:
-            content += [[part, *movement] for movement in self.movement_data(part)]
-        return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+        movements = [[part, *each] for part in PARTS for each in self.movement_data(part)]
+        content = json.dumps([self.outcome.status, *movements]).encode()
+        return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
 
     def movement_data(self, part: str) -> list[list[Any]]:
-        """Return the movements of a part as plain data; an empty list if the run lacks the part.
-
-        SQLite drops the sign of -0.0; adding 0.0 drops the sign here as well.
-        """
-        data = []
-        for m in self.scores[part].movements if part in self.scores else ():
-            arrays = (m.target, m.waypoints)
-            places = [None if array is None else (array + 0.0).tolist() for array in arrays]
-            data.append([m.goal, m.hand, m.kind, m.ticks, *places])
-        return data
+        """Return the movements of a part as plain data (:func:`movement_data`); an empty list if
+        the run lacks the part."""
+        return [movement_data(each) for each in self.scores.get(part, Score()).movements]
 
     def to_row(self) -> dict[str, Any]:
         """Return the columns of the run in table ``results``, without the ids of other rows."""
@@ -232,7 +223,6 @@ class Run:
         outcome = Outcome(
             row["status"],
             row["reason"],
-            bound=row["proven_bound"],
             details=json.loads(row["details"]),
             used=tuple(filter(None, row["used"].split(", "))),
             meter=None if row["trials"] is None else Meter(**meter),
@@ -316,8 +306,6 @@ COLUMNS = tuple(
          "corrective movements in the last tenth"),
         ("other_arm_travel", "REAL", "solution.other_arm_travel",
          "joint travel of the arm that is not chosen, rad"),
-        ("proven_bound", "INTEGER", "outcome.bound",
-         "reward that no solution can exceed; in runs of version 3.0.0 and earlier alone"),
         ("build_s", "REAL", "counts.build_s", "seconds of setting up a solver's problems"),
         ("solve_s", "REAL", "counts.solve_s", "seconds of solving, without compiling"),
         ("wall_s", "REAL", "outcome.times.wall_s", "seconds of wall time"),
@@ -345,30 +333,51 @@ COLUMNS = tuple(
 """Columns of view ``runs``: SQL, data frames and documentation follow from this list."""
 
 
-def movements_from(
-    task: Task, rows: Iterable[Mapping[str, Any]], waypoints: Iterable[Mapping[str, Any]] = ()
-) -> tuple[Movement, ...]:
-    """Return the movements of one solution from its rows of table ``movements`` and, for movements
-    along a path, its rows of table ``waypoints``. Raises ValueError for a joint that is not a
-    finite number."""
+def movement_data(movement: Movement) -> list[Any]:
+    """Return goal, hand, kind, ticks and path of a movement as plain data: the form in which
+    workers send, hashes count and folders store movements.
 
-    def joints(row: Mapping[str, Any]) -> list[float]:
-        return [row[name] for name in task.robot.joint_names]
+    The path is JSON: the target, or the waypoints of a movement of kind ``path``. Adding 0.0 drops
+    the sign of -0.0. Raises TypeError, ValueError or AttributeError for a movement that has no such
+    form.
+    """
+    m, place = movement, movement.target
+    if m.waypoints is not None:
+        if m.kind != "path" or not (place is None or np.array_equal(place, m.waypoints[-1])):
+            raise ValueError("only a path has waypoints, and its target is the last of them")
+        place = m.waypoints
+    numbers = None if place is None else (real_array("a path", place) + 0.0).tolist()
+    text = None if numbers is None else json.dumps(numbers, separators=(",", ":"))
+    return [int(m.goal), str(m.hand), str(m.kind), m.ticks and int(m.ticks), text]
 
-    points: dict[int, list[list[float]]] = defaultdict(list)
-    for row in sorted(waypoints, key=itemgetter("waypoint")):
-        points[row["order"]].append(joints(row))
-    movements = []
-    for row in sorted(rows, key=itemgetter("order")):
-        target, path = np.array(joints(row), dtype=np.float64), None
-        if row["kind"] == "path":
-            path = np.array(points[row["order"]], dtype=np.float64).reshape(-1, len(target))
-        if not all(np.isfinite(each).all() for each in (target, path) if each is not None):
-            raise ValueError("a joint is not a finite number")
-        movements.append(
-            Movement(int(row["goal"]), row["hand"], row["kind"], target, int(row["ticks"]), path)
-        )
-    return tuple(movements)
+
+def movement_from(data: Sequence[Any]) -> Movement:
+    """Return a movement from its plain data (:func:`movement_data`). Raises TypeError, ValueError
+    or IndexError for other data."""
+    goal, hand, kind, ticks, text = data
+    place = None if text is None else real_array("a path", json.loads(text))
+    if kind == "path" and place is not None:
+        return Movement(goal, hand, kind, place[-1], ticks, place)
+    return Movement(goal, hand, kind, place, ticks)
+
+
+def reward_bytes(rewards: Sequence[int | None]) -> bytes:
+    """Return the rewards of trials as bytes, which :func:`rewards_from` reads.
+
+    The numbers are the best reward, then for each trial by how much it is worse, plus 1; 0 stands
+    for None. All lowest bytes of the numbers come first, then all next bytes: so they pack best.
+    """
+    best = max((reward for reward in rewards if reward is not None), default=0)
+    numbers = [best, *(0 if reward is None else best - reward + 1 for reward in rewards)]
+    return np.array(numbers).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
+
+
+def rewards_from(content: bytes) -> Array:
+    """Return the rewards of trials from :func:`reward_bytes`, shape ``(trials,)``; NaN stands for
+    None. Raises ValueError for other bytes."""
+    numbers = np.frombuffer(content, np.uint8).reshape(4, -1).T.copy().view("<u4").ravel()
+    best = numbers[:1].view("<i4")
+    return np.where(numbers[1:] == 0, np.nan, best + 1.0 - numbers[1:])
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:

@@ -2,10 +2,9 @@
 
 ``plan`` has a row for each cell that the last ``coartic run`` asked for; ``cells`` has these cells
 and the cells of earlier commands. ``results`` has a row for each run, ``movements`` for each
-movement of its solutions, ``waypoints`` for each waypoint of a movement that follows a path,
-``learning`` the rewards of its trials. The views ``runs``, ``solutions`` and ``paths`` show the
-runs of the plan; docs/results.md lists their columns. One process writes, a batch of finished runs
-at a time; whatever interrupts it, a batch is there whole or not at all.
+movement of its solutions, ``learning`` the rewards of its trials. The views ``runs`` and
+``solutions`` show the runs of the plan; docs/results.md lists their columns. One process writes, a
+batch of finished runs at a time; whatever interrupts it, a batch is there whole or not at all.
 """
 
 from __future__ import annotations
@@ -13,12 +12,11 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import re
 import sqlite3
 import time
 import warnings
 import zlib
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from itertools import groupby
@@ -27,85 +25,103 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
-from coartic.internal.limits import MOST_RUNS, MOST_TRIALS, check_limits
+from coartic.internal.limits import MOST_TRIALS
 from coartic.internal.text import one_line, plain
 from coartic.internal.validation import explain_inline
 from coartic.model import PAPER
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import Cell, Job, hash_of
-from coartic.runs.record import COLUMNS, PARTS, STATUSES, Run, movements_from
-from coartic.tasks.task import Task, parse_task
+from coartic.runs.record import (
+    COLUMNS,
+    PARTS,
+    STATUSES,
+    Run,
+    movement_data,
+    movement_from,
+    reward_bytes,
+    rewards_from,
+)
+from coartic.tasks.task import parse_task
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 5
+FORMAT = 6
 """Number of the format: a change of a table or of a view raises it."""
 _APPLICATION = 0x636F6172  # "coar"
-FAILED_TRIAL = -(2**31)
-"""Stored in place of the reward of a trial that did not hit every goal."""
 
 _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "boolean"}
 _DTYPES: dict[str, Any] = {
+    **dict.fromkeys(("hand", "kind", "path"), "string"),
+    **dict.fromkeys(("order", "goal", "ticks"), "Int64"),
     **{column.name: _KINDS[column.kind.split()[0]] for column in COLUMNS},
-    **dict.fromkeys(("part", "hand", "kind"), "string"),
-    **dict.fromkeys(("result_id", "order", "goal", "ticks"), "Int64"),
 }
 """Types of the columns of views in data frames; all have room for missing values."""
-_CELL, _JOB = TypeAdapter(Cell), TypeAdapter(Job)
-_JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
-_OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # end of a journal that names another file
-_STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
+_CELL = TypeAdapter(Cell)
+
+
+def _rule(name: str, kind: str) -> str:
+    """Return the condition that SQLite checks for a column of table ``results``."""
+    if kind.startswith("TEXT"):
+        letters = f" AND {name} NOT GLOB '*[^LR]*'" if name.endswith("hands") else ""
+        return f"typeof({name}) != 'blob'{letters}"
+    if kind == "BOOLEAN":
+        return f"{name} BETWEEN 0 AND 1"
+    limits = "-1e19 AND 0" if name.endswith("reward") else "0 AND 1e19"  # minus a count of ticks
+    whole = "" if kind == "REAL" else f" AND typeof({name}) != 'real'"
+    return f"{name} BETWEEN {limits}{whole}"
+
+
+_STORED = ", ".join(
+    f"{name} {kind} CHECK ({_rule(name, kind)})" for name, kind, source, _ in COLUMNS if source
+)
 _IN_VIEW = ", ".join(f'"{column.name}"' for column in COLUMNS)
-_SCHEMA = f"""
-CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
-    environment INTEGER);
-CREATE TABLE plan (position INTEGER PRIMARY KEY, cell INTEGER NOT NULL UNIQUE REFERENCES cells,
-    runs INTEGER NOT NULL);
-CREATE TABLE cells (id INTEGER PRIMARY KEY, digest TEXT NOT NULL, code TEXT NOT NULL,
+_SCHEMA = (
+    """CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
+    environment INTEGER, plan_hash TEXT)""",
+    """CREATE TABLE plan (position INTEGER PRIMARY KEY,
+    cell INTEGER NOT NULL UNIQUE REFERENCES cells, runs INTEGER NOT NULL)""",
+    """CREATE TABLE cells (id INTEGER PRIMARY KEY, digest TEXT NOT NULL, code TEXT NOT NULL,
     task TEXT NOT NULL, definition TEXT NOT NULL, method TEXT NOT NULL, title TEXT NOT NULL,
     citation TEXT NOT NULL, information TEXT NOT NULL, stochastic INTEGER NOT NULL,
     defaults TEXT NOT NULL, origin TEXT NOT NULL, parameters TEXT NOT NULL, setting TEXT NOT NULL,
-    model TEXT NOT NULL, trial_budget INTEGER, UNIQUE (digest, code));
-CREATE TABLE environments (id INTEGER PRIMARY KEY, content TEXT NOT NULL UNIQUE, commit_id TEXT,
-    packages TEXT);
-CREATE TABLE results (id INTEGER PRIMARY KEY, cell INTEGER NOT NULL REFERENCES cells,
+    model TEXT NOT NULL, trial_budget INTEGER, UNIQUE (digest, code))""",
+    """CREATE TABLE environments (id INTEGER PRIMARY KEY, content TEXT NOT NULL UNIQUE,
+    commit_id TEXT, packages TEXT)""",
+    f"""CREATE TABLE results (id INTEGER PRIMARY KEY, cell INTEGER NOT NULL REFERENCES cells,
     suite_seed INTEGER NOT NULL, environment INTEGER NOT NULL REFERENCES environments,
-    details TEXT NOT NULL, {_STORED}, UNIQUE (cell, suite_seed, run));
-CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
-    goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL, ticks INTEGER NOT NULL,
-    PRIMARY KEY (result_id, part, "order")) WITHOUT ROWID;
-CREATE TABLE waypoints (result_id INTEGER NOT NULL, "order" INTEGER NOT NULL,
-    waypoint INTEGER NOT NULL, PRIMARY KEY (result_id, "order", waypoint)) WITHOUT ROWID;
-CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
-CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method, setting,
+    details TEXT NOT NULL, {_STORED}, UNIQUE (cell, suite_seed, run),
+    CHECK (status IN {STATUSES}),
+    CHECK ((status = 'ok') = (reward IS NOT NULL) AND (status = 'ok') = (hands IS NOT NULL)))""",
+    """CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL,
+    "order" INTEGER NOT NULL, goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL,
+    ticks INTEGER NOT NULL, path TEXT NOT NULL, PRIMARY KEY (result_id, part, "order"))
+    WITHOUT ROWID""",
+    "CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL)",
+    """CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method, setting,
     information, parameters, code, commit_id AS "commit", packages
     FROM suite JOIN plan JOIN cells ON cells.id = plan.cell JOIN results
     ON results.cell = plan.cell AND suite_seed = suite.seed AND run < plan.runs
-    JOIN environments ON environments.id = results.environment;
-CREATE VIEW solved AS SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
-    FROM asked WHERE status = 'ok';
-CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run;
-CREATE VIEW solutions AS SELECT run_id, movements.* FROM asked
-    JOIN movements ON result_id = asked.id AND part = 'solution' ORDER BY position, run, "order";
-CREATE VIEW paths AS SELECT run_id, waypoints.* FROM asked
-    JOIN waypoints ON result_id = asked.id ORDER BY position, run, "order", waypoint;
-PRAGMA application_id = {_APPLICATION};
-PRAGMA user_version = {FORMAT};
-"""
+    JOIN environments ON environments.id = results.environment""",
+    f"CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run",
+    """CREATE VIEW solutions AS SELECT run_id, "order", goal, hand, kind, ticks, path
+    FROM asked JOIN movements ON result_id = asked.id AND part = 'solution'
+    ORDER BY position, run, movements."order\"""",
+)
+"""Statements that make the tables and views, each as SQLite keeps it."""
+_PLANNED = (
+    """SELECT name, seed, time_limit_s, command, date, content FROM suite
+    JOIN environments ON environments.id = environment""",
+    "SELECT * FROM plan JOIN cells ON cells.id = cell ORDER BY position",
+)
+"""Queries of all that a plan says; ``plan_hash`` is a hash of their rows."""
 
-_SURROUNDINGS: dict[str, Any] = {
-    **dict.fromkeys(("coartic", "model_code", "python", "platform", "processor", "date"), str),
-    **{"command": list, "packages": dict, "cores": int, "commit": str},
-}
-"""Types of the facts about the surroundings of a suite that reports show."""
 _LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
 WAIT_S = 1.0  # wait for another program
 _LONGEST_PATH = 500  # letters of the path of a file; SQLite adds those of its journal
@@ -157,8 +173,7 @@ class Store:
                 self._db.execute(query, latest)
                 asked = {"position": position, "cell": cell, "runs": job.numbers[-1] + 1}
                 self._insert("plan", asked)
-            robots = [job.cell.task.robot for job in plan]
-            add_joints(self._db, (name for robot in robots for name in robot.joint_names))
+            self._db.execute("UPDATE suite SET plan_hash = ?", (self._plan_hash(),))
 
     def plan(self) -> list[Job]:
         """Return the plan of the folder. Raises CoarticError if no plan is stored yet."""
@@ -166,18 +181,18 @@ class Store:
             suite = self._one("SELECT * FROM suite")
             if suite is None:
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
-            query = "SELECT * FROM plan JOIN cells ON cells.id = cell ORDER BY position"
-            tasks: dict[str, Task] = {}
-            jobs = []
-            for row in self._db.execute(query):
-                check_limits("runs", row["runs"], 1, MOST_RUNS)
-                cell = self._read_cell(row)
-                if tasks.setdefault(cell.task.name, cell.task) != cell.task:
-                    raise ValueError(f"two tasks are called {cell.task.name!r}")
-                asked = {"seed": suite["seed"], "time_limit_s": suite["time_limit_s"]}
-                asked |= {"cell": cell, "numbers": range(row["runs"]), "suite": suite["name"]}
-                jobs.append(_JOB.validate_python(asked))
-            return jobs
+            if suite["plan_hash"] != self._plan_hash():
+                raise ValueError("the plan is not as it was written")
+            return [
+                Job(
+                    self._read_cell(row),
+                    suite["seed"],
+                    range(row["runs"]),
+                    suite["time_limit_s"],
+                    suite["name"],
+                )
+                for row in self._db.execute(_PLANNED[1])
+            ]
 
     def made_with(self) -> dict[str, Any]:
         """Return versions, platform, commit, command line and date of the last ``coartic run``."""
@@ -186,12 +201,7 @@ class Store:
                 "SELECT content, command, date FROM suite JOIN environments ON id = environment"
             )
             how = {"command": json.loads(row["command"]), "date": row["date"]}
-            made_with = json.loads(row["content"]) | how
-            facts = made_with | {"commit": (made_with["commit"] or {"id": ""})["id"]}
-            for name, kind in _SURROUNDINGS.items():
-                if not isinstance(facts[name], kind):
-                    raise ValueError(f"{name} is {plain(repr(facts[name]), 80)}")
-            return dict(made_with)
+            return dict(json.loads(row["content"]) | how)
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -269,55 +279,45 @@ class Store:
             cell = self._read_cell(self._one("SELECT * FROM cells WHERE id = ?", row["cell"]))
             environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
             blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
-            movements, waypoints = (
-                self._db.execute(f"SELECT * FROM {table} WHERE result_id = ?", (row["id"],))
-                for table in ("movements", "waypoints")
-            )
-            rows: dict[str, list[Any]] = {part: [] for part in PARTS}
-            for each in movements:
-                rows[each["part"]].append(each)
-            points = waypoints.fetchall()
-            rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
+            parts: dict[str, list[Movement]] = {part: [] for part in PARTS}
+            query = """SELECT part, goal, hand, kind, ticks, path FROM movements
+                WHERE result_id = ? ORDER BY "order\""""
+            for part, *data in self._db.execute(query, (row["id"],)):
+                parts[part].append(movement_from(data))
+            rewards = unpack(blob[0], row["trials"]) if blob else np.empty(0)
             return Run.from_row(
                 row,
                 cell,
                 json.loads(environment["content"]),
-                {part: movements_from(cell.task, rows[part], points) for part in PARTS},
-                [None if reward == FAILED_TRIAL else reward for reward in rewards],
+                {part: tuple(movements) for part, movements in parts.items()},
+                [None if np.isnan(reward) else int(reward) for reward in rewards.tolist()],
             )
 
     def runs(self) -> pd.DataFrame:
         """Return view ``runs`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            return checked_runs(self._frame("runs"))
+            return self._frame("runs")
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            return self._frame("solutions").drop(columns=["result_id", "part"])
+            return self._frame("solutions")
 
-    def movements(
-        self, part: str, tasks: Mapping[str, Task], most: int
-    ) -> dict[str, tuple[Movement, ...]]:
+    def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
         """Return the movements of a part (:data:`PARTS`) of runs that are ok, by run id.
 
-        Of each cell only the first ``most`` of these runs count. ``tasks`` holds the tasks of the
-        plan by name.
+        Of each cell only the first ``most`` of these runs count.
         """
-        points: dict[str, list[Any]] = defaultdict(list)
-        of_waypoints = """SELECT run_id, waypoints.* FROM solved
-            JOIN waypoints ON result_id = solved.id WHERE place <= ?
-            ORDER BY position, run, "order", waypoint"""
-        of_movements = """SELECT run_id, task, movements.* FROM solved
+        query = """SELECT run_id, goal, hand, kind, ticks, path FROM
+            (SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
+            FROM asked WHERE status = 'ok') AS solved
             JOIN movements ON result_id = solved.id AND part = ? WHERE place <= ?
             ORDER BY position, run, "order\""""
         with explain_errors(self.folder):
-            for row in self._db.execute(of_waypoints, (most,)):
-                points[row["run_id"]].append(row)
-            rows = self._db.execute(of_movements, (part, most))
+            rows = self._db.execute(query, (part, most))
             return {
-                run_id: movements_from(tasks[name], of_run, points[run_id])
-                for (run_id, name), of_run in groupby(rows, itemgetter("run_id", "task"))
+                run_id: tuple(movement_from(row[1:]) for row in of_run)
+                for run_id, of_run in groupby(map(tuple, rows), itemgetter(0))
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
@@ -327,15 +327,14 @@ class Store:
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
         with explain_errors(self.folder):
             for run_id, blob, trials in self._db.execute(query):
-                stored = unpack(blob, trials)
-                yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
+                yield run_id, unpack(blob, trials)
 
     # Rows.
 
     def _write_run(self, run: Run) -> None:
         """Write a run into the tables, in place of an earlier run with its id."""
         if earlier := self._one("SELECT id FROM results WHERE run_id = ?", run.id):
-            for table in ("movements", "waypoints", "learning"):
+            for table in ("movements", "learning"):
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
         row = run.to_row()
@@ -343,20 +342,15 @@ class Store:
         row["environment"] = self._environment(run.outcome.environment or {})
         result = self._insert("results", row)
 
-        def joints(configuration: Array) -> dict[str, float]:
-            return dict(zip(run.cell.task.robot.joint_names, configuration.tolist(), strict=True))
-
+        names = "goal", "hand", "kind", "ticks", "path"
         for part, score in run.scores.items():
-            for order, m in enumerate(score.movements):
-                assert m.target is not None
-                place = {"result_id": result, "order": order}
-                facts = {"part": part, "goal": m.goal, "hand": m.hand, "kind": m.kind}
-                self._insert("movements", place | facts | {"ticks": m.ticks} | joints(m.target))
-                for n, point in enumerate(() if m.waypoints is None else m.waypoints):
-                    self._insert("waypoints", place | {"waypoint": n} | joints(point))
+            for order, movement in enumerate(score.movements):
+                place = {"result_id": result, "part": part, "order": order}
+                data = dict(zip(names, movement_data(movement), strict=True))
+                self._insert("movements", place | data)
         if rewards := run.outcome.rewards:
-            stored = [FAILED_TRIAL if reward is None else reward for reward in rewards]
-            blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
+            packer = zlib.compressobj(9, strategy=zlib.Z_FILTERED)
+            blob = packer.compress(reward_bytes(rewards)) + packer.flush()
             self._insert("learning", {"result_id": result, "rewards": blob})
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
@@ -375,6 +369,10 @@ class Store:
         if (cell.digest, cell.setting) != (row["digest"], row["setting"]):
             raise ValueError(f"{cell.label} on {cell.task.name} is not the cell that was run")
         return cell
+
+    def _plan_hash(self) -> str:
+        """Return the hash of all that the plan says."""
+        return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:
         """Return the id of the row of an environment; insert the row if it is missing."""
@@ -413,7 +411,7 @@ class Store:
         names = [column[0] for column in rows.description]
         frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
         with np.errstate(invalid="ignore"):  # astype refuses numbers that are too large
-            return frame.astype({name: _DTYPES.get(name, "float64") for name in names})  # joints
+            return frame.astype({name: _DTYPES[name] for name in names})
 
     def _wait_for(self, statement: str) -> None:
         """Execute a statement as soon as other programs that have the file open allow it."""
@@ -522,7 +520,10 @@ def writing(folder: Path) -> Iterator[Store]:
                 # No write-ahead log, which is unsafe on network disks and adds a file.
                 connection.execute("PRAGMA journal_mode = DELETE")
                 if not is_there:
-                    connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
+                    marks = (
+                        f"PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {FORMAT}"
+                    )
+                    connection.executescript(";\n".join(["BEGIN", *_SCHEMA, marks, "COMMIT"]))
             yield Store(folder, connection)
 
 
@@ -572,10 +573,8 @@ def connect(where: str, timeout_s: float) -> sqlite3.Connection:
 
 
 def check_files(folder: Path) -> None:
-    """Refuse a results folder whose file would make SQLite change another file.
-
-    Raises CoarticError for a link and for the journal of several databases.
-    """
+    """Raise CoarticError if a file of a results folder is a link, which would make SQLite change
+    another file, or no file."""
     for ending in ("", "-journal", "-wal", "-shm"):
         path = folder / f"{RUNS_FILE}{ending}"
         if path.is_symlink():
@@ -586,12 +585,6 @@ def check_files(folder: Path) -> None:
             raise CoarticError(
                 f"{path} is {kind}, not a file: move it away, or name another folder"
             )
-        # After a rollback SQLite deletes the file that such a journal names.
-        if ending == "-journal" and path.exists() and path.stat().st_size >= len(_OF_SEVERAL):
-            with path.open("rb") as file:
-                file.seek(-len(_OF_SEVERAL), os.SEEK_END)
-                if file.read() == _OF_SEVERAL:
-                    raise CoarticError(f"{path} was not written by coartic, and names another file")
 
 
 def has_tables(connection: sqlite3.Connection) -> bool:
@@ -601,58 +594,36 @@ def has_tables(connection: sqlite3.Connection) -> bool:
     triggers, which change what is written. Raises CoarticError for any other file, and ValueError
     for a row that names a missing row: no view would show its run.
     """
-
-    def schema(of: sqlite3.Connection) -> set[tuple[str, str, str]]:
-        rows = of.execute("SELECT type, name, sql FROM sqlite_master")
-        return {(kind, name, " ".join((sql or "").split())) for kind, name, sql in rows}
-
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
-    there = schema(connection)
+    there = [*map(tuple, connection.execute("SELECT type, sql FROM sqlite_master"))]
     if application != _APPLICATION:
-        if {"cells", "results"} <= {name for _, name, _ in there}:
-            raise CoarticError(
-                "it was restored from a dump, which keeps neither whose file it is nor its format: "
-                "copy the file itself"
-            )
         if there:
-            raise CoarticError("it is not a file of coartic; move it away")
+            raise CoarticError(
+                "it is not a file of coartic, or was restored from a dump: move it away, or copy "
+                "the file itself"
+            )
         return False
     if version > FORMAT:
         raise CoarticError("it was written by a later version of coartic: update coartic")
     if version < FORMAT:
         raise CoarticError(
-            "it was written by coartic 2.0.0 or earlier; version 2.0.0 reads it. Run the suite "
-            "again with another --out"
+            "it was written by coartic 3.0.0 or earlier: version 3.0.0 reads it, or says which "
+            "version does. Run the suite again with another --out"
         )
-    with closing(sqlite3.connect(":memory:")) as ours:
-        ours.executescript(_SCHEMA)
-        columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]
-        add_joints(ours, filter(_JOINT.fullmatch, columns))
-        triggers = {entry for entry in there if entry[0] == "trigger"}
-        for kind, name, _ in sorted((schema(ours) - there) | triggers):
-            raise CoarticError(
-                f"it is not as coartic makes it: {kind} {plain(name, 80)} is missing or is not "
-                "ours. Restore a copy, or run the suite again with another --out."
-            )
+    if any(kind == "trigger" for kind, _ in there) or {*_SCHEMA} - {sql for _, sql in there}:
+        raise CoarticError(
+            "its tables and views are not as coartic makes them. Restore a copy, or run the suite "
+            "again with another --out."
+        )
     for table, row, missing, _ in connection.execute("PRAGMA foreign_key_check"):
         raise ValueError(f"row {row} of {table} names a row of {missing} that is not there")
     return True
 
 
-def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
-    """Add a column for each of these joints that has no column yet."""
-    names = list(dict.fromkeys(names))
-    for table in ("movements", "waypoints"):
-        there = {column[1] for column in connection.execute(f"PRAGMA table_info({table})")}
-        for name in names:
-            if name not in there:
-                connection.execute(f"ALTER TABLE {table} ADD COLUMN {name} REAL")
-
-
 UNREADABLE = (
     *(OSError, sqlite3.DatabaseError, zlib.error),
-    *(ValueError, KeyError, TypeError, OverflowError, RecursionError),
+    *(ValueError, LookupError, TypeError, OverflowError, RecursionError),
 )
 """Errors that a file raises that cannot be used, or whose content coartic did not write."""
 
@@ -667,40 +638,44 @@ def explain_errors(folder: Path) -> Iterator[None]:
         raise CoarticError(explain(folder / RUNS_FILE, error)) from None
 
 
+_BUSY = "another program has it open: close it there, or wait for it"
+_DAMAGED = (
+    "it is damaged. Move it away and repeat the `coartic run` command, or restore a copy: the file "
+    "itself, no dump, nor a pointer of Git LFS, for which `git lfs pull` brings the file"
+)
+_WORDS = {
+    "SQLITE_BUSY": _BUSY,
+    "SQLITE_LOCKED": _BUSY,
+    "SQLITE_READONLY": "it or its folder cannot be written. If a `coartic run` was interrupted "
+    "there, copy the whole folder, and use the copy",
+    "SQLITE_READONLY_DBMOVED": "it was removed, renamed or replaced while the suite ran: put it "
+    "back, or repeat the command to start again",
+    "SQLITE_CORRUPT": _DAMAGED,
+    "SQLITE_NOTADB": _DAMAGED,
+}
+"""Sentences by SQLite's names of errors, or by the first two words of the names."""
+
+
 def explain(path: Path, error: Exception) -> str:
-    """Return a sentence on a file that cannot be used, with advice if SQLite cannot read it."""
+    """Return a sentence on a file that cannot be used."""
+    said = plain(str(error), 200) or type(error).__name__
     if isinstance(error, CoarticError):
         said = one_line(str(error))
-        return said if str(path.parent) in said else f"{path}: {said}"
-    if isinstance(error, OSError):
-        return f"cannot use {plain(str(error.filename or path))}: {error.strerror or error}"
-    kind, is_text = getattr(error, "sqlite_errorname", ""), "decode to UTF-8" in str(error)
-    if isinstance(error, sqlite3.OperationalError) and not is_text:
-        if kind == "SQLITE_READONLY_DBMOVED":
-            return (
-                f"{path.parent} was removed, renamed or replaced while the suite ran: put it back, "
-                "or repeat the command to start again"
-            )
-        if kind.startswith(_LOCKED):
-            return f"another program has {path} open; close it there, or wait for it"
-        if "readonly" in str(error) and path.with_name(f"{path.name}-journal").exists():
-            return (
-                f"{path} was left in the middle of writing, and cannot be put right, since the "
-                "folder cannot be written. Copy the whole folder, and use the copy."
-            )
-        if kind.startswith("SQLITE_CANTOPEN"):
-            return f"cannot use {path}: {why_not_opened(path) or error}"
-        return f"cannot use {path}: {error}"
-    wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
-    wrong = plain(wrong, 200) or type(error).__name__
-    if kind == "SQLITE_NOTADB" and (what := what_it_is(path)):
-        return f"{path} is {what}"
-    if type(error) is sqlite3.DatabaseError or is_text:  # malformed, no database, or no UTF-8
-        return (
-            f"{path} is damaged ({wrong}). Move it away and repeat the `coartic run` command, or "
-            "restore a copy."
-        )
-    return f"{path} holds what coartic does not write ({wrong})"
+        if str(path.parent) in said:
+            return said
+    elif isinstance(error, OSError):
+        path, said = Path(error.filename or path), error.strerror or said
+    elif isinstance(error, sqlite3.Error):
+        name = getattr(error, "sqlite_errorname", "")
+        said = _WORDS.get(name, _WORDS.get("_".join(name.split("_")[:2]), said))
+        if name.startswith("SQLITE_CANTOPEN"):
+            said = why_not_opened(path) or said
+        if "decode to UTF-8" in said:
+            said = _DAMAGED
+    else:
+        wrong = explain_inline(error, []) if isinstance(error, ValidationError) else said
+        said = f"it holds what coartic does not write ({plain(wrong, 200)})"
+    return f"cannot use {plain(str(path))}: {said}"
 
 
 def why_not_opened(path: Path) -> str:
@@ -716,46 +691,17 @@ def why_not_opened(path: Path) -> str:
     return ""
 
 
-def what_it_is(path: Path) -> str:
-    """Return what a file is that is no database, with what to do; empty for any other file."""
-    with path.open("rb") as file:
-        begins = file.read(40).lstrip()
-    if begins.startswith(b"version https://git-lfs"):
-        return "a pointer of Git LFS, not the file: `git lfs pull` brings the file"
-    if begins.startswith((b"PRAGMA", b"BEGIN TRANSACTION")):
-        return "a dump of a database as text: copy the file itself"
-    return ""
+def unpack(blob: bytes, trials: int | None) -> Array:
+    """Return the rewards of the trials of a run from table ``learning``, shape ``(trials,)``; NaN
+    stands for a trial that failed or whose reward is not kept.
 
-
-def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:
-    """Return the stored rewards of a run, shape ``(trials,)``: :data:`FAILED_TRIAL` stands for a
-    trial that failed or whose reward is not kept.
-
-    Raises ValueError for more rewards than trials.
+    Raises ValueError for damaged rewards, and for more rewards than trials.
     """
-    size = 4 * min(trials or 0, MOST_TRIALS)
-    content = zlib.decompressobj().decompress(blob, size + 1)
-    if len(content) > size:
-        raise ValueError(f"there are more rewards than {trials} trials")
-    return np.frombuffer(content, dtype="<i4")
-
-
-def checked_runs(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return view ``runs`` unchanged. Raises ValueError for a value that no run can have."""
-    solved = runs.status == "ok"
-    rules = {"status": runs.status.isin(STATUSES)}
-    for name in ("reward", "hands"):
-        rules[name] = runs[name].notna() == solved
-    for name in ("hands", "replay_hands", "initial_hands"):
-        rules[f"letters of {name}"] = runs[name].fillna("L").str.fullmatch("[LR]+")
-    for name, kind, *_ in COLUMNS:
-        if "NOT NULL" in kind:
-            rules[f"lack of {name}"] = runs[name].notna()
-        if kind.startswith(("INTEGER", "REAL")):
-            is_reward = name.endswith("reward") or name == "proven_bound"  # minus a count of ticks
-            size = runs[name].fillna(0) * (-1 if is_reward else 1)
-            rules[f"size of {name}"] = (size >= 0) & (size < np.inf)
-    for name, holds in rules.items():
-        if not holds.all():
-            raise ValueError(f"run {runs.run_id[~holds].iloc[0]}: {name}")
-    return runs
+    size = 4 * (1 + min(trials or 0, MOST_TRIALS))
+    try:
+        content = zlib.decompressobj().decompress(blob, size + 1)
+        if len(content) > size:
+            raise ValueError
+        return rewards_from(content)
+    except (zlib.error, ValueError, TypeError):
+        raise ValueError(f"the rewards of {trials} trials are damaged") from None

@@ -56,7 +56,7 @@ def row(method, reward, *, task="two-armed-1", run=0, setting="", **more):
         "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
         "warm": run > 0, "together": 1,
         "solution_corrections": 0, "early_corrections": 30, "late_corrections": 20,
-        "other_arm_travel": 0.0, "proven_bound": None, **more,
+        "other_arm_travel": 0.0, **more,
     }  # fmt: skip
 
 
@@ -80,7 +80,7 @@ def declared(method, deterministic=()):
 def study_of(rows, tasks=(), *, deterministic=(), **parts):
     """A study of rows of runs, with parts made up; tasks that are not given are loaded by name."""
     runs = pd.DataFrame(rows).reset_index(drop=True)
-    runs = runs.astype({"reward": "Int64", "proven_bound": "Int64"})
+    runs = runs.astype({"reward": "Int64"})
     by_name, plan = {task.name: task for task in tasks}, []
     for name, method, setting in runs.groupby(["task", "method", "setting"], sort=False).groups:
         parameters = dict(item.split("=") for item in setting.split(", ") if item)

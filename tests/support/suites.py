@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from coartic import load_task
+from coartic.analysis import verify
 from coartic.analysis.study import load
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
@@ -105,6 +106,20 @@ def edit(folder, statement, *values):
     with closing(sqlite3.connect(folder / RUNS_FILE)) as database:
         assert database.execute(statement, values).rowcount
         database.commit()
+
+
+def moved(joint, by):
+    """SQL of the path of straight movements with a joint moved; joints are ``$[0]``, ``$[1]``..."""
+    new = f"json_set(path, '{joint}', json_extract(path, '{joint}') + {by})"
+    return f"CASE kind WHEN 'path' THEN path ELSE {new} END"
+
+
+def edit_plan(folder, statement, *values):
+    """A change of a plan by hand, as if coartic had written it so."""
+    edit(folder, statement, *values)
+    with closing(sqlite3.connect(folder / RUNS_FILE)) as database:
+        rows = [[*row] for query in verify.PLANNED for row in database.execute(query)]
+    edit(folder, "UPDATE suite SET plan_hash = ?", verify.hash_of(rows))
 
 
 def same_results(a, b):
