@@ -13,10 +13,18 @@ from pydantic import BeforeValidator, Field, PlainValidator, ValidationError
 
 from coartic import CoarticError, Task, builtin_tasks, load_task
 from coartic.benchmarks.registry import Registry, methods_named, registry
-from coartic.benchmarks.suites import WILDCARD, Suite, TaskNamed, check_kind, load_suite, tasks_of
+from coartic.benchmarks.suites import (
+    WILDCARD,
+    Seconds,
+    Suite,
+    TaskNamed,
+    Trials,
+    check_kind,
+    load_suite,
+    tasks_of,
+)
 from coartic.internal.limits import (
     MOST_CELLS,
-    MOST_SECONDS,
     MOST_SEED,
     MOST_TRIALS,
     number_or_range,
@@ -39,7 +47,8 @@ def task_or_name(value: Any) -> Task | str:
 def runs_asked(value: Any) -> int | range | None:
     """Return a number of runs, a range of runs, or None."""
     try:
-        return None if value is None else number_or_range("runs", value, "range(50, 100)")
+        example = "range(50, 100), or 50..99 in a command"
+        return None if value is None else number_or_range("runs", value, example)
     except ValueError as error:
         raise error_saying(str(error)) from None
 
@@ -69,16 +78,14 @@ class Request(FileData):
     runs: Annotated[Any, PlainValidator(runs_asked)] = None
     """Number of runs of each cell; by default the number of the suite. A range such as
     ``range(50, 100)`` is a part of the runs, for a job of an array."""
-    trials: Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True), _plain] | None = None
+    trials: Annotated[Trials, _plain] | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
     suite."""
     seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True), _plain] = 0
     """Seed of the suite."""
-    time_limit_s: Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True), _plain] | None = (
-        None
-    )
+    time_limit_s: Annotated[Seconds, _plain] | None = None
     """CPU time of a run, s; by default the limit of the suite."""
-    trial_budget: Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True), _plain] | None = None
+    trial_budget: Annotated[Trials, _plain] | None = None
     """Most physical trials of a run, whatever its method."""
 
 

@@ -43,6 +43,9 @@ def plain_value(value: Any) -> Value:
     raise PydanticCustomError("scalar", "{text}", {"text": problem})
 
 
+Runs = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
+Trials = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
+Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
 _Value = Annotated[Value, PlainValidator(plain_value)]
 _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
@@ -70,7 +73,7 @@ class Block(FileData):
     """True to free the base in x and y on every task."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
     """Numbers of goals: the block has only tasks with so many; by default all."""
-    runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
+    runs: Runs | None = None
     """Runs of each method on each task; by default the number of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
     """Parameters of the methods, by name."""
@@ -102,11 +105,11 @@ class Suite(FileData):
     """Title in lists and reports."""
     description: Line
     """Sentence in lists and reports."""
-    runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)]
+    runs: Runs
     """Runs of each stochastic method on each task; other methods are run once."""
-    trials: Annotated[int, Field(gt=0, le=MOST_TRIALS, strict=True)] | None = None
+    trials: Trials | None = None
     """Trials of a run, for methods that have this parameter."""
-    time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
+    time_limit_s: Seconds | None = 600.0
     """CPU time of a job, s: of one run, or of runs that are performed side by side."""
     blocks: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
     """Blocks of tasks and methods: tables ``[[blocks]]``."""

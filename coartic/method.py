@@ -185,9 +185,9 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     """Plain data to be stored with the solution. Never its score."""
     initial: tuple[Movement, ...] = ()
-    """Movements of a learner's first trial, if it hit every goal. None follows a path."""
+    """Movements of a learner's first trial, if it hit every goal."""
     replay: tuple[Movement, ...] = ()
-    """Movements of a learner's noiseless greedy trial after learning. None follows a path."""
+    """Movements of a learner's noiseless greedy trial after learning."""
 
 
 class Outline(NamedTuple):

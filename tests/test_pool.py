@@ -107,12 +107,6 @@ HANDLED = {
     "two_ends": ("way = Movement(1, 'right', 'path', session.q0 + 1, waypoints=[session.q0])\n"
                  "        return Result((way, *corrected(session)[1:]))",
                  "solver-failed", "its target is the last of them"),
-    "paths": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
-              "        return Result(corrected(session), initial=way)",
-              "solver-failed", "movements in 'initial' follow a path"),
-    "paths_in_replay": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
-                        "        return Result(corrected(session), replay=way)",
-                        "solver-failed", "movements in 'replay' follow a path"),
     "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
              "solver-failed", "returned no solution"),
     "spends": ("for _ in range(2): session.spend(gradients=2**62)",

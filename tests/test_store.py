@@ -120,7 +120,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     solution = Score(-3, "L", movements)
     first = next(iter(written[0].values()))
     outcome = replace(first.outcome, environment={"commit": {"id": "c0de", "dirty": True}})
-    run = replace(first, scores={"solution": solution}, outcome=outcome)
+    run = replace(first, scores={"solution": solution, "replay": solution}, outcome=outcome)
 
     def some():
         yield run

@@ -35,7 +35,7 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER
-from coartic.cli.arguments import runs_read
+from coartic.cli.arguments import value_in
 from coartic.internal.text import RENAMED, did_you_mean
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
 from coartic.tasks.task import TASK_FOLDER
@@ -307,7 +307,7 @@ def test_a_renamed_method_is_known_by_its_present_id():
         (["run", "paper", "--jobs", "0"], "--jobs is 0; it must be a whole number from 1"),
         (
             ["run", "paper", "--time-limit", "0"],
-            "--time-limit is 0; it must be a number from 0.001",
+            "--time-limit is 0; it should be at least 0.001",
         ),
         (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
         (["animate", "0", "--width", "1.5"], "--width is 1.5; it must be a whole number from 200"),
@@ -443,6 +443,6 @@ def test_advice_about_instances_and_their_families_is_taken(tmp_path):
         plan_suite("paper", family_files=[family])
     advice = str(caught.value).rpartition("such as ")[2]
     assert len(plan_suite("paper", family_files=[family], tasks=[advice], methods=["EC4"])) == 10
-    with pytest.raises(CoarticError, match=r"or a range, such as 50\.\.99"):
-        runs_read("x")
-    assert runs_read("50..99") == range(50, 100)
+    with pytest.raises(CoarticError, match=r"such as range\(50, 100\), or 50\.\.99 in a command"):
+        plan_suite("paper", runs="x")
+    assert value_in("50..99") == range(50, 100)

@@ -15,7 +15,7 @@ import typer
 
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.limits import check_limits, number_or_range
+from coartic.internal.limits import check_limits
 from coartic.internal.text import did_you_mean, unknown
 
 if TYPE_CHECKING:
@@ -48,10 +48,7 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
     int. Reading any other value raises CoarticError."""
 
     def read(text: str) -> Any:
-        value: Any = text
-        for kind in (float, int):
-            with suppress(ValueError):
-                value = kind(text)
+        value = value_in(text)
         try:
             check_limits(option, value, least, most)
         except ValueError as error:
@@ -61,19 +58,30 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
     return typer.Option(option, parser=read, metavar=unit, help=what)
 
 
-def runs_read(text: str) -> int | range:
-    """Return the number of runs that an option names, or the range of runs, such as ``50..99``.
-
-    Raises CoarticError for any other text.
-    """
-    ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", text)
+def value_in(text: str) -> Any:
+    """Return the number that an option names, or the range, such as ``50..99``; any other text is
+    returned unchanged."""
+    ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", str(text))  # a default is no text
     value: Any = range(int(ends[1]), int(ends[2]) + 1) if ends else text
-    with suppress(ValueError):
-        value = int(text)
-    try:
-        return number_or_range("--runs", value, "50..99")
-    except ValueError as error:
-        raise CoarticError(str(error)) from None
+    for kind in (float, int):
+        with suppress(ValueError):
+            value = kind(text)
+    return value
+
+
+def asked(name: str, what: str, unit: str = "N") -> Any:
+    """Return an option for a field of a request that holds a number, and is checked by it."""
+    option = f"--{name.removesuffix('_s').replace('_', '-')}"
+
+    def read(text: str) -> Any:
+        from coartic.benchmarks.planning import request_for
+
+        try:
+            return getattr(request_for(**{name: value_in(text)}), name)
+        except CoarticError as error:
+            raise CoarticError(str(error).replace(name, option, 1)) from None
+
+    return typer.Option(option, parser=read, metavar=unit, help=what)
 
 
 def names_in(text: str | None) -> list[str]:

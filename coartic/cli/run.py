@@ -16,7 +16,6 @@ from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
-from coartic.internal.limits import MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.internal.text import counted, one_line, unknown
 from coartic.internal.threads import MOST_JOBS
 
@@ -43,15 +42,9 @@ def run(
     ] = None,
     runs: Annotated[
         Any,
-        typer.Option(
-            parser=given.runs_read,
-            metavar="N",
-            help="Runs of each method on each task, or a part of them, such as 50..99.",
-        ),
+        given.asked("runs", "Runs of each method on each task, or a part of them, such as 50..99."),
     ] = None,
-    trials: Annotated[
-        int | None, given.within("--trials", "Trials of each run.", 1, MOST_TRIALS)
-    ] = None,
+    trials: Annotated[Any, given.asked("trials", "Trials of each run.")] = None,
     jobs: Annotated[
         int | None, given.within("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
     ] = None,
@@ -65,14 +58,12 @@ def run(
     family_file: Annotated[
         list[Path] | None, given.option("FILE", "A family of your own (TOML).")
     ] = None,
-    seed: Annotated[int, given.within("--seed", "Seed of the suite.", 0, MOST_SEED)] = 0,
-    time_limit: Annotated[
-        float | None,
-        given.within("--time-limit", "Most CPU time of a run.", 1e-3, MOST_SECONDS, "SECONDS"),
+    seed: Annotated[Any, given.asked("seed", "Seed of the suite.")] = 0,
+    time_limit_s: Annotated[
+        Any, given.asked("time_limit_s", "Most CPU time of a run.", "SECONDS")
     ] = None,
     trial_budget: Annotated[
-        int | None,
-        given.within("--trial-budget", "Most trials that a run may make.", 1, MOST_TRIALS),
+        Any, given.asked("trial_budget", "Most trials that a run may make.")
     ] = None,
     scheduler: Annotated[
         str | None, given.option("ADDRESS", "Dask scheduler to use instead of this machine.")
@@ -102,7 +93,7 @@ def run(
         methods=names,
         family_files=family_file or (),
         **{"runs": runs, "trials": trials, "seed": seed},
-        **{"time_limit_s": time_limit, "trial_budget": trial_budget},
+        **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
     )
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
