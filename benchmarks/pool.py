@@ -34,6 +34,7 @@ from typing import Any
 
 from coartic.benchmarks.worker import answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import write_atomically
 from coartic.internal.interruption import blocked_signals
 from coartic.internal.text import error_line, plain
@@ -70,6 +71,7 @@ class Local:
     what methods print and log, and their tracebacks.
     """
 
+    @checked_arguments
     def __init__(self, jobs: int = -1, *, timeout_s: float = 60.0, verbose: bool = False) -> None:
         self.workers = threads_for(jobs)
         self.timeout_s = timeout_s

@@ -17,13 +17,14 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from coartic.internal.limits import refuse_mask
+from coartic.internal.arguments import checked_arguments
+from coartic.internal.limits import real_array
 from coartic.robot import Array
 
 CONFIDENCE = 0.95
@@ -32,6 +33,8 @@ TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
 """The quantiles that such an interval lies between."""
 LEVEL = 0.05
 """Level of a test."""
+Resamples = Annotated[int, 1, 10_000_000]
+"""Number of resamples."""
 RESAMPLES = 9_999
 """With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
 SEED = 0
@@ -77,8 +80,7 @@ def vector(values: ArrayLike) -> Array:
 
     Runs without a solution have no reward: the caller decides what becomes of them.
     """
-    refuse_mask("a sample", values)
-    sample = np.asarray(values, dtype=np.float64)
+    sample = real_array("a sample", values)
     if sample.ndim != 1 or sample.size == 0 or not np.isfinite(sample).all():
         raise ValueError("a sample is a vector of at least one value, all of them finite")
     return sample
@@ -101,7 +103,8 @@ def centred(values: Array) -> Array:
     return np.where(varies(values), values - values.mean(axis=0), 0.0)
 
 
-def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
+@checked_arguments
+def mean(values: ArrayLike, *, resamples: Resamples = RESAMPLES) -> Estimate:
     """Mean with its interval, as :func:`bootstrap_estimate` makes it."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
@@ -111,8 +114,9 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
     return bootstrap_estimate((np.array(values),), np.mean, resamples)
 
 
+@checked_arguments
 def difference_of_means(
-    first: ArrayLike, second: ArrayLike, *, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples."""
 
@@ -122,10 +126,11 @@ def difference_of_means(
     return bootstrap_estimate((vector(first), vector(second)), difference, resamples)
 
 
+@checked_arguments
 def bootstrap_estimate(
     samples: tuple[Array, ...],
     statistic: Callable[..., Any],
-    resamples: int = RESAMPLES,
+    resamples: Resamples = RESAMPLES,
 ) -> Estimate:
     """A statistic of one or more independent samples with its BCa interval.
 
@@ -138,6 +143,9 @@ def bootstrap_estimate(
     - a sample of more than :data:`LARGE` values, or one for which BCa is not defined: the
       percentile interval.
     """
+    if not samples:
+        raise ValueError("needed is a sample at least")
+    samples = tuple(map(vector, samples))
     value, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
     if min(n) < FEWEST:
         return Estimate(value, n=n)
