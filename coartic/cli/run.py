@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -159,8 +160,13 @@ def list_(
     """List tasks, suites and methods, or describe one of them."""
     from coartic.benchmarks.registry import registry
 
-    registered = registry(method_file or [], with_code=False)
-    say_pairs(overview(registered) if name is None else describe(name, registered))
+    registered, methods = registry(method_file or [], with_code=False), list[str]()
+    pairs = overview(registered) if name is None else describe(name, registered)
+    if name is not None:
+        with suppress(CoarticError):  # no method
+            methods = given.methods_meant([name], registered)
+        given.check_used(method_file, registered, methods)
+    say_pairs(pairs)
 
 
 def overview(registered: Registry) -> Iterator[tuple[str, str]]:
@@ -276,6 +282,7 @@ def reproduce(
     name, outcome, solution = cell.method.name, run.outcome, run.solution
     if name not in registered:
         raise CoarticError(f"unknown method {name!r}: pass --method-file FILE")
+    given.check_used(method_file, registered, [name])
     result = f"{outcome.status}: {outcome.reason}"
     if solution.reward is not None:
         result = f"reward {number(solution.reward)}, hands {solution.hands}"
@@ -326,9 +333,12 @@ def check(
     registered = registry(method_file or [])
     if subject.endswith(".toml"):
         check_kind(subject, "task")
+        if verbose:
+            raise CoarticError("--verbose has no effect: it shows what a method prints")
         broken = show_laws(subject, check_task_file(Path(subject), registered))
     else:
         names = given.methods_meant([subject], registered)
+        given.check_used(method_file, registered, names)
         broken = sum(
             show_laws(name, check_method(registered[name], verbose=verbose)) for name in names
         )
