@@ -18,7 +18,9 @@ from matplotlib.figure import Figure
 import coartic
 from coartic import (
     CoarticError,
+    ExplorationCondition,
     Movement,
+    Provenance,
     Robot,
     Task,
     analysis,
@@ -519,6 +521,16 @@ def test_all_functions_are_called_wrongly():
         (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), "p_values has masked entries"),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
         (lambda: interval({}, "gap"), "the row has no gap, gap_low, gap_high"),
+        (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
+        (
+            lambda: Task(goals=[(3.0, 2.0)], q0=TASK.q0 * np.nan),
+            "Task: q0 is .*; needed are finite",
+        ),
+        (lambda: Robot(*[(1.0,)] * 9), "Robot: .*; it takes 5 arguments"),
+        (
+            lambda: ExplorationCondition("x", ("left",), True, False, "none", direction="stay"),
+            "^ExplorationCondition: direction is 'stay', which nothing goes by",
+        ),
         (lambda: judge(), "judge: missing a required argument: 'claims'"),
     ],
 )

@@ -108,16 +108,24 @@ def run(
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    perform_and_say(plan(chosen, request, registered), out, include or [], jobs, scheduler)
+    jobs_asked, is_part = plan(chosen, request, registered), isinstance(runs, range)
+    perform_and_say(jobs_asked, out, include or [], jobs, scheduler, is_part=is_part)
 
 
 def perform_and_say(
-    plan: Sequence[Job], out: Path, include: Sequence[str], jobs: int | None, scheduler: str | None
+    plan: Sequence[Job],
+    out: Path,
+    include: Sequence[str],
+    jobs: int | None,
+    scheduler: str | None,
+    *,
+    is_part: bool = False,
 ) -> None:
     """Perform the missing runs of a plan and print the findings; exit with code 1 if a run crashed.
 
     ``include`` names folders whose runs are copied into folder ``out`` first. Runs are performed by
-    a Dask scheduler, or by this machine with ``jobs`` processes.
+    a Dask scheduler, or by this machine with ``jobs`` processes. Of a part of the runs there are no
+    findings.
     """
     from coartic.analysis.study import load
     from coartic.benchmarks.cluster import Dask
@@ -140,7 +148,7 @@ def perform_and_say(
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(plan, out, executor=executor, watch=display.update)
     say(str(progress))
-    if any(job.numbers[0] for job in plan):
+    if is_part:
         part = f"{out} has a part of the runs: --include {out}, with all other parts, joins them"
         say_pairs([("Next", part)])
         sys.exit(1 if progress.crashed else 0)

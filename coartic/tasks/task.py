@@ -224,6 +224,8 @@ class Task(FileData):
             raise error_saying(str(error)) from None
         if q.shape != (robot.dof,):
             raise error_saying(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
+        if not np.isfinite(q).all():
+            raise error_saying(f"q0 is {brief_value(q.tolist())}; needed are finite numbers")
         left, right = (tuple(q[robot.joints(hand)].tolist()) for hand in HANDS)
         content["start"] = Start(base=tuple(q[:2].tolist()), left=left, right=right)
         return content
