@@ -17,18 +17,24 @@ from __future__ import annotations
 
 import math
 from statistics import mode
+from typing import Annotated
 
 import numpy as np
 
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study, solved
+from coartic.internal.arguments import checked_arguments
+from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
 
+Runs = Annotated[int, 1, MOST_RUNS]
+"""Number of runs of a cell."""
 LEAST_SHARE = 0.1
 """Share of a method's runs that a hand sequence has at least where it is compared."""
 
 
+@checked_arguments
 def with_control(
     study: Study, signature: str, task: str, label: str
 ) -> dict[str, tuple[Array, Array]]:
@@ -87,6 +93,7 @@ def most_trials(study: Study, task: str, label: str) -> float:
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
+@checked_arguments
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     """Return the excess of a method's signature over random search on a task: the mean over the
     runs of the method with whose hands random search has runs; NaN without any."""
@@ -101,6 +108,7 @@ def selects(study: Study, label: str) -> bool:
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
+@checked_arguments
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
     """Return all runs of random search, as many trials as the method's, that hit the same goal in
     the same two contexts; None for a method that selects nothing, and without such runs.
@@ -124,7 +132,8 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     return pair if pair.in_both else None
 
 
-def control_suite(study: Study, *, runs: int = 20) -> str:
+@checked_arguments
+def control_suite(study: Study, *, runs: Runs = 20) -> str:
     """Return a suite of random search for the hands with which methods end that have no control.
 
     Run it with the folder of the study included, and all signatures have a control.

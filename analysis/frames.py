@@ -26,8 +26,9 @@ from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
-from coartic.internal.limits import brief_value
-from coartic.internal.text import counted
+from coartic.internal.arguments import checked_arguments
+from coartic.internal.limits import brief_value, real_array
+from coartic.internal.text import counted, plain
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
@@ -53,9 +54,9 @@ def checked(
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
     wanted = [*dict.fromkeys((*names, *others, *numbers))]
     if missing := [name for name in wanted if name not in frame.columns]:
-        raise CoarticError(f"the frame has no column {', '.join(missing)}")
+        raise CoarticError(f"the frame has no column {', '.join(map(shown, missing))}")
     if several := [name for name in wanted if [*frame.columns].count(name) > 1]:
-        raise CoarticError(f"the frame has column {several[0]} twice: leave one of them out")
+        raise CoarticError(f"the frame has column {shown(several[0])} twice: leave one of them out")
     if not len(frame):
         raise CoarticError("the frame has no rows")
     columns = frame[wanted].copy()
@@ -73,6 +74,11 @@ def checked(
         columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
         refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
     return columns
+
+
+def shown(name: object) -> str:
+    """Return the name of a column as one printable line."""
+    return plain(str(name))
 
 
 def names_given(what: str, names: str | Sequence[str]) -> list[str]:
@@ -95,7 +101,7 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
         raise CoarticError(
-            f"column {column} has {brief_value(value)} in row {brief_value(row)}: {needed}"
+            f"column {shown(column)} has {brief_value(value)} in row {brief_value(row)}: {needed}"
         )
 
 
@@ -248,7 +254,9 @@ def means(
     if not by:
         raise CoarticError("by is empty: needed are names of columns")
     if both := [name for name in columns if name in by]:
-        raise CoarticError(f"column {both[0]} is in by and in columns: needed is one of both")
+        raise CoarticError(
+            f"column {shown(both[0])} is in by and in columns: needed is one of both"
+        )
     values, rows = checked(frame, numbers=columns, others=by), []
     for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
@@ -404,7 +412,7 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
     reach = np.empty(0)
     with suppress(TypeError, ValueError):  # no numbers
-        reach = np.asarray(targets, dtype=np.float64)
+        reach = real_array("targets", targets)
     if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach < _LARGEST_GAP)).all():
         raise CoarticError(
             f"targets are {brief_value(targets)}: needed are gaps, shares of the best known reward "
@@ -425,6 +433,7 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["method", "trials", "share"])
 
 
+@checked_arguments
 def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     """Return recorded trials, of people for instance, as solutions for signatures.
 

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from coartic import CoarticError, Task
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value
 from coartic.internal.toml_files import refuse_foreign
 from coartic.motion.movement import LARGEST_ENTRY
@@ -24,6 +25,7 @@ MOST_TRIALS = 100_000
 """Largest number of a trial."""
 
 
+@checked_arguments
 def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> pd.DataFrame:
     """Read recorded trials: a CSV file with a row for each hit.
 

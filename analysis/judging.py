@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -21,8 +21,8 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.words import capital, estimate, p_value
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import real_array
-from coartic.internal.text import unknown
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""
@@ -86,6 +86,7 @@ def tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimat
     )
 
 
+@checked_arguments
 def mean_beyond(
     sentence: str, values: ArrayLike, bound: float = 0.0, side: Side = "greater"
 ) -> Finding:
@@ -120,8 +121,6 @@ def mean_beyond(
     >>> finding.holds, finding.evidence
     (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
     """
-    if side not in get_args(Side):
-        raise CoarticError(unknown("side", str(side), get_args(Side)))
     there = real_array("values", values)
     there = there[~np.isnan(there)]
     if len(there) < FEWEST:
@@ -133,6 +132,7 @@ def mean_beyond(
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
 
+@checked_arguments
 def all_of(*findings: Finding) -> Finding:
     """Join findings that a claim needs together.
 
@@ -173,6 +173,7 @@ def all_of(*findings: Finding) -> Finding:
     )
 
 
+@checked_arguments
 def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     """Judge the claims of a study, with their tests corrected over each other (Holm).
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from coartic import Task
 from coartic.analysis.methods import SEARCHES
 from coartic.analysis.solutions import initial_solution
+from coartic.internal.arguments import checked_arguments
 from coartic.robot import Array
 from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
@@ -32,6 +33,7 @@ class BestKnown(KnownOptimum):
     """True if no reward is shipped and no search for the optimum has a solution."""
 
 
+@checked_arguments
 def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown]:
     """Return the best known reward of each task, from shipped rewards and all runs of a folder.
 

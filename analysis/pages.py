@@ -9,19 +9,25 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from coartic.analysis.words import interval, listed, number, p_value
+from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PAGE = "README.md.jinja"
+"""Name of the template of a study's page."""
 
+
+@checked_arguments
 def write_study(
-    folder: Path, tables: dict[str, pd.DataFrame], draw: Callable[[pd.DataFrame], Figure]
+    folder: str | Path, tables: dict[str, pd.DataFrame], draw: Callable[[pd.DataFrame], Figure]
 ) -> None:
     """Write tables, figure and page of a study into its folder.
 
     Parameters
     ----------
-    folder : pathlib.Path
+    folder : str or pathlib.Path
         The study's folder. Its ``README.md.jinja`` is filled in from all CSV files of the folder,
         each a table of the file's name, as :func:`fill_page` says.
     tables : dict
@@ -40,20 +46,26 @@ def write_study(
     """
     from coartic.analysis.figures import picture
 
+    folder = Path(folder)
+    if not (folder / PAGE).is_file():
+        raise CoarticError(f"{folder} is no folder of a study: it has no {PAGE}")
     for name, table in tables.items():
         table.to_csv(folder / f"{name}.csv", float_format="%.6g")
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in folder.glob("*.csv")}
+    if "results" not in stored:
+        raise CoarticError(f"{folder} has no results.csv: give a table 'results'")
     (folder / "figure.svg").write_bytes(picture(draw(stored["results"]), ".svg"))
-    page = fill_page(folder / "README.md.jinja", **stored)
+    page = fill_page(folder / PAGE, **stored)
     (folder / "README.md").write_text(page, encoding="utf-8")
 
 
-def fill_page(template: Path, **values: Any) -> str:
+@checked_arguments
+def fill_page(template: str | Path, **values: Any) -> str:
     """Fill in a page.
 
     Parameters
     ----------
-    template : pathlib.Path
+    template : str or pathlib.Path
         A Jinja template. It can call ``interval(row, column, digits, scale)``, which writes ``7.8
         [7.3, 8.1]``, and ``expect(holds, what)``, use the filters ``number``, ``p_value`` and
         ``listed``, and include templates of the same folder.
@@ -73,6 +85,10 @@ def fill_page(template: Path, **values: Any) -> str:
         The template uses an unknown name.
     """
     import jinja2
+
+    template = Path(template)
+    if not template.is_file():
+        raise CoarticError(f"there is no file {template}")
 
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(template.parent),

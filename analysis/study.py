@@ -13,11 +13,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
-from pandas.api.types import is_hashable
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.method_frame import methods_of
@@ -28,12 +27,12 @@ from coartic.analysis.optima import (
     initial_reward,
     restrictions,
 )
-from coartic.analysis.signatures.measures import SIGNATURES
+from coartic.analysis.signatures.measures import signature_named
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
+from coartic.internal.arguments import checker_of
 from coartic.internal.files import folder_named
-from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.motion.trial import ranked_sequences
@@ -73,6 +72,8 @@ def typical_run(runs: pd.DataFrame) -> str:
 
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
+Part = Literal["solution", "replay"]
+"""Part of a run that can be executed."""
 MOST_EXECUTED = 500
 """Most runs of a method on a task for which signatures are computed."""
 
@@ -89,15 +90,16 @@ def cached(
 ) -> Callable[Concatenate[Study, Asked], Computed]:
     """Make a function of a study keep its result for each study and its other arguments.
 
-    The function raises CoarticError for an object that is no study.
+    The function raises CoarticError for an object that is no study, and for an argument of another
+    kind than its hint says.
     """
+    check = checker_of(function)
 
     @wraps(function)
     def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
         check_study(study)
+        check(study, *args, **named)
         key = function, args, tuple(named.items())
-        if wrong := [each for each in (*args, *named.values()) if not is_hashable(each)]:
-            raise CoarticError(f"{function.__name__} takes names, not {brief_value(wrong[0])}")
         if key not in study._computed:
             study._computed[key] = function(study, *args, **named)
         result: Computed = study._computed[key]
@@ -366,19 +368,17 @@ class Study:
             By the index of :attr:`runs`; NaN for runs without the signature, and for runs after the
             first 500 of a method on a task.
         """
-        if not is_hashable(name) or name not in SIGNATURES:
-            raise CoarticError(unknown("signature", name, SIGNATURES))
-        values = pd.Series(np.nan, self.runs.index, name=name)
+        signature, values = signature_named(name), pd.Series(np.nan, self.runs.index, name=name)
         for key, runs in self.cells.items():
             executed = self.executed(*key, replay=replay)
             here = runs.index[runs.run_id.isin(executed.run_ids)]
-            values[here] = SIGNATURES[name].each(executed)
+            values[here] = signature.each(executed)
         return values
 
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
         """Return a signature of the runs of a method on a task that have it, shape ``(n,)``."""
-        return SIGNATURES[name].of(self.executed(task, method, replay=replay))
+        return signature_named(name).of(self.executed(task, method, replay=replay))
 
     @cached
     def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
@@ -388,13 +388,13 @@ class Study:
         choice of hands itself, is of all hand sequences together, ``""``.
         """
         executed = self.executed(task, method)
-        values = SIGNATURES[name].each(executed)
+        values = signature_named(name).each(executed)
         hands = np.array(["" if name == "hand" else run.hands for run in executed.runs])
         there = np.isfinite(values)
         return {str(each): values[there & (hands == each)] for each in np.unique(hands[there])}
 
     @cached
-    def movements(self, part: str = "solution") -> dict[str, tuple[Movement, ...]]:
+    def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` of executed runs, by run id."""
         with open_results(self.folder) as store:
             return store.movements(part, MOST_EXECUTED)

@@ -7,15 +7,21 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from coartic import Task
     from coartic.estimates import Estimate
 
 _LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
+Digits = Annotated[int, 0, 30]
+"""Number of decimals."""
 NONE = "–"
 """Text of a missing value."""
 MOST_NAMED = 3
@@ -54,7 +60,8 @@ def id_of(function: Callable[..., Any]) -> str:
     return function.__name__.partition("_")[2].replace("_", "-")
 
 
-def number(value: float, digits: int | None = None) -> str:
+@checked_arguments
+def number(value: float, digits: Digits | None = None) -> str:
     """Write a number, with a true minus and spaces between thousands; a dash for NaN.
 
     ``digits``: decimals; by default integers are whole and others have three figures.
@@ -107,8 +114,13 @@ def estimate(value: Estimate, digits: int | None = None) -> str:
     return f"{number(value.value, digits)} {in_brackets(value.low, value.high, digits)}".strip()
 
 
+@checked_arguments
 def interval(
-    row: Mapping[Any, Any], column: str, digits: int = 1, scale: float = 1.0, unit: str = ""
+    row: Mapping[Any, Any] | pd.Series,
+    column: str,
+    digits: Digits = 1,
+    scale: float = 1.0,
+    unit: str = "",
 ) -> str:
     """Write a number of a table with its interval.
 
@@ -135,7 +147,10 @@ def interval(
     >>> interval({"gap": 0.078, "gap_low": 0.073, "gap_high": 0.081}, "gap", scale=100, unit=" %")
     '7.8 % [7.3, 8.1]'
     """
-    value, low, high = (scale * float(row[f"{column}{end}"]) for end in ("", "_low", "_high"))
+    names = [f"{column}{end}" for end in ("", "_low", "_high")]
+    if missing := [name for name in names if name not in getattr(row, "keys", tuple)()]:
+        raise CoarticError(f"the row has no {', '.join(missing)}")
+    value, low, high = (scale * float(row[name]) for name in names)
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 

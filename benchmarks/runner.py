@@ -19,7 +19,7 @@ from typing import Any
 
 from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.pool import Local
+from coartic.benchmarks.pool import WAITED, Local
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.reproduce import doubts_of
 from coartic.benchmarks.scoring import score
@@ -170,7 +170,8 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    An interruption keeps finished runs; the next call performs the missing runs. Of each method of
+    An interruption keeps finished runs; the next call performs the missing runs, also those that
+    waited without computing, of which it warns. Of each method of
     a file, a run is made again after a run with another seed; if the results differ, or targets
     may be meant in degrees, it warns.
 
@@ -221,6 +222,10 @@ def perform(
                     if len(runs) > 1:  # a failure may come from other runs of the job
                         alone += [run.job for run in runs if run.outcome.status not in _SURE]
                         runs = [run for run in runs if run.outcome.status in _SURE]
+                    for run in runs:
+                        if run.outcome.reason.endswith(WAITED):
+                            warnings.warn(waited(run), stacklevel=2)
+                    runs = [run for run in runs if not run.outcome.reason.endswith(WAITED)]
                     store.write(runs)
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
@@ -232,6 +237,15 @@ def perform(
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
+
+
+def waited(run: Run) -> str:
+    """Return a sentence on a run that waited and is not kept."""
+    name, task = run.cell.label, run.cell.task.name
+    return (
+        f"run {run.number} of {name} on {task}: {run.outcome.reason}, so it is not kept. Repeat "
+        "the command, on a machine with less to do"
+    )
 
 
 def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:

@@ -15,6 +15,7 @@ from pydantic import Field, PlainValidator, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from coartic import CoarticError, Task, builtin_tasks, parse_task
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_TRIALS, brief_value
 from coartic.internal.text import Line, unknown
 from coartic.internal.toml_files import read_toml
@@ -155,6 +156,7 @@ def suites() -> dict[str, Suite]:
     return {path.stem: read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
+@checked_arguments
 def load_suite(name: str) -> Suite:
     """Return a shipped suite by name, or read a suite file (``.toml``).
 

@@ -16,13 +16,14 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from coartic.internal.limits import refuse_mask
+from coartic.internal.arguments import checked_arguments
+from coartic.internal.limits import real_array
 from coartic.robot import Array
 
 CONFIDENCE = 0.95
@@ -31,6 +32,8 @@ TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
 """The quantiles that such an interval lies between."""
 LEVEL = 0.05
 """Level of a test."""
+Resamples = Annotated[int, 1, 10_000_000]
+"""Number of resamples."""
 RESAMPLES = 9_999
 """With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
 SEED = 0
@@ -76,8 +79,7 @@ def vector(values: ArrayLike) -> Array:
 
     Runs without a solution have no reward: the caller decides what becomes of them.
     """
-    refuse_mask("a sample", values)
-    sample = np.asarray(values, dtype=np.float64)
+    sample = real_array("a sample", values)
     if sample.ndim != 1 or sample.size == 0 or not np.isfinite(sample).all():
         raise ValueError("a sample is a vector of at least one value, all of them finite")
     return sample
@@ -100,7 +102,8 @@ def centred(values: Array) -> Array:
     return np.where(varies(values), values - values.mean(axis=0), 0.0)
 
 
-def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
+@checked_arguments
+def mean(values: ArrayLike, *, resamples: Resamples = RESAMPLES) -> Estimate:
     """Mean with its interval, as :func:`mean_of_means` makes it."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
@@ -110,15 +113,17 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
     return mean_of_means([np.array(values)], [1.0], resamples)
 
 
+@checked_arguments
 def difference_of_means(
-    first: ArrayLike, second: ArrayLike, *, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples."""
     return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
 
 
+@checked_arguments
 def mean_of_means(
-    samples: Sequence[Array], weights: Sequence[float], resamples: int = RESAMPLES
+    samples: Sequence[Array], weights: Sequence[float], resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """A weighted sum of the means of independent samples, with its BCa interval.
 
@@ -130,6 +135,8 @@ def mean_of_means(
     - a sample of more than :data:`LARGE` values, or one for which BCa is not defined: the
       percentile interval.
     """
+    if not samples:
+        raise ValueError("needed is a sample at least")
     parts = [*zip(samples, weights, strict=True)]
     value = float(sum(weight * sample.mean() for sample, weight in parts))
     n = tuple(map(len, samples))

@@ -460,6 +460,7 @@ def score(
         no policy, or an agent that was trained in another wrapper.
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
     given = (known_env(env) if isinstance(env, str) else options_of(env)) | options
     if given.get("task") in [*shipped_families()]:  # a Task has no hash
         given = {"split": "test", **given}

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUN_SEED, check_limits, real_array
 from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
@@ -670,6 +671,7 @@ MODULES = (
 """Modules of the built-in methods, each with a list ``METHODS``."""
 
 
+@checked_arguments
 def run_method(
     method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
 ) -> tuple[Result, Session]:

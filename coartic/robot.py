@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
-from coartic.internal.limits import real_array
+from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
 from coartic.internal.validation import in_sentences
 
@@ -235,7 +235,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape, or there is no such hand.
+            ``q`` has another shape or is not finite, or there is no such hand.
 
         Notes
         -----
@@ -262,7 +262,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape, or there is no such hand.
+            ``q`` has another shape or is not finite, or there is no such hand.
         """
         xs, ys = self._numpy_chain(self._configuration(q), hand)
         return np.stack([np.stack(xs, axis=-1), np.stack(ys, axis=-1)], axis=-1)
@@ -286,7 +286,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape, or there is no such hand.
+            ``q`` has another shape or is not finite, or there is no such hand.
         """
         return self.linearised(q, hand)[1]
 
@@ -302,7 +302,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape than ``(..., dof)``, or there is no such hand.
+            ``q`` has another shape than ``(..., dof)`` or is not finite, or there is no such hand.
         """
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
@@ -330,7 +330,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape.
+            ``q`` has another shape or is not finite.
         """
         array = self._configuration(q)
         half = np.array(self.drawn_base) / 2
@@ -360,6 +360,8 @@ class Robot:
             raise ValueError(
                 f"configuration has shape {array.shape}; this robot needs (..., {self.dof})"
             )
+        if not np.isfinite(array).all():
+            raise ValueError(f"configuration {brief_value(array.tolist())} is not finite")
         return array
 
     def _numpy_chain(self, q: Array, hand: Hand) -> tuple[list[Any], list[Any]]:

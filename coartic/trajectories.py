@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import SolutionError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import check_limits
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel
@@ -163,7 +164,10 @@ class Trajectory:
         axes.set_title(f"{self.task.name}: {self.execution.hands}, reward −{-self.reward}")
         return figure
 
-    def animate(self, path: str | Path, *, width: int = 560, replace: bool = False) -> None:
+    @checked_arguments
+    def animate(
+        self, path: str | Path, *, width: Annotated[int, 200, 3840] = 560, replace: bool = False
+    ) -> None:
         """Write a film of the movement.
 
         Parameters

@@ -1,6 +1,7 @@
 """The command line as a user meets it."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -23,7 +24,18 @@ from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session
 from tests.support.strategies import metres_task, tiny_task
-from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, cell_on, edit, edit_plan, moved
+from tests.support.suites import (
+    BROKEN,
+    KNOWN,
+    ROOT,
+    InProcess,
+    cell_on,
+    edit,
+    edit_plan,
+    moved,
+    paper_cells,
+    run_and_write,
+)
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
@@ -504,3 +516,67 @@ def test_files_of_other_programs_are_refused_in_every_command(coartic, command):
     code, _, error = coartic(*command.split(), "arm.urdf")
     assert code == 2
     assert "arm.urdf: coartic reads no .urdf file; a task is a TOML file" in error
+
+
+OPTIONS = {
+    "play --out": ("play --no-open", "play --no-open --out a.html"),
+    "play --replace": ("play --no-open", "play --no-open --replace"),
+    "list --method-file": ("list", "list --method-file mine.py"),
+    "list EC1 --method-file": ("list EC1", "list EC1 --method-file mine.py"),
+    "list paper --method-file": ("list paper", "list paper --method-file mine.py"),
+    "list nearest-hand --method-file": ("list EC1", "list nearest-hand --method-file mine.py"),
+    "report --for-paper": ("report out", "report out --for-paper"),
+    "report --out": ("report out", "report out --out elsewhere"),
+    "animate --in": ("animate {run} --in out", "animate {run} --in nowhere"),
+    "animate --initial --out": ("animate {run} --in out --out b.gif",
+                          "animate {run} --in out --out b.gif --replace --initial"),
+    "animate --width": ("animate {run} --in out --out c.gif",
+                        "animate {run} --in out --out d.gif --width 300"),
+    "animate --replace": ("animate {run} --in out --out b.gif",
+                          "animate {run} --in out --out b.gif --replace"),
+    "reproduce --in": ("reproduce {run} --in out", "reproduce {run} --in nowhere"),
+    "reproduce --method-file": ("reproduce {run} --in out",
+                                "reproduce {run} --in out --method-file mine.py"),
+    "verify --again": ("verify out", "verify out --again 1"),
+    "verify --method-file": ("verify out", "verify out --method-file mine.py"),
+    "verify --again --method-file": ("verify out --again 1",
+                                     "verify out --again 1 --method-file mine.py"),
+    "new --out": ("new a-search", "new a-search --out b.py"),
+    "new --replace": ("new a-search", "new a-search --replace"),
+    "check --method-file": ("check corrective-alone/given",
+                            "check corrective-alone/given --method-file mine.py"),
+    "check --verbose": ("check task.toml", "check task.toml --verbose"),
+    "draw --out": ("draw ascending --out e.svg", "draw ascending --out f.svg"),
+    "draw --replace": ("draw ascending --out e.svg", "draw ascending --out e.svg --replace"),
+    "draw folder --replace": ("draw ascending --out g", "draw ascending --out g --replace"),
+    "cite --analysis": ("cite", "cite --analysis"),
+}  # fmt: skip
+REFUSED = {
+    *("play --replace", "list EC1 --method-file", "list paper --method-file", "check --verbose"),
+    *("reproduce --method-file", "verify --method-file", "verify --again --method-file"),
+    *("check --method-file", "draw folder --replace"),
+}
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_each_option_changes_what_a_command_does_or_is_refused(coartic, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    study = run_and_write(tmp_path / "out", paper_cells(tasks=["ascending"]), runs=1, trials=5)
+    Path("mine.py").write_text(
+        (ROOT / "tests" / "methods" / "nearest_hand.py").read_text("utf-8"), "utf-8"
+    )
+    Path("task.toml").write_text(TASK_FILE.read_text("utf-8"), "utf-8")
+    for name, (plain, changed) in OPTIONS.items():
+        said = []
+        for words in (plain, changed):
+            code, text, error = coartic(*words.format(run=study.runs.run_id[0][:8]).split())
+            films = [path.stat().st_size for path in Path().glob("b.gif")]
+            said.append((code, re.sub("in [0-9]+ s", "", text), error, films))
+        assert said[0] != said[1], name
+        assert ("has no effect" in said[1][2]) == (name in REFUSED), (name, said[1])
+        assert said[1][0] == 2 or name not in REFUSED
+    tried = {f"{name.split()[0]} {word}" for name in OPTIONS for word in name.split()[1:]}
+    for command, known in get_command(app).commands.items():
+        for option in known.params:
+            if command != "run" and option.opts[0] not in (option.name, "--help", "--open"):
+                assert {f"{command} {each}" for each in option.opts} & tried, option.opts

@@ -5,7 +5,7 @@ import pytest
 
 import coartic
 from coartic import Movement, SolutionError, execute, load_task
-from coartic.analysis import mean, mean_beyond, other_tasks
+from coartic.analysis import mean, other_tasks
 from coartic.motion.solution import movements_of
 from coartic.runs.record import movement_data
 from tests.support.strategies import make_trials
@@ -34,19 +34,11 @@ DOORS = {
     "a path": lambda: execute(
         TASK, [Movement(n, "right", "path", waypoints=[MASKED]) for n in range(1, 5)]
     ),
-    "a tick by tick": lambda: coartic.trajectory(
-        TASK, [Movement(n, "right", "planned", MASKED) for n in range(1, 5)]
-    ),
     "trials": lambda: make_trials(TASK, "RRRR", np.ma.masked_equal(np.zeros((1, 4, 10)), 0.0)),
     "lists of trials": lambda: make_trials(TASK, "RRRR", [[MASKED] * 4]),
-    "a hand's place": lambda: TASK.robot.forward_kinematics(MASKED, "right"),
-    "a Jacobian": lambda: TASK.robot.jacobian(MASKED, "right"),
     "a movement": lambda: coartic.move(TASK.robot, TASK.q0, MASKED, "right", (5, 1), 0.1),
-    "a correction": lambda: coartic.correct(TASK.robot, MASKED, "right", (5, 1)),
     "a stored movement": lambda: movement_data(Movement(1, "right", "planned", MASKED)),
-    "a mean": lambda: mean(MASKED),
     "a masked number": lambda: mean([1.0, 2.0, np.ma.masked]),
-    "a mean over tasks": lambda: mean_beyond("{}", MASKED),
     "a mean over instances": lambda: other_tasks({"family": [MASKED]}),
 }
 

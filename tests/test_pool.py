@@ -14,6 +14,7 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
+from coartic.benchmarks import pool
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
@@ -57,7 +58,6 @@ class Again(Does):
 """
 HONEST = -319  # what these movements are worth
 HANDLED = {
-    "hangs": ("time.sleep(999)", "crashed", "wall time limit of 1.4 s exceeded twice: it waited"),
     "hangs_once": ("if not os.path.exists(__file__ + '.slept'):\n"
                    "            open(__file__ + '.slept', 'w').close()\n"
                    "            time.sleep(999)\n"
@@ -142,10 +142,10 @@ def folder(tmp_path_factory):
     def make(folder):
         folder.mkdir()
         does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-        hangs, once, *others = [cell_on(task, does, what=name) for name in HANDLED]
+        once, *others = [cell_on(task, does, what=name) for name in HANDLED]
         others += [cell_on(task, again), cell_on(task, KNOWN["corrective-alone/given"])]
         for name, cells, timeout_s, limit_s in (
-            ("hangs", [hangs, once], 0.5, 0.3),
+            ("hangs", [once], 0.5, 0.3),
             ("others", others, 600.0, 0.5),
         ):
             run_and_write(
@@ -172,8 +172,22 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.reason.isprintable()
     died = name in ("exits", "quits_well", "is_killed", "removes_its_folder")
     assert run.isna().wall_s == (died or "CPU" in words)
-    assert run.isna().cpu_s == (died or "wall" in words)
+    assert run.isna().cpu_s == died
     assert run.isna().reward if status != "ok" else run.reward == HONEST
+
+
+def test_a_run_that_waits_is_no_result_and_is_performed_again(tmp_path):
+    body = """if not os.path.exists(__file__ + '.ready'):
+            time.sleep(999)
+        return Result(corrected(session))"""
+    does, _ = entries(tmp_path, [("waits", body)])
+    cells, local = [cell_on(load_task("ascending"), does, what="waits")], Local(1, timeout_s=0.5)
+    options = {"executor": local, "runs": 1, "time_limit_s": 0.3}
+    words = "run 0 of test/does what=waits on ascending: wall time limit of 1.4 s exceeded twice"
+    with pytest.warns(UserWarning, match=words), pytest.raises(CoarticError, match="has 0 of 1"):
+        run_and_write(tmp_path / "out", cells, **options)
+    (tmp_path / "mine.py.ready").touch()
+    assert run_and_write(tmp_path / "out", cells, **options).runs.status.tolist() == ["ok"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test chooses the core of processes")
@@ -304,6 +318,15 @@ def test_a_process_that_cannot_begin_says_what_ended_and_blames_no_file(
     monkeypatch.setattr("coartic.benchmarks.method_files.start_process", fails)
     with pytest.raises(CoarticError, match=f"mine.py is not read: .*{words}"):
         entries(tmp_path, [("honest", "pass")])
+
+
+@pytest.mark.parametrize("allowed", [8, 14, 63])
+def test_too_few_open_files_get_a_sentence_before_a_process_begins(tmp_path, monkeypatch, allowed):
+    monkeypatch.setattr(pool, "files_allowed", lambda: allowed)
+    with pytest.raises(CoarticError, match="mine.py is not read: .*after `ulimit -n 1024`"):
+        entries(tmp_path, [("honest", "pass")])
+    with pytest.raises(CoarticError, match="Too many open files"):
+        list(Local(1).perform(planned([cell_on(load_task("ascending"), KNOWN["hill-climbing"])])))
 
 
 def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):

@@ -1,11 +1,13 @@
 """What a user writes wrong gets one sentence, with the key and what would be right."""
 
 import ast
+import inspect
 import itertools
 import os
 import re
 import traceback
 from functools import partial
+from inspect import isfunction
 from pathlib import Path
 
 import numpy as np
@@ -13,24 +15,60 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+import coartic
 from coartic import (
     CoarticError,
+    ExplorationCondition,
     Movement,
+    Provenance,
     Robot,
     Task,
+    analysis,
     builtin_tasks,
     correct,
     corrective_trial,
     execute,
+    hand_sequences,
+    initial_hands,
     learn,
+    learn_many,
     load_task,
     move,
     movements_of,
+    objective,
+    parse_task,
+    problems,
     trajectory,
 )
-from coartic.analysis import ecdf, means, ranking
+from coartic.analysis import (
+    beyond_p,
+    by_task,
+    ecdf,
+    fill_page,
+    gaps,
+    interval,
+    judge,
+    load,
+    mean,
+    mean_beyond,
+    means,
+    number,
+    other_tasks,
+    ranking,
+    read_hits,
+    shares,
+    solutions_of,
+    write_study,
+)
 from coartic.analysis.figures import picture
 from coartic.analysis.sections import FIGURES, TABLES
+from coartic.analysis.signatures.context_tests import posture_difference_below
+from coartic.analysis.statistics.hypotheses import (
+    bootstrap_test,
+    holm,
+    share_test,
+    sign_flip_test,
+)
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
@@ -339,12 +377,17 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
     assert not [*tmp_path.iterdir()]
 
 
+MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
+    *(-3, np.inf, np.full(10, np.nan), pd.NA, {"a": 1}, MASKED, Path("x"), [True, 1.0]),
 )
 TASK, ROBOT = load_task("ascending"), Robot()
 TRIAL = corrective_trial(TASK, "RRR")
+PATH = trajectory(TASK, TRIAL.movements)
+FOUND = mean_beyond("{}", [1.0, 2.0, 3.0])
+GROUPS = [np.eye(3, 10), np.eye(4, 10)]
 FRAME = pd.DataFrame({"method": "a", "task": "t", "reward": [-300.0], "best_known": -292,
                       "run": 0, "trials": 5})  # fmt: skip
 CALLS = (
@@ -366,7 +409,50 @@ CALLS = (
     (correct, {"robot": ROBOT, "q": TASK.q0, "hand": "right", "goal": (3.0, 2.0)}),
     (move, {"robot": ROBOT, "q": TASK.q0, "target": TASK.q0, "hand": "right",
             "goal": (3.0, 2.0), "radius": 0.1}),
+    (ROBOT.base_outline, {"q": TASK.q0}),
+    (hand_sequences, {"task": TASK, "hands": ["right"]}),
+    (initial_hands, {"task": TASK, "hands": ["right"]}),
+    (learn_many, {"task": TASK, "condition": "EC1", "seeds": [0], "trials": 3, "jobs": 1}),
+    (objective, {"task": TASK, "hands": "RRR", "half_width": 1.0, "budget": 5}),
+    (problems, {"family": "long/v1", "split": "test", "count": 1}),
+    (parse_task, {"content": {"goals": [[3.0, 2.0]]}, "source": "x", "reach": True}),
+    (PATH.animate, {"path": ".gif", "width": 200, "replace": True}),
+    *((function, {"frame": FRAME}) for function in (gaps, shares, by_task)),
+    (mean, {"values": [1.0, 2.0, 3.0], "resamples": 99}),
+    (mean_beyond, {"sentence": "{}", "values": [1.0, 2.0, 3.0], "bound": 0.0, "side": "less"}),
+    (judge, {"claims": {"a": ("x", "y", FOUND)}}),
+    (number, {"value": 1.5, "digits": 2}),
+    (interval, {"row": {"a": 1.0, "a_low": 0.0, "a_high": 2.0}, "column": "a", "digits": 1,
+                "scale": 1.0, "unit": ""}),
+    (other_tasks, {"scores": {"a": [np.array([1.0, 2.0])]}}),
+    (beyond_p, {"method": GROUPS, "other": GROUPS, "rng": np.random.default_rng(0),
+                "resamples": 99}),
+    (posture_difference_below, {"first": GROUPS[0], "second": GROUPS[1], "bound": 1.0,
+                                "rng": np.random.default_rng(0), "resamples": 99}),
+    (holm, {"p_values": [0.1, 0.2], "family": 2}),
+    (bootstrap_test, {"first": [1.0, 2.0], "second": 0.0, "alternative": "less", "resamples": 99}),
+    (sign_flip_test, {"differences": [1.0, 2.0]}),
+    (share_test, {"count": 3, "total": 5, "share": 0.5, "alternative": "greater"}),
+    (write_study, {"folder": "nowhere", "tables": {}, "draw": lambda results: Figure()}),
+    (fill_page, {"template": "nowhere.jinja"}),
+    (read_hits, {"path": "nowhere.csv", "task": TASK, "ticks_per_unit": 1.0}),
+    (solutions_of, {"task": TASK, "hits": FRAME}),
+    (load, {"folder": "nowhere"}),
 )  # fmt: skip
+CELL = {"task": "two-armed-1", "method": "EC4"}
+OF_STUDY = {
+    **{name: {**CELL, "replay": False} for name in ("executed", "configurations")},
+    "signature": {"name": "first", "replay": False},
+    "signature_of": {"name": "first", **CELL, "replay": False},
+    "signature_by_hands": {"name": "first", **CELL},
+    "sequences": {"task": "two-armed-1"},
+    "movements": {"part": "solution"},
+    **{name: {"signature": "first", "task": "two-armed-1", "label": "dual-process/EC4"}
+       for name in ("mean_excess", "with_control")},
+    "control_suite": {"runs": 2},
+    "contexts_of_control": {"contexts": None},
+    "runtimes": {"targets": [0.5]},
+}  # fmt: skip
 
 
 def refused_by_us(call):
@@ -390,10 +476,67 @@ def is_ours(error):
 @pytest.mark.parametrize(("call", "usual"), CALLS)
 def test_no_wrong_argument_gets_an_error_of_python(call, usual):
     """A movement's fields are arguments, too."""
-    call(**usual)
+    assert refused_by_us(partial(call, **usual))[0]
+    hints = inspect.signature(call).parameters
     for name, value in itertools.product(usual, ODD):
         ours, words = refused_by_us(partial(call, **usual | {name: value}))
         assert ours, (name, value, words)
+        if value is MASKED and name in hints:
+            is_array = re.search("Array|Config|Sequence.float", str(hints[name].annotation))
+            assert words or not is_array, name
+
+
+@pytest.mark.parametrize("name", OF_STUDY)
+def test_no_wrong_question_to_a_study_gets_an_error_of_python(name, traced):
+    usual = OF_STUDY[name]
+    call = getattr(traced, name, None) or partial(getattr(analysis, name), traced)
+    for argument, value in itertools.product(usual, ODD):
+        ours, words = refused_by_us(partial(call, **usual | {argument: value}))
+        assert ours, (argument, value, words)
+        assert words or value in (True, 3, [1]), (argument, value)
+
+
+def test_all_functions_are_called_wrongly():
+    called = {call.__name__ for call, _ in CALLS} | {*OF_STUDY, "all_of", "builtin_tasks"}
+    for package in (coartic, analysis):
+        functions = [each for each in package.__all__ if isfunction(getattr(package, each))]
+        assert {*functions} <= called
+    for wrong in (1, None, FOUND.evidence):
+        with pytest.raises(CoarticError, match="needed is Finding"):
+            analysis.all_of(wrong)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: mean([1.0, 2.0], resamples=-1), "resamples is -1; it must be a whole number"),
+        (lambda: mean([1.0, 2.0], resamples=np.nan), "resamples is nan; it must be a whole"),
+        (lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)), "goal has True; needed are real"),
+        (lambda: parse_task({}, np.inf), "source is inf; needed is a text"),
+        (lambda: parse_task({}, source=5, reach=1), "source is 5"),
+        (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
+        (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
+        (lambda: Movement(1, "right", "planned", MASKED), "target has masked entries"),
+        (lambda: Movement(1, "right", "path", waypoints=[MASKED]), "waypoints has masked"),
+        (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), "p_values has masked entries"),
+        (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
+        (lambda: interval({}, "gap"), "the row has no gap, gap_low, gap_high"),
+        (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
+        (
+            lambda: Task(goals=[(3.0, 2.0)], q0=TASK.q0 * np.nan),
+            "Task: q0 is .*; needed are finite",
+        ),
+        (lambda: Robot(*[(1.0,)] * 9), "Robot: .*; it takes 5 arguments"),
+        (
+            lambda: ExplorationCondition("x", ("left",), True, False, "none", direction="stay"),
+            "^ExplorationCondition: direction is 'stay', which nothing goes by",
+        ),
+        (lambda: judge(), "judge: missing a required argument: 'claims'"),
+    ],
+)
+def test_what_was_taken_silently_or_badly_has_a_sentence(call, words):
+    with pytest.raises((CoarticError, ValueError, TypeError), match=words):
+        call()
 
 
 @pytest.mark.parametrize("field", ["goal", "hand", "kind", "target", "waypoints"])

@@ -18,6 +18,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
 from coartic.internal.threads import environment
@@ -93,6 +94,7 @@ def spoken(rows: pd.DataFrame, template: str) -> str:
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 
+@checked_arguments
 def picture(drawing: Figure, ending: str) -> bytes:
     """Return a figure as the bytes of a file with this ending, one of :data:`FORMATS`.
 

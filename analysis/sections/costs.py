@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from coartic.analysis.study import Study, cached, load, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.errors import CoarticError
 from coartic.estimates import Estimate
-from coartic.internal.limits import brief_value
+from coartic.internal.limits import brief_value, real_array
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
@@ -173,7 +174,9 @@ def runtimes(
         reward above the reward of the corrective process alone.
     """
     study = results if isinstance(results, Study) else load(results)
-    shares = np.asarray(targets, dtype=np.float64)
+    shares = np.empty(0)
+    with suppress(ValueError):  # no numbers, or masked
+        shares = real_array("targets", targets)
     if shares.ndim != 1 or not shares.size or not ((shares > 0) & (shares <= 1)).all():
         raise CoarticError(
             f"targets are {brief_value(targets)}: needed are numbers above 0 and up to 1"

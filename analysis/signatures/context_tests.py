@@ -14,11 +14,19 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.estimates import RESAMPLES, centred, slices
+from coartic.estimates import RESAMPLES, Resamples, centred, slices
+from coartic.internal.arguments import checked_arguments
 from coartic.robot import Array
 
 IN_MEMORY = 500
 """Most permutations or resamples of runs in memory at once."""
+
+
+def refuse_other_shapes(*groups: Array) -> None:
+    """Raise ValueError for groups of runs that are not all of shape ``(runs, dof)``."""
+    shapes = [np.shape(group) for group in groups]
+    if any(len(shape) != 2 or shape[1:] != shapes[0][1:] for shape in shapes):
+        raise ValueError(f"runs have shapes {shapes}; needed is (runs, dof) of each")
 
 
 def distance_of_means(first: Array, second: Array) -> float:
@@ -45,13 +53,14 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
     return distance_of_means(first, second) / spread if spread else math.nan
 
 
+@checked_arguments
 def posture_difference_below(
     first: Array,
     second: Array,
     bound: float,
     rng: np.random.Generator,
     *,
-    resamples: int = RESAMPLES,
+    resamples: Resamples = RESAMPLES,
 ) -> float:
     """Test that the standardised posture difference is below a bound, by the bootstrap.
 
@@ -59,6 +68,7 @@ def posture_difference_below(
     :func:`standardised_posture_difference` is at least ``bound``; the observed sample counts, too.
     Noise adds to distances, so that p is rather too large. NaN if a context has a single run.
     """
+    refuse_other_shapes(first, second)
     if min(len(first), len(second)) < 2:
         return math.nan
     means, squares = [], np.zeros(resamples)
@@ -74,7 +84,7 @@ def posture_difference_below(
 
 
 def permutation_p(
-    first: Array, second: Array, rng: np.random.Generator, *, resamples: int = RESAMPLES
+    first: Array, second: Array, rng: np.random.Generator, *, resamples: Resamples = RESAMPLES
 ) -> float:
     """Test that :func:`distance_of_means` exceeds chance, by a one-sided permutation test of runs.
 
@@ -107,17 +117,18 @@ def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> N
     return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
 
 
-def smallest_p(first: int, second: int, resamples: int = RESAMPLES) -> float:
+def smallest_p(first: int, second: int, resamples: Resamples = RESAMPLES) -> float:
     """Return the smallest p of :func:`permutation_p` for the numbers of runs in two contexts."""
     return 1 / min(math.comb(first + second, first), 1 + resamples)
 
 
+@checked_arguments
 def beyond_p(
     method: Sequence[Array],
     other: Sequence[Array],
     rng: np.random.Generator,
     *,
-    resamples: int = RESAMPLES,
+    resamples: Resamples = RESAMPLES,
 ) -> float:
     """Test that a method's posture difference between contexts exceeds another method's, by
     permutation.
@@ -149,6 +160,9 @@ def beyond_p(
     >>> beyond_p(moved, still, rng) < 0.001 < beyond_p(still, still, rng)
     True
     """
+    if len(method) != 2 or len(other) != 2:
+        raise ValueError("needed are the runs of each method in two contexts")
+    refuse_other_shapes(*method, *other)
     if min(map(len, (*method, *other))) < 2:
         return math.nan
     pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]

@@ -25,10 +25,12 @@ from coartic.analysis.signatures.context_tests import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.estimates import SEED
+from coartic.internal.arguments import checked_arguments
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import KEPT
 
 
+@checked_arguments
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Return pairs of tasks that differ only after their first goals, with the number of shared
     goals.
@@ -51,6 +53,7 @@ def movable(task: Task, hand: Hand) -> Array:
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
+@checked_arguments
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
     """Return the motor-equivalent part and the other part of a difference of configurations Δq.
 
@@ -143,6 +146,7 @@ class TwoContexts:
         """P-value of the permutation test of runs; NaN if a context has a single run."""
         return permutation_p(*self.configurations, self._rng("context dependence"))
 
+    @checked_arguments
     def p_beyond(self, other: TwoContexts) -> float:
         """Return the p-value of the test that the posture difference exceeds the posture difference
         of another method; NaN if a context has a single run."""

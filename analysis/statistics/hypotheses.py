@@ -12,8 +12,7 @@ A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, c
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import scipy
@@ -25,21 +24,27 @@ from coartic.estimates import (
     RESAMPLES,
     SEED,
     Estimate,
+    Resamples,
     centred,
     slices,
     vector,
 )
+from coartic.internal.arguments import checked_arguments
+from coartic.internal.limits import MOST_RUNS, real_array
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
+Count = Annotated[int, 0, MOST_RUNS]
+Share = Annotated[float, 0.0, 1.0]
 
 
+@checked_arguments
 def bootstrap_test(
     first: ArrayLike,
     second: ArrayLike | float,
     alternative: Alternative = "greater",
     *,
-    resamples: int = RESAMPLES,
+    resamples: Resamples = RESAMPLES,
 ) -> Estimate:
     """Test the difference of two means, or of a mean and a number, by the bootstrap.
 
@@ -93,6 +98,7 @@ def bootstrap_test(
     return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
 
 
+@checked_arguments
 def sign_flip_test(differences: ArrayLike) -> Estimate:
     """Test paired differences, shape ``(n,)``, by permutations of their signs, two-tailed.
 
@@ -116,7 +122,8 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
     return Estimate(mean, p=float(result.pvalue), n=n, least_p=least)
 
 
-def share_test(count: int, total: int, share: float, alternative: Alternative) -> Estimate:
+@checked_arguments
+def share_test(count: Count, total: Count, share: Share, alternative: Alternative) -> Estimate:
     """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
     The value of the estimate is the difference ``count / total - share``.
@@ -125,14 +132,15 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
     return Estimate(count / total - share, p=p, n=(total,))
 
 
-def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
+@checked_arguments
+def holm(p_values: ArrayLike, family: int | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
     Rejecting adjusted p-values at or below α has a family-wise error rate of α at most, whatever
     the dependence. NaN, a missing test, stays NaN and does not count, unless ``family`` says the
     number of planned tests: then missing tests count as p = 1.
     """
-    p = np.asarray(p_values, dtype=np.float64)
+    p = real_array("p_values", p_values).reshape(-1)
     planned = int((~np.isnan(p)).sum()) if family is None else family
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from coartic import estimates
 from coartic.estimates import FEWER_RESAMPLES, Estimate
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import real_array
 from coartic.robot import Array
 
@@ -28,6 +29,7 @@ Scores = Mapping[str, Sequence[Array]]
 """Scores of the runs on each instance, shape ``(n,)``, by family."""
 
 
+@checked_arguments
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     """Return the mean over tasks of the mean over runs, with its stratified BCa interval."""
 
@@ -35,6 +37,7 @@ def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     return estimates.mean_of_means(strata, [1 / len(strata)] * len(strata))
 
 
+@checked_arguments
 def other_tasks(scores: Scores) -> Estimate:
     """Return the mean over families, instances and runs, with its interval for other tasks.
 

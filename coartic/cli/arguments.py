@@ -6,7 +6,7 @@ import keyword
 import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -139,6 +139,18 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
                 raise CoarticError(unknown("method", name, every)) from None
             raise
     return meant
+
+
+def check_used(
+    method_files: Sequence[Path] | None, registered: Registry, methods: Iterable[str]
+) -> None:
+    """Raise CoarticError for a method file that has none of some methods."""
+    used = {registered[name].where for name in methods if name in registered}
+    for path in method_files or ():
+        if str(path.resolve()) not in used:
+            raise CoarticError(
+                f"--method-file {path} has no effect: none of its methods is asked for"
+            )
 
 
 def file_name(method: str) -> str:

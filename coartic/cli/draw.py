@@ -33,6 +33,8 @@ def draw(
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
+    if replace and not out.suffix:
+        raise CoarticError("--replace has no effect on a folder, whose pictures are written again")
     meant = given.tasks_meant(tasks or builtin_tasks())
     names = [name for text in meant for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
@@ -108,6 +110,8 @@ def play(
     from coartic.internal.files import write_output
     from coartic.play.page import play_page
 
+    if replace and out is None:
+        raise CoarticError("--replace has no effect without --out")
     chosen = [] if task is None else given.tasks_meant([task])
     page = play_page(*map(load_task, chosen)).encode()
     if out is None:

@@ -11,6 +11,7 @@ import typer
 
 from coartic.cli import arguments as given
 from coartic.cli.terminal import complain, say, say_pairs, say_table
+from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
 from coartic.internal.limits import MOST_RUNS
@@ -90,6 +91,8 @@ def verify(
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 
+    if method_file and not again:
+        raise CoarticError("--method-file has no effect without --again, which performs runs again")
     with open_store(folder), explain_errors(folder):  # these explain an error
         report = check_runs(folder)
     say(
@@ -104,6 +107,9 @@ def verify(
         from coartic.benchmarks.reproduce import perform_some_again
 
         registered, count, unlike = registry(method_file or []), 0, 0
+        with open_store(folder) as store:
+            methods = [job.cell.method.name for job in store.plan()]
+        given.check_used(method_file, registered, methods)
         for run_id, changes in perform_some_again(folder, again, registered):
             count += 1
             unlike += bool(changes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -98,16 +99,24 @@ def run(
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    perform_and_say(plan(chosen, request, registered), out, include or [], jobs, scheduler)
+    jobs_asked, is_part = plan(chosen, request, registered), isinstance(runs, range)
+    perform_and_say(jobs_asked, out, include or [], jobs, scheduler, is_part=is_part)
 
 
 def perform_and_say(
-    plan: Sequence[Job], out: Path, include: Sequence[str], jobs: int | None, scheduler: str | None
+    plan: Sequence[Job],
+    out: Path,
+    include: Sequence[str],
+    jobs: int | None,
+    scheduler: str | None,
+    *,
+    is_part: bool = False,
 ) -> None:
     """Perform the missing runs of a plan and print the findings; exit with code 1 if a run crashed.
 
     ``include`` names folders whose runs are copied into folder ``out`` first. Runs are performed by
-    a Dask scheduler, or by this machine with ``jobs`` processes.
+    a Dask scheduler, or by this machine with ``jobs`` processes. Of a part of the runs there are no
+    findings.
     """
     from coartic.analysis.study import load
     from coartic.benchmarks.cluster import Dask
@@ -130,7 +139,7 @@ def perform_and_say(
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(plan, out, executor=executor, watch=display.update)
     say(str(progress))
-    if any(job.numbers[0] for job in plan):
+    if is_part:
         part = f"{out} has a part of the runs: --include {out}, with all other parts, joins them"
         say_pairs([("Next", part)])
         sys.exit(1 if progress.crashed else 0)
@@ -149,8 +158,13 @@ def list_(
     """List tasks, suites and methods, or describe one of them."""
     from coartic.benchmarks.registry import registry
 
-    registered = registry(method_file or [], with_code=False)
-    say_pairs(overview(registered) if name is None else describe(name, registered))
+    registered, methods = registry(method_file or [], with_code=False), list[str]()
+    pairs = overview(registered) if name is None else describe(name, registered)
+    if name is not None:
+        with suppress(CoarticError):  # no method
+            methods = given.methods_meant([name], registered)
+        given.check_used(method_file, registered, methods)
+    say_pairs(pairs)
 
 
 def overview(registered: Registry) -> Iterator[tuple[str, str]]:
@@ -266,6 +280,7 @@ def reproduce(
     name, outcome, solution = cell.method.name, run.outcome, run.solution
     if name not in registered:
         raise CoarticError(f"unknown method {name!r}: pass --method-file FILE")
+    given.check_used(method_file, registered, [name])
     result = f"{outcome.status}: {outcome.reason}"
     if solution.reward is not None:
         result = f"reward {number(solution.reward)}, hands {solution.hands}"
@@ -316,9 +331,12 @@ def check(
     registered = registry(method_file or [])
     if subject.endswith(".toml"):
         check_kind(subject, "task")
+        if verbose:
+            raise CoarticError("--verbose has no effect: it shows what a method prints")
         broken = show_laws(subject, check_task_file(Path(subject), registered))
     else:
         names = given.methods_meant([subject], registered)
+        given.check_used(method_file, registered, names)
         broken = sum(
             show_laws(name, check_method(registered[name], verbose=verbose)) for name in names
         )

@@ -60,25 +60,30 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
     for masked entries, under which an array holds numbers that do not count."""
     import numpy as np  # which the command line's help does without
 
+    refuse_entries(name, value)
     try:
         array = np.asarray(value)
     except ValueError:
         raise ValueError(
             f"{name} is {brief_value(value)}; needed are real numbers, in rows of one length"
         ) from None
-    refuse_mask(name, value)
+    if array.dtype == object and all(isinstance(each, numbers.Real) for each in array.flat):
+        array = array.astype(np.float64)  # a nullable column of pandas
     if array.dtype.kind not in "uif":
         raise ValueError(f"{name} is {brief_value(value)}; needed are real numbers")
     return array.astype(np.float64, copy=False)
 
 
-def refuse_mask(name: str, value: Any) -> None:
-    """Raise ValueError for an array with masked entries, or a list that contains one."""
+def refuse_entries(name: str, value: Any) -> None:
+    """Raise ValueError for an array with masked entries, or a list that contains one, and for True
+    or False in a list."""
     import numpy as np
 
     if isinstance(value, list | tuple):
         for each in value:
-            refuse_mask(name, each)
+            if isinstance(each, bool):
+                raise ValueError(f"{name} has {each}; needed are real numbers")
+            refuse_entries(name, each)
     elif np.ma.is_masked(value):
         raise ValueError(f"{name} has masked entries; needed are numbers without a mask")
 

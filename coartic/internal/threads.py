@@ -11,6 +11,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from numbers import Integral
 from pathlib import Path
 
 from coartic.internal.interruption import ENDING
@@ -35,7 +36,7 @@ def threads_for(jobs: int) -> int:
 
     Raises ValueError for any other number below 1.
     """
-    if jobs != -1 or isinstance(jobs, float):
+    if not (isinstance(jobs, Integral) and jobs == -1):
         check_limits("jobs", jobs, 1, MOST_JOBS)
         return jobs
     if hasattr(os, "sched_getaffinity"):

@@ -55,6 +55,9 @@ def in_sentences(kind: type[T]) -> type[T]:
 
     @wraps(init)
     def call(self: Any, *args: Any, **given: Any) -> None:
+        if args and isinstance(self, BaseModel):
+            name = next(iter(type(self).model_fields))
+            raise TypeError(f"{type(self).__name__} takes arguments by name, such as {name}=...")
         try:
             init(self, *args, **given)
         except ValidationError as error:
@@ -120,13 +123,17 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
     meant."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
-        if not key and isinstance(part, int) and keys:
+        if not key and isinstance(part, int) and part < len(keys):
             part = keys[part]  # an argument without its name
         name = plain(str(part), 80)
         key += f"[{name}]" if isinstance(part, int) else f".{name}" if key else name
     match detail["type"]:
         case "sentence":
             return message
+        case "value_error" if not key:  # of the whole
+            return message.removeprefix("Value error, ")
+        case "unexpected_positional_argument":
+            return f"it takes {len(keys)} arguments"
         case "missing":
             return f"{key} is missing"
         case "extra_forbidden" | "unexpected_keyword_argument":

@@ -318,6 +318,8 @@ def move(
     Source: paper, section *Generating Movement for Each Goal*.
     """
     check_arm(robot, hand)
+    if not isinstance(stop_on_arrival, bool | np.bool_):
+        raise TypeError(f"stop_on_arrival is {brief_value(stop_on_arrival)}; it must be a bool")
     batch = batch_for(robot, 1)
     run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = configuration(robot, q)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.limits import brief_value, real_array
+from coartic.internal.limits import brief_value, real_array, refuse_entries
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import width_of
@@ -75,6 +75,10 @@ class Movement:
     waypoints: Array | None = None
     """Configurations that a path passes through, shape ``(k, dof)``, from where the robot stands
     to ``waypoints[-1]``, length unit (base) and rad (joints); None for the other kinds."""
+
+    def __post_init__(self) -> None:
+        refuse_entries("target", self.target)
+        refuse_entries("waypoints", self.waypoints)
 
     def __repr__(self) -> str:
         named = ("goal", "hand", "kind", "target", "ticks", "waypoints")

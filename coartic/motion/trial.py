@@ -685,10 +685,10 @@ def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
     not have."""
     if hands is None:
         return task.hands
-    chosen = tuple(hands)
-    if not chosen or any(hand not in task.hands for hand in chosen):
+    chosen = tuple(hands) if isinstance(hands, Iterable) else ()
+    if not chosen or not all(isinstance(hand, str) and hand in task.hands for hand in chosen):
         raise ValueError(
-            f"hands is {brief_value(hands if isinstance(hands, str) else chosen)}; it must be a "
+            f"hands is {brief_value(hands)}; it must be a "
             f"list of hands of task {task.name!r}: {' and '.join(map(repr, task.hands))}"
         )
     return chosen

@@ -29,6 +29,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, check_limits
 from coartic.internal.text import Line, counted, unknown
 from coartic.internal.toml_files import read_toml
@@ -325,6 +326,7 @@ def instance_of(family: Family, address: Address) -> Task:
     return parse_task(content, name)
 
 
+@checked_arguments
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
     """Return an instance of a shipped family by its name, ``two-armed/v1/i017``. Raises TaskError
@@ -338,6 +340,7 @@ def instance(name: str) -> Task:
     return instance_of(load_family(address.family), address)
 
 
+@checked_arguments
 def named_by(text: str) -> list[str]:
     """List the names of the instances of a range, ``two-armed/v1/i000..i039``, or the name itself.
 

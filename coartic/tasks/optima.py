@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from coartic.internal.arguments import checked_arguments
 from coartic.tasks.task import Task
 
 BASE = "task"
@@ -52,6 +53,7 @@ def essence(task: Task) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+@checked_arguments
 def best_shipped(task: Task) -> KnownOptimum | None:
     """The best reward that is shipped of a task, however it is called.
 

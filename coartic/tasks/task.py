@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from coartic.errors import CoarticError, TaskError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import folder_named, write_output
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import Line, counted, did_you_mean, short_repr
@@ -223,6 +224,8 @@ class Task(FileData):
             raise error_saying(str(error)) from None
         if q.shape != (robot.dof,):
             raise error_saying(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
+        if not np.isfinite(q).all():
+            raise error_saying(f"q0 is {brief_value(q.tolist())}; needed are finite numbers")
         left, right = (tuple(q[robot.joints(hand)].tolist()) for hand in HANDS)
         content["start"] = Start(base=tuple(q[:2].tolist()), left=left, right=right)
         return content
@@ -270,6 +273,7 @@ class Task(FileData):
             raise error_saying(far)
         return self
 
+    @checked_arguments
     def save(self, path: str | Path, *, replace: bool = False) -> None:
         """Write the task as a file, which :func:`load_task` reads.
 
@@ -408,6 +412,7 @@ def shipped_tasks() -> dict[str, Task]:
     return {task.name: task for task in map(read_task, sorted(TASK_FOLDER.glob("*.toml")))}
 
 
+@checked_arguments
 def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> Task:
     """Make a task from the content of a task file.
 

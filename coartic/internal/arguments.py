@@ -1,0 +1,115 @@
+"""Check the arguments of public functions against their hints."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, wraps
+from numbers import Integral, Real
+from types import UnionType
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from coartic.errors import CoarticError
+from coartic.internal.limits import brief_value, check_limits, real_array
+from coartic.internal.text import unknown
+
+Asked = ParamSpec("Asked")
+Computed = TypeVar("Computed")
+_KINDS: dict[Any, Any] = {bool: bool | np.bool_, int: Integral, float: Real, str: str}
+_WORDS = {"bool": "True or False", "int": "a whole number", "float": "a number", "str": "a text"}
+
+
+class ArgumentError(CoarticError, ValueError, TypeError):
+    """An argument that a function does not take."""
+
+
+def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
+    """Return the function, which raises ArgumentError for an argument that its hint excludes."""
+    check = checker_of(function)
+
+    @wraps(function)
+    def call(*args: Asked.args, **named: Asked.kwargs) -> Computed:
+        check(*args, **named)
+        return function(*args, **named)
+
+    return call
+
+
+def checker_of(function: Callable[..., Any]) -> Callable[..., None]:
+    """Return a function that raises ArgumentError for an argument that a hint of ``function``
+    excludes.
+
+    Arrays may be lists of numbers, but have no masked entries. ``Annotated[int, 1, 9]`` takes whole
+    numbers from 1 to 9. Hints with names that only the type checker imports exclude nothing.
+    """
+    signature = inspect.signature(function)
+
+    @cache
+    def hint_of(name: str) -> Any:
+        try:
+            return eval(signature.parameters[name].annotation, inspect.unwrap(function).__globals__)
+        except NameError:
+            return Any
+
+    def check(*args: Any, **named: Any) -> None:
+        try:
+            given = signature.bind(*args, **named).arguments
+        except TypeError as error:
+            raise ArgumentError(f"{function.__name__}: {error}") from None
+        for name, value in given.items():
+            parameter = signature.parameters[name]
+            if parameter.kind is parameter.VAR_POSITIONAL:
+                for each in value:
+                    check_argument(name, each, hint_of(name), parameter.annotation)
+            elif parameter.kind is not parameter.VAR_KEYWORD and name != "self":
+                check_argument(name, value, hint_of(name), parameter.annotation)
+
+    return check
+
+
+def check_argument(name: str, value: Any, hint: Any, words: str) -> None:
+    """Raise ArgumentError for a value that a hint, which is written as ``words``, excludes."""
+    try:
+        if type(value) is not hint and not fits(name, value, hint):
+            needed = _WORDS.get(words, words)
+            raise ValueError(f"{name} is {brief_value(value)}; needed is {needed}")
+    except ValueError as error:
+        raise ArgumentError(str(error)) from None
+
+
+def fits(name: str, value: Any, hint: Any) -> bool:
+    """Return whether a value is of the kind that a hint says; True for hints of other forms.
+
+    Raises ValueError for a value that has a sentence of its own.
+    """
+    kind, parts = get_origin(hint) or hint, get_args(hint)
+    if kind in (Union, UnionType) and value is None:
+        return type(None) in parts
+    if kind is np.ndarray or {*get_args(ArrayLike)} <= {*parts}:
+        real_array(name, value)
+        return True
+    if kind in (Union, UnionType):
+        return any(fits(name, value, each) for each in parts)
+    if kind is Annotated:
+        check_limits(name, value, *hint.__metadata__)
+        return True
+    if kind is Literal:
+        if isinstance(value, str) and value not in parts:
+            raise ValueError(unknown(name, value, parts))
+        return isinstance(value, str)
+    if kind in _KINDS:
+        return isinstance(value, _KINDS[kind]) and (kind is bool or not isinstance(value, bool))
+    if not isinstance(kind, type) or kind is Any:
+        return True
+    if kind is tuple and isinstance(value, tuple) and ... not in parts:
+        return len(value) == len(parts) and all(map(fits, [name] * len(parts), value, parts))
+    if issubclass(kind, Mapping) and isinstance(value, Mapping) and parts:
+        return all(fits(name, each, parts[1]) for each in value.values())
+    if issubclass(kind, Mapping) or not issubclass(kind, Iterable) or not parts:
+        return isinstance(value, kind)
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        return False
+    return not isinstance(value, list | tuple) or all(fits(name, e, parts[0]) for e in value)
