@@ -392,6 +392,42 @@ def test_on_a_phone_picture_slider_and_finding_come_first(visited, address):
     assert page.get_by_label("Task").is_visible()
 
 
+@pytest.mark.parametrize("width", [1280, 390])
+def test_every_goal_is_seen_on_screen_and_in_print(opened, width):
+    page = settled(opened(width=width, color_scheme="dark"))
+    stage, inset = (page.locator(f"[data-is={name}]").bounding_box() for name in STAGE)
+    beside, below = (inset[axis] >= stage[axis] + stage[size] for axis, size in SIDES)
+    assert (beside, below) == (width == 1280, width == 390)
+    for handle in page.locator(".handle").all():
+        assert handle.evaluate(IS_ON_TOP)
+    page.evaluate(RECORD_PRINT, STAGE)
+    page.emulate_media(media="null")  # as the browser sees it: screen, then print
+    page.pdf(format="A4")
+    for across, up, paper in page.evaluate("printed"):
+        assert across == pytest.approx(up, rel=0.01)  # pixels a CSS pixel
+        assert across > 2
+        assert min(paper) > 200  # not the dark colour of the screen
+    assert page.evaluate("printed.length") == 2
+
+
+STAGE = ["stage", "inset"]
+SIDES = (("x", "width"), ("y", "height"))
+IS_ON_TOP = """handle => {
+  const { left, top, width, height } = handle.getBoundingClientRect();
+  window.scrollTo(0, 0);
+  return document.elementFromPoint(left + width / 2, top + height / 2) === handle;
+}"""
+RECORD_PRINT = """names => {
+  window.printed = [];
+  matchMedia("print").addEventListener("change", ({ matches }) => matches && names.forEach(name => {
+    const canvas = document.querySelector(`[data-is=${name}]`);
+    const pixel = canvas.getContext("2d").getImageData(4, canvas.height / 2, 1, 1).data;
+    const density = [canvas.width / canvas.clientWidth, canvas.height / canvas.clientHeight];
+    printed.push([...density, [...pixel].slice(0, 3)]);
+  }));
+}"""
+
+
 def test_it_practises_plays_and_saves_pictures(opened):
     page = opened(reduced_motion="no-preference")
     page.get_by_role("button", name="Pause").wait_for()

@@ -13,6 +13,8 @@ function around(points, margin = 0) {
   return box;
 }
 
+const PRINTED = 3; // pixels a CSS pixel in print
+
 class Picture {
   constructor(canvas) {
     this.canvas = canvas;
@@ -27,7 +29,7 @@ class Picture {
   /* Start again, with a box of the world in sight. */
   begin([left, bottom, right, top]) {
     const { canvas, context } = this;
-    const density = this.density || window.devicePixelRatio || 1;
+    const density = this.density || (window.matchMedia("print").matches ? PRINTED : window.devicePixelRatio || 1);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     if (canvas.width !== Math.round(width * density) || canvas.height !== Math.round(height * density)) {
       canvas.width = Math.round(width * density);

@@ -97,6 +97,7 @@ class Play {
     ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, () => { this.waits = false; }, true));
     this.restore(saved);
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
+    window.matchMedia("print").addEventListener("change", () => this.draw()); // at once, in the size and colours of the print
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.refresh());
     new MutationObserver(() => this.refresh()).observe(document.body, { attributeFilter: ["data-theme"] }); // of the site
     new IntersectionObserver((entries) => {
@@ -363,7 +364,7 @@ class Play {
 
   draw() {
     const { stage, state } = this;
-    const colours = Object.fromEntries(["first", "second", "dim", "ink", "line", "hit", "soft"].map((name) => [name, stage.colour(name)]));
+    const colours = Object.fromEntries(["first", "second", "dim", "ink", "line", "soft"].map((name) => [name, stage.colour(name)]));
     colours.ghost = colours.dim;
     this.colours = colours;
     const points = [...this.movers.flatMap((mover) => mover.seen()), ...this.problems.flatMap((problem) => problem.goals)];
@@ -983,12 +984,13 @@ class Play {
     this.find("note").textContent = note;
   }
 
-  /* The stage at twice its size, with the words beside it. */
+  /* The stage at twice its size, above the postures at the shared goal and the words. */
   save() {
     const { stage, inset, data, colours } = this;
     [stage.density, inset.density] = [2, 2];
     this.draw();
-    const [width, height] = stage.size;
+    const [width, stage_height] = stage.size;
+    const height = stage_height + (inset.canvas.hidden ? 0 : inset.size[1]);
     const picture = new Picture(document.createElement("canvas"));
     const { canvas, context } = picture;
     const words = [[...this.find("score").children].map((line) => line.textContent).join("; "), ...this.finding, `${[this.find("preset").selectedOptions[0].text, this.nameOf(this.state.who), this.find("progress").textContent].filter(Boolean).join(", ")}; coartic ${data.version}`];
@@ -1001,7 +1003,7 @@ class Play {
     context.fillStyle = stage.colour("page");
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.drawImage(stage.canvas, 0, 0);
-    if (!inset.canvas.hidden) context.drawImage(inset.canvas, 2 * inset.canvas.offsetLeft, 2 * inset.canvas.offsetTop);
+    if (height > stage_height) context.drawImage(inset.canvas, 0, 2 * stage_height);
     lines.forEach((line, k) => picture.text(line, [24, 2 * height + 32 + 40 * k], colours.ink, "left", 28));
     [stage.density, inset.density] = [0, 0];
     this.draw();
