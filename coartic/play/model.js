@@ -713,7 +713,8 @@ function receding_horizon(problem, horizon) {
         const corner = plan.corners[k];
         const beyond = THROUGH / (distance_of(corner, trial.q) + 1e-9);
         const target = corner.map((value, j) => value + beyond * (value - trial.q[j]));
-        trial.reaches(goal + k, plan.hands[k], target);
+        const hits = move(problem, trial.q.slice(), target, goal + k, plan.hands[k], true) > 0; // else a step passes over the goal
+        trial.reaches(goal + k, plan.hands[k], hits ? target : corner);
       }
     }
   }

@@ -81,7 +81,7 @@ class Picture {
     context.strokeStyle = ink;
     const [from, to] = [12, 12 + unit * scale].map((x) => this.toWorld([x, size[1] - 12]));
     this.line([from, to], 1.5);
-    this.text(`${unit} length unit${unit === 1 ? "" : "s"}`, [18 + unit * scale, size[1] - 12], ink, "left", 12);
+    this.text(counted(unit, "length unit"), [18 + unit * scale, size[1] - 12], ink, "left", 12);
   }
 
   /* What the box slides on, below it or beside it. */
@@ -146,7 +146,7 @@ class Picture {
   goal([x, y], radius, { label, colour, hit, held, movable }) {
     const { context } = this;
     const [px, py] = this.toScreen([x, y]);
-    const r = Math.max(4, radius * this.scale);
+    const r = Math.max(2, radius * this.scale); // to scale, unless it would not be seen
     if (movable) {
       context.fillStyle = colour;
       context.globalAlpha = held ? 0.3 : 0.13;
@@ -160,7 +160,7 @@ class Picture {
     context.fillStyle = hit ? colour : this.colour("page");
     context.fill();
     context.strokeStyle = colour;
-    context.lineWidth = 2;
+    context.lineWidth = Math.min(2, r / 2);
     context.stroke();
     context.fillStyle = colour;
     this.text(label, [px + r + 11, py - r - 6], colour, "center", 15, 600);

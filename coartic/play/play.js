@@ -470,10 +470,11 @@ class Play {
     const all = [...references, ...learned].filter(Number.isFinite);
     if (!all.length) return;
     let [low, high] = [Math.min(...all), Math.max(...all)];
-    [low, high] = [low - 0.12 * (high - low) - 2, high + 0.25 * (high - low) + 4];
+    [low, high] = [low - 0.2 * (high - low) - 2, high + 0.25 * (high - low) + 4];
     curve.begin([0, 0, 1, 1]);
     const { context, size: [width, height] } = curve;
-    const [left, right, top, bottom] = [40, width - 10, 8, height - 22];
+    curve.text("ticks, by trials", [0, 8], colours.soft, "left", 12);
+    const [left, right, top, bottom] = [40, width - 10, 20, height - 22];
     const x = (trials) => left + ((right - left) * Math.log(trials)) / Math.log(TRIALS);
     const y = (ticks) => bottom - ((bottom - top) * (ticks - low)) / (high - low);
     for (let trials = 1; trials <= TRIALS; trials *= 10) {
@@ -485,16 +486,26 @@ class Play {
     for (let ticks = step * Math.ceil(low / step); ticks < high; ticks += step) {
       curve.text(`${ticks}`, [left - 5, y(ticks)], colours.soft, "right", 12);
     }
+    const named = []; // heights of names
     this.problems.forEach((_, k) => {
-      const level = (reward, dash) => { if (Number.isFinite(reward)) curve.path([[left, y(-reward)], [right, y(-reward)]], 1.2, dash); };
-      context.strokeStyle = colours[ROLES[k]];
-      level(this.alone[k].reward, [2, 4]);
-      level(this.plan[k] && this.plan[k].reward, [8, 4]);
-      level(this.optimum || NaN, []);
+      const colour = colours[ROLES[k]];
+      const level = (name, reward, dash) => {
+        if (!Number.isFinite(reward)) return;
+        const at = y(-reward);
+        curve.path([[left, at], [right, at]], 1.2, dash);
+        const free = [at - 8, at + 9].find((place) => references.every((ticks) => Math.abs(y(ticks) - place) > 6)
+          && named.every((other) => Math.abs(other - place) > 12));
+        if (free === undefined) return;
+        named.push(free);
+        curve.text(name, [left + 4, free], colour, "left", 12);
+      };
+      context.strokeStyle = colour;
+      level(NAMES.alone, this.alone[k].reward, [2, 4]);
+      level("planner", this.plan[k] && this.plan[k].reward, [8, 4]);
+      level("proven optimum", this.optimum || NaN, []);
       runs_of(k).forEach(({ snapshots }) => curve.path(snapshots.flatMap(({ trials, reward }, i) => (
         [snapshots[Math.max(0, i - 1)].reward, reward].map((each) => [x(trials), y(-each)]))), 1.5));
     });
-    curve.text("ticks, by trials", [right, top + 8], colours.soft, "right", 12);
     const at = Math.min(this.shown, Math.max(1, ...runs.map(({ made }) => made)));
     context.fillStyle = colours.ink;
     context.fillRect(x(at) - 0.75, top, 1.5, bottom - top);
@@ -550,7 +561,7 @@ class Play {
     const random = Number.isFinite(by_chance) ? ` (random search: ${by_chance.toFixed(1)})` : "";
     return [
       `At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
-      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${runs} runs each).${random && " Random search keeps the best of as many random trials."}`,
+      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${counted(runs, "run")} each).${random && " Random search keeps the best of as many random trials."}`,
     ];
   }
 
@@ -558,13 +569,13 @@ class Play {
   get scores() {
     const { state, main } = this;
     const you = state.who === "you";
-    let names = you ? ["You", `Orange: ${this.nameOf(state.mate)}`] : ["Blue", "Orange"];
+    let names = you ? ["Blue: you", `Orange: ${this.nameOf(state.mate)}`] : ["Blue", "Orange"];
     if (this.announced) names = ["The learner's next trial", "The planner"];
     if (main.length < 2) names = [capital(this.nameOf(state.who))];
     const scores = main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
     if (main.length > 1 && !you) return scores;
     if (main.length < 2 && state.who !== "alone") scores.push(["ghost", "Corrective process alone", this.alone[0].reward]);
-    if (this.plan[0] && state.who !== "plan") scores.push(["bare", "Planner (local search)", this.plan[0].reward]);
+    if (this.plan[0] && state.who !== "plan") scores.push(["bare", `Planner (local search)${main.length > 1 ? ", blue goals" : ""}`, this.plan[0].reward]);
     if (this.optimum) scores.push(["bare", "Optimum (proven)", this.optimum]);
     return scores;
   }
@@ -587,7 +598,7 @@ class Play {
     const drift = state.drift ? `, drift ${state.drift}` : "";
     this.set("textContent", {
       lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", play: this.playing ? "Pause" : "Play",
-      count: `${this.main.map((mover, k) => `${this.main.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${mover.last + 1}`).join(", ")} ticks`,
+      count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : counted(mover.last + 1, "tick")}`).join(", "),
     });
     const stored = this.stored(state.who);
     this.find("film").hidden = !stored;
@@ -778,7 +789,10 @@ class Play {
       this.keep();
     };
     on("preset", "change", (event) => choose(Number(event.target.value)));
-    on("reset", "click", () => choose(this.state.preset));
+    on("reset", "click", () => {
+      this.state.drift = this.first.drift;
+      choose(this.state.preset);
+    });
     on("more", "toggle", (event) => {
       this.state.open = Number(event.target.open);
       this.refresh();
@@ -822,6 +836,7 @@ class Play {
     on("trials", "input", (event) => {
       const trials = Math.max(1, Math.round(Math.exp((Number(event.target.value) / 1000) * Math.log(TRIALS))));
       this.state.trials = trials < TRIALS ? trials : 0;
+      this.showControls();
       this.showMeeting();
       this.answer();
     });
@@ -907,13 +922,13 @@ class Play {
     };
     state.ahead = Math.max(0, Math.min(Math.round(state.ahead), state.goals.length - 1));
     state.edited = Math.max(1, Math.min(Math.round(state.edited), state.goals.length));
-    const { who, goals, others, explores, drift, ahead, edited } = state;
+    const { who, goals, others, explores, trials, drift, ahead, edited } = state;
     const runs = preset.runs || [];
     const one = preset.task.hands.length < 2;
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
     fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
-    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => ticks).join(" and ")} ticks`])]);
-    fill("ahead", goals.map((_, k) => [k, k ? `${k} goal${k > 1 ? "s" : ""} ahead` : "no goal ahead"]));
+    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => counted(ticks, "tick")).join(" and ")}`])]);
+    fill("ahead", goals.map((_, k) => [k, k ? `${counted(k, "goal")} ahead` : "no goal ahead"]));
     fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
     this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores, drift: DRIFTS.indexOf(drift) });
     this.find("drift").setAttribute("aria-valuetext", `drift ${drift}`);
@@ -921,8 +936,9 @@ class Play {
     ["who", "reward"].forEach((name) => this.find(name).querySelectorAll("input").forEach((input) => { input.checked = input.value === state[name]; }));
     this.find("two").checked = Boolean(others);
     this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
-    const few = goals.length < 2;
-    this.set("disabled", { reset: !changed && !state.own, two: few, fewer: few, announced: few, add: goals.length >= MOST_GOALS });
+    const [few, full] = [goals.length < 2, goals.length >= MOST_GOALS];
+    this.set("disabled", { reset: !changed && !state.own && !trials && drift === this.first.drift, two: few, fewer: few, announced: few, add: full });
+    this.find("why").textContent = (few && "The only goal stays; it has no next goal.") || (full && `Goals can be added while there are fewer than ${MOST_GOALS}.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
       runs: !runs.length, dial: other, "for-learner": other, "for-dial": other, "for-two": other || one,
