@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from coartic import (
-    MotionModel,
     Movement,
     corrective_trial,
     execute,
@@ -113,8 +112,8 @@ def test_random_trials_are_those_of_the_package(name):
         np.testing.assert_allclose(np.reshape(trial["reached"], hit.shape), hit, rtol=0, atol=1e-9)
 
 
-EXECUTE = """(task, model, solutions) => {
-  const problem = coartic.problem_of(task, { ...coartic.PAPER, ...model });
+EXECUTE = """(task, solutions) => {
+  const problem = coartic.problem_of(task);
   return solutions.map((movements) => {
     const trial = coartic.execute(problem, movements);
     const { rows, hits } = coartic.trajectory(problem, trial);
@@ -125,8 +124,7 @@ EXECUTE = """(task, model, solutions) => {
 
 
 def test_straight_solutions_are_executed_tick_by_tick():
-    constants = {"arrival_tolerance": 0.1}
-    task, model = load_task("two-armed-1"), MotionModel(**constants)
+    task = load_task("two-armed-1")
     rng = np.random.default_rng(3)
     hands, targets = sample(task, 60, noise=0.2, seed=11)
     solutions = []
@@ -142,15 +140,15 @@ def test_straight_solutions_are_executed_tick_by_tick():
           "target": None if m.target is None else m.target.tolist()} for m in movements]
         for movements in solutions
     ]  # fmt: skip
-    theirs, completed = node(EXECUTE, content(task), constants, plain), 0
+    theirs, completed = node(EXECUTE, content(task), plain), 0
     for movements, film in zip(solutions, theirs, strict=True):
-        outcome = execute(task, movements, model=model)
+        outcome = execute(task, movements)
         made = [[m.goal, HANDS.index(m.hand), m.kind, m.ticks] for m in outcome.movements]
         assert film["made"][: len(made)] == made
         assert film["reward"] == outcome.reward
         if not outcome.completed:
             continue
-        ours = trajectory(task, movements, model)
+        ours = trajectory(task, movements)
         completed += 1
         assert film["hits"] == ours.hits.tolist()
         np.testing.assert_allclose(film["rows"], ours.configurations, rtol=0, atol=1e-9)

@@ -412,6 +412,7 @@ def test_on_a_phone_picture_slider_and_finding_come_first(visited, address):
     for width, height in ((390, 844), (844, 390)):
         page.set_viewport_size({"width": width, "height": height})
         assert "alike" in text(page, "finding")
+        assert text(page, "progress") == "1 trial"
         for part in (".stage", "[data-is=trials]", "[data-is=finding]"):
             box = page.locator(part).bounding_box()
             assert box["y"] + box["height"] <= height

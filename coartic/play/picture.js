@@ -3,14 +3,8 @@
 
 /* What is in sight of points, with a margin: left, bottom, right, top. */
 function around(points, margin = 0) {
-  const box = [Infinity, Infinity, -Infinity, -Infinity];
-  points.forEach(([x, y]) => {
-    box[0] = Math.min(box[0], x - margin);
-    box[1] = Math.min(box[1], y - margin);
-    box[2] = Math.max(box[2], x + margin);
-    box[3] = Math.max(box[3], y + margin);
-  });
-  return box;
+  const sides = [0, 1].map((axis) => points.map((point) => point[axis]));
+  return [...sides.map((side) => Math.min(...side) - margin), ...sides.map((side) => Math.max(...side) + margin)];
 }
 
 const PRINTED = 3; // pixels a CSS pixel in print
@@ -31,10 +25,8 @@ class Picture {
     const { canvas, context } = this;
     const density = this.density || (window.matchMedia("print").matches ? PRINTED : window.devicePixelRatio || 1);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (canvas.width !== Math.round(width * density) || canvas.height !== Math.round(height * density)) {
-      canvas.width = Math.round(width * density);
-      canvas.height = Math.round(height * density);
-    }
+    const pixels = { width: Math.round(width * density), height: Math.round(height * density) };
+    if (canvas.width !== pixels.width || canvas.height !== pixels.height) Object.assign(canvas, pixels);
     this.scale = Math.min(width / (right - left), height / (top - bottom));
     this.centre = [(left + right) / 2, (bottom + top) / 2];
     this.size = [width, height];

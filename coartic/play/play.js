@@ -80,7 +80,7 @@ class Mover {
 
 class Play {
   constructor(root, data, saved) {
-    Object.assign(this, { root, data, held: null, order: 0, busy: false, results: new Map(), playing: false });
+    Object.assign(this, { root, data, held: null, order: 0, busy: false, results: new Map(), handles: new Map(), playing: false });
     this.find = (name) => root.querySelector(`[data-is="${name}"]`);
     this.set = (property, values) => Object.entries(values).forEach(([name, value]) => { this.find(name)[property] = value; });
     this.stage = new Picture(this.find("stage"));
@@ -648,36 +648,22 @@ class Play {
         wanted.set(`${k} ${g}`, { at: goal, label: `Goal ${this.labelOf(k, g)}${whose}`, move: (to) => this.moveGoal(k, g, to) });
       }));
     }
-    const layer = this.find("handles");
-    let place = 0;
-    this.handles = this.handles || new Map();
-    this.handles.forEach((handle, name) => {
-      if (!wanted.has(name)) {
-        handle.remove();
-        this.handles.delete(name);
-      }
-    });
-    wanted.forEach(({ at, label, move }, name) => {
-      let handle = this.handles.get(name);
-      if (!handle) {
-        handle = document.createElement("button");
-        handle.type = "button";
-        handle.className = "handle";
-        this.drags(handle, name);
-        this.handles.set(name, handle);
-      }
-      const next = layer.children[place];
-      if (next !== handle) layer.insertBefore(handle, next || null); // in the order of the keyboard
-      place += 1;
+    const shown = [...wanted].map(([name, { at, label, move }]) => {
+      if (!this.handles.has(name)) this.handles.set(name, this.handle(name));
+      const handle = this.handles.get(name);
       const [x, y] = this.stage.toScreen(at);
       handle.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
       handle.classList.toggle("joint", this.editing);
       handle.setAttribute("aria-label", `${label}, at ${short(at[0])}, ${short(at[1])}. Arrow keys move it.`);
-      Object.assign(handle, { at, move });
+      return Object.assign(handle, { at, move });
     });
+    const layer = this.find("handles");
+    const there = [...layer.children];
+    if (there.length !== shown.length || shown.some((handle, k) => handle !== there[k])) layer.replaceChildren(...shown);
   }
 
-  drags(handle, name) {
+  handle(name) {
+    const handle = Object.assign(document.createElement("button"), { type: "button", className: "handle" });
     const to = (event) => {
       const box = this.find("stage").getBoundingClientRect();
       return this.stage.toWorld([event.clientX - box.left, event.clientY - box.top]);
@@ -708,6 +694,7 @@ class Play {
       handle.move(handle.at);
       this.keep();
     });
+    return handle;
   }
 
   /* The robots stand at the goal they share. */
