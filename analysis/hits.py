@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from coartic import CoarticError, Task
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value
+from coartic.internal.text import counted
 from coartic.internal.toml_files import refuse_foreign
 from coartic.motion.movement import LARGEST_ENTRY
 
@@ -91,8 +92,8 @@ def read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]]
                 headings = fields
             elif len(fields) != len(headings):
                 raise CoarticError(
-                    f"{path}, line {reader.line_num}: it has {len(fields)} entries, the headings "
-                    f"are {len(headings)}: {', '.join(headings)}"
+                    f"{path}, line {reader.line_num}: it has {counted(len(fields), 'value')}, "
+                    f"the headings are {len(headings)}: {', '.join(headings)}"
                 )
             else:
                 rows.append(fields)

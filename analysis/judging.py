@@ -23,6 +23,7 @@ from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import real_array
+from coartic.internal.text import counted
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""
@@ -128,7 +129,7 @@ def mean_beyond(
     sign = 1.0 if side == "greater" else -1.0
     test, without = tests_over_tasks(sign * there, sign * bound)
     opposite = max(tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
-    evidence = f"{sentence.format(estimate(mean(there), 2))} ({len(there)} tasks)"
+    evidence = f"{sentence.format(estimate(mean(there), 2))} ({counted(len(there), 'task')})"
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
 

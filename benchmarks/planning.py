@@ -29,7 +29,7 @@ from coartic.internal.limits import (
     MOST_TRIALS,
     number_or_range,
 )
-from coartic.internal.text import unknown
+from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, error_saying, explain_inline
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, trials_in
@@ -138,7 +138,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     jobs = list(itertools.islice(of_suite, MOST_CELLS + 1))
     if len(jobs) > MOST_CELLS:
         raise CoarticError(
-            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} combinations "
+            f"suite {suite.name!r} asks for more than {MOST_CELLS:,} combinations "
             "(tasks x moves x methods x grid)"
         )
     ids = dict.fromkeys(itertools.chain(*asked.values()))
@@ -336,12 +336,12 @@ def distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
             )
         if trials_in(cell.parameters) > MOST_TRIALS:
             raise CoarticError(
-                f"{where}: {trials_in(cell.parameters):_} trials a run; at most {MOST_TRIALS:_} "
+                f"{where}: {trials_in(cell.parameters):,} trials a run; at most {MOST_TRIALS:,} "
                 "are kept"
             )
         if (first := distinct.setdefault(cell.digest, job)).numbers != job.numbers:
             raise CoarticError(
-                f"{where}: the suite asks for {len(first.numbers)} runs of it, and then for "
-                f"{len(job.numbers)}; give one number"
+                f"{where}: the suite asks for {counted(len(first.numbers), 'run')} of it, and "
+                f"then for {len(job.numbers)}; give one number"
             )
     return list(distinct.values())

@@ -22,7 +22,7 @@ from pydantic import TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.text import error_line
+from coartic.internal.text import counted, error_line
 from coartic.method import (
     Information,
     MethodError,
@@ -77,7 +77,7 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
         outcomes = _OUTCOMES.validate_python(content)
         if len(outcomes) == len(job.numbers):
             return outcomes
-        why = f"{len(outcomes)} for {len(job.numbers)} runs"
+        why = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
     except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
@@ -159,7 +159,7 @@ def perform_job(job: Job) -> list[Outcome]:
                 results = method.solve_together(sessions)
         made = trials_outside() - made
         if made and not cell.method.is_ours:
-            text = f"the method made {made} trials outside its session, which are not counted"
+            text = f"the method made {counted(made, 'trial')} outside its session, not counted"
             raise UndeclaredError(f"{text}: by coartic.objective, learn, execute or an environment")
     except BaseException as error:
         results = [error] * len(sessions)

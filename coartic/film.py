@@ -22,7 +22,8 @@ from matplotlib.figure import Figure
 
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
-from coartic.internal.files import check_output, write_output
+from coartic.internal.files import check_ending, check_output, write_output
+from coartic.internal.text import counted
 
 if TYPE_CHECKING:
     from coartic.trajectories import Trajectory
@@ -92,8 +93,7 @@ def write_film(
 def check_film(path: Path, *, replace: bool = False) -> None:
     """Raises CoarticError, before anything is drawn, for an ending that is not supported, for MP4
     without ffmpeg, and as :func:`check_output` does."""
-    if path.suffix.lower() not in FILMS:
-        raise CoarticError(f"{path}: the name must end in {', '.join(FILMS)}")
+    check_ending(path, FILMS)
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
     check_output(path, replace=replace)
@@ -118,7 +118,7 @@ def set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], 
         for hand, trace in traces.items():
             trace.set_data(*paths[hand][: row + 1].T)
         fill_goals(goals, movement.hits <= row)
-        counter.set_text(f"{row + 1} ticks")
+        counter.set_text(counted(row + 1, "tick"))
 
     return show
 

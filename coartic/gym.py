@@ -28,7 +28,7 @@ from coartic.errors import CoarticError, NotApplicableError
 from coartic.estimates import Estimate, mean
 from coartic.gym_kernel import VectorState, observe, step_robots
 from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
-from coartic.internal.text import unknown
+from coartic.internal.text import counted, unknown
 from coartic.method import Method, MethodError, run_method
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import robot_parameters
@@ -255,7 +255,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
             first = whole_seed(seed)
             seeds = [None if first is None else first + row for row in range(self.num_envs)]
         if len(seeds) != self.num_envs:
-            raise ValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
+            there = counted(self.num_envs, "environment")
+            raise ValueError(f"{counted(len(seeds), 'seed')} for {there}")
         for row, each in enumerate(seeds):
             if each is not None or self._rngs[row] is None:
                 self._rngs[row] = seeding.np_random(each)[0]

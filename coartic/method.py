@@ -29,6 +29,7 @@ from pydantic import BaseModel, ConfigDict
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUN_SEED, check_limits, real_array
+from coartic.internal.text import counted
 from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import Correction, correct
@@ -459,7 +460,7 @@ class Session:
         if left is None:
             return count
         if left <= 0 < count:
-            raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
+            raise BudgetError(f"the budget of {counted(self._trial_budget or 0, 'trial')} is spent")
         return min(count, left)
 
     # The same for an objective, which returns what fits the task and the budget.
@@ -559,7 +560,7 @@ class Session:
             if count < 0:
                 raise ValueError(f"counter {name!r}: {count} is negative")
             if getattr(self._meter, name) + count > MOST_COUNT:
-                raise ValueError(f"counter {name!r}: it counts to {MOST_COUNT:_} at most")
+                raise ValueError(f"counter {name!r}: it counts to {MOST_COUNT:,} at most")
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:

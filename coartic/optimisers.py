@@ -246,7 +246,7 @@ class Objective:
         if not ((wanted >= 0) & (wanted <= FAILED)).all():
             raise ValueError(
                 f"targets are {brief_value(wanted.tolist())}; each must be a cost, the ticks of a "
-                f"trial, from 0 to {FAILED:_}"
+                f"trial, from 0 to {FAILED:,}"
             )
         evaluations, costs = np.array([*self._better, (np.inf, -np.inf)]).T
         found = evaluations[np.searchsorted(-costs, -wanted)]

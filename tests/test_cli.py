@@ -1,5 +1,6 @@
 """The command line as a user meets it."""
 
+import io
 import os
 import re
 import signal
@@ -17,7 +18,7 @@ from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
 from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, app, draw
-from coartic.cli.terminal import Display
+from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
 from coartic.runs.plan import run_seed
 from coartic.tasks.task import TASK_FOLDER
@@ -86,13 +87,15 @@ def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
     assert "1 failed" in text
 
 
+@pytest.mark.parametrize("failed", [0, 1])
 @pytest.mark.parametrize("is_terminal", [True, False])
-def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal):
+def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal, failed):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
     progress = Progress(Path("results"), 63, done=18, waiting=Counter(x=37, y=20), workers=2)
+    progress.failed = failed
     progress.timed["x"], progress.took["x"] = 6, 600.0  # 100 s a run, by two workers
-    cell = cell_on(load_task("two-armed-2"), KNOWN["posture-qp/goals-ahead"])
+    cell = cell_on(load_task("two-armed-2"), KNOWN["corrective-alone/best-hands"])
     with Display() as display:
         display.update(progress, cell)  # too early to tell
         progress.done = 19
@@ -100,16 +103,27 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
         progress.done, progress.waiting = 63, Counter()
         display.update(progress, cell)
     shown = capsys.readouterr().err.replace("\r", "\n").split("\n")
-    name = "Two-armed 2, posture QP, goals ahead"
-    lines = ["63/63    0 failed"]
+    words = "  1 failed" if failed else ""
+    name = "Two-armed 2, corrective process alone, best hands"
+    lines = [f"63/63{words}"]
     if is_terminal:
         lines = [
-            f"18/63    0 failed                      {name}",
-            f"19/63    0 failed  about 48 min left   {name}"[:79],
-            f"63/63    0 failed                      {name}",
+            f"18/63{words}  {name}",
+            f"19/63{words}  48 min left  {name}",
+            f"63/63{words}  {name}",
         ]
         assert {*map(len, shown)} == {0, 79}  # drawn in its place, each time as wide
-    assert [line.rstrip() for line in shown if line] == [line[:79].rstrip() for line in lines]
+    assert [line.rstrip() for line in shown if line] == lines
+
+
+@pytest.mark.parametrize(
+    ("encoding", "printed"),
+    [("ascii", "-3 ? 1 -"), ("latin-1", "-3 ± 1 -"), ("utf-8", "−3 ± 1 –")],
+)
+def test_a_terminal_without_a_sign_shows_one_like_it(encoding, printed):
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding)
+    say("−3 ± 1 –", stream=terminal)
+    assert terminal.buffer.getvalue().decode(encoding) == f"{printed}{os.linesep}"
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -322,6 +336,26 @@ def test_a_new_file_can_be_imported_and_hides_no_module(coartic, tmp_path, monke
 def test_help_has_a_short_name(coartic):
     for command in ((), ("run",), ("report",)):
         assert coartic(*command, "-h") == coartic(*command, "--help") == coartic("help", *command)
+
+
+@pytest.mark.parametrize(("command", "_example"), COMMANDS)
+def test_help_has_no_types_of_python(coartic, command, _example):
+    assert "<" not in coartic(command.__name__.removesuffix("_"), "--help")[1]
+
+
+def test_ranges_are_written_for_people(coartic):
+    code, _, error = coartic("run", "paper", "--seed", -1)
+    assert (code, "from 0 to 9,223,372,036,854,775,807" in error) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("command", "ending"),
+    [("play", ".html"), ("draw", ".pdf"), ("animate 1a2b", ".mp4"), ("new my-search", ".py")],
+)
+def test_a_file_of_another_kind_is_not_written(coartic, tmp_path, command, ending):
+    code, _, error = coartic(*command.split(), "--out", tmp_path / "x.txt")
+    assert (code, "the name must end in" in error, ending in error) == (2, True, True)
+    assert not [*tmp_path.iterdir()]
 
 
 SURROUNDED = """

@@ -140,7 +140,7 @@ CASES = [
     ("test/random", "determinism", "same seed on ascending, same process: details"),
     ("test/local", "determinism", "same seed on tiny, another process: details"),
     ("test/remembers", "no hidden state", "after other runs, ascending with the same seed"),
-    ("test/spendthrift", "limits", "BudgetError: all 7 trials of the budget"),
+    ("test/spendthrift", "limits", "BudgetError: the budget of 7 trials is spent"),
     ("test/peeks", "information", "the method used 'Jacobian', which it does not declare"),
     ("test/overdeclares", "information", "declared but never used: Jacobian"),
     ("test/taker", "information", "reveal is for this project's own compiled methods"),

@@ -220,7 +220,7 @@ def test_ranges():
     assert named_by("long/v1/i000") == ["long/v1/i000"]
     with pytest.raises(TaskError, match="goes backwards"):
         named_by("long/v1/i003..i001")
-    with pytest.raises(TaskError, match="names more than 10_000 instances"):
+    with pytest.raises(TaskError, match="names more than 10,000 instances"):
         named_by(f"long/v1/i000..i{MOST_CELLS}")
     for text in ("long/v1/i000..d003", "long/v1/i000..", "long/v1/..i003"):
         with pytest.raises(TaskError, match="is not a range of instances"):

@@ -241,8 +241,12 @@ def test_what_else_is_refused():
         TaskVectorEnv(0, "two-armed-1")
     with pytest.raises(ValueError, match="reset takes no options, but {'task': 'long'} are"):
         TaskEnv("ascending").reset(options={"task": "long"})
-    with pytest.raises(ValueError, match="2 seeds for 3 environments"):
-        TaskVectorEnv(3, "ascending").reset(seed=[1, 2])
+    for seeds, count, words in (
+        ([1, 2], 3, "2 seeds for 3 environments"),
+        ([1, 2], 1, "2 seeds for 1 environment$"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            TaskVectorEnv(count, "ascending").reset(seed=seeds)
     for seed in (-1, 1.5, "1"):
         for env in (TaskEnv("ascending"), TaskVectorEnv(3, "ascending")):
             with pytest.raises(ValueError, match="seed is .*; it must be a whole number from 0"):

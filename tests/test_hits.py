@@ -100,7 +100,7 @@ def test_other_forms_of_the_same_table_are_read(people, tmp_path, form):
 
 
 NO_TABLE = {
-    "line 3: it has 16 entries, the headings are 15: subject,": lambda text: "".join(
+    "line 3: it has 16 values, the headings are 15: subject,": lambda text: "".join(
         line[:-1] + ",7" * (n == 2) + "\n" for n, line in enumerate(text.splitlines(True))
     ).encode(),
     "line 2: it has 14 entries": lambda text: text.replace("\na,", "\n", 1).encode(),
@@ -223,5 +223,5 @@ def test_a_goal_is_two_finite_numbers(goal):
 
 @pytest.mark.parametrize("seeds", [range(10**9), count()])
 def test_the_number_of_seeds_has_a_limit(seeds):
-    with pytest.raises(ValueError, match="seeds has more than 1_000_000 entries"):
+    with pytest.raises(ValueError, match="seeds has more than 1,000,000 entries"):
         learn_many(TASK, "EC4", seeds=seeds, trials=1)

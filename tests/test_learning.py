@@ -535,8 +535,8 @@ def test_seeds_of_numpy_are_shown_and_kept_as_numbers(seeds):
 @pytest.mark.parametrize(
     ("seeds", "trials", "most"),
     [
-        (range(10**9), 1, "1_000_000"),
-        (itertools.count(), 10_000, "20_000"),
+        (range(10**9), 1, "1,000,000"),
+        (itertools.count(), 10_000, "20,000"),
         (range(21), 10_000_000, "20"),
     ],
 )

@@ -117,8 +117,13 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
     assert words in text(page, "finding")
     assert "5 runs each)" in text(page, "meaning")
     # Earlier, by the slider, there was less of it.
+    reset = page.get_by_role("button", name="Reset")
+    assert reset.is_disabled()
     page.get_by_role("slider", name="Practice").fill("1")
     assert "alike" in text(page, "finding")
+    reset.click()
+    assert words in text(settled(page), "finding")
+    assert reset.is_disabled()
 
 
 @pytest.mark.parametrize("rule", ["best-single-hand", "best-of-all", "RLLR"])
@@ -146,8 +151,17 @@ def test_a_task_from_a_file_begins_with_the_hands_of_the_package(visited, tmp_pa
     assert ticks(page, "The learner") == -corrective_trial(task, initial_hands(task)).reward
 
 
-def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(visited, tmp_path):
-    task, page_file = metres_task(), tmp_path / "play.html"
+RING = """(canvas, { x, y, width, height }) => {  // radius of the circle, by its colour
+  const { left, top } = canvas.getBoundingClientRect();
+  const [column, row] = [x + width / 2 - left, y + height / 2 - top].map(Math.round);
+  const pixels = canvas.getContext("2d").getImageData(column, row, 40, 1).data;
+  return Array.from({ length: 40 }, (_, k) => k).findLast(k => pixels[4 * k] < 40);
+}"""
+
+
+@pytest.mark.parametrize("radius", [0.01, 0.03])
+def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(visited, tmp_path, radius):
+    task, page_file = metres_task(radius), tmp_path / "play.html"
     html = pages.play_page(task).replace("TRIALS = 10000;", "TRIALS = 100;")
     html = html.replace("const figure = new", "const figure = window.player = new")
     page_file.write_text(html, encoding="utf-8")
@@ -161,6 +175,14 @@ def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(visited, tm
     assert right - left < 1.2
     assert top - bottom < 1.0
     assert page.evaluate("player.within([0.1234, 0.4567])") == [0.123, 0.457]
+    centre, other = (
+        page.get_by_role("button", name=f"Goal {n}, at").bounding_box() for n in (2, 3)
+    )
+    pixels = np.hypot(*(centre[axis] - other[axis] for axis in "xy"))
+    metre = pixels / np.linalg.norm(np.subtract(*task.goals[1:]))
+    assert page.locator("[data-is=stage]").evaluate(RING, centre) == pytest.approx(
+        task.radius * metre, abs=1
+    )
     before = page.evaluate("player.state.goals.length")
     page.get_by_role("button", name="Add a goal").click()
     after = page.evaluate("player.state.goals")
@@ -331,14 +353,18 @@ def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
         changed_to(page, address, f"preset=2&others=&trials=100&drift={nonsense}")
         assert shown_condition(page) == CONDITIONS["EC1"]
         assert ticks(page, "The learner") == by_drift[0]
+    changed_to(page, address, "preset=2&others=&drift=1")
+    page.get_by_role("button", name="Reset").click()
+    assert dial.input_value() == "0"
 
 
 def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back(opened):
     page = settled(opened("who=plan&tick=200"))
     state, second = page.url, ticks(page, "Orange")
     page.get_by_role("radio", name="You").check()
-    assert ticks(settled(page), "You") == -corrective_trial("ascending", "RRR").reward
+    assert ticks(settled(page), "Blue: you") == -corrective_trial("ascending", "RRR").reward
     assert ticks(page, r"Orange: the planner \(local search\)") == second
+    assert ticks(page, r"Planner \(local search\), blue goals") < second
     assert "blue robot, a posture for each goal. Orange: the planner (local search)." in text(
         page, "lead"
     )
@@ -355,8 +381,9 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     page = settled(opened("who=alone"))
     task = page.get_by_label("Task").locator("option:checked")
     for _ in range(3):
+        assert text(page, "why") == ""
         page.get_by_role("button", name="Add a goal").click()
-    page.evaluate(DRAWN)
+    assert text(page, "why") == "Goals can be added while there are fewer than 6."
     labels = page.locator(".handle").evaluate_all("all => all.map(each => each.ariaLabel)")
     places = [re.search(r"at (\S+), (\S+)\. ", label).groups() for label in labels]
     places = np.array(places, dtype=float)
@@ -371,6 +398,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     shown, last = map(int, re.findall(r"\d+", text(page, "count")))
     assert shown == last
     assert "the robot hits goal 1." in text(page, "lead")
+    assert text(page, "why") == "The only goal stays; it has no next goal."
     page.get_by_role("button", name="Reset").click()
     assert task.inner_text() == "Up or down"
     assert "both robots" in text(page, "lead")
@@ -384,12 +412,49 @@ def test_on_a_phone_picture_slider_and_finding_come_first(visited, address):
     for width, height in ((390, 844), (844, 390)):
         page.set_viewport_size({"width": width, "height": height})
         assert "alike" in text(page, "finding")
+        assert text(page, "progress") == "1 trial"
         for part in (".stage", "[data-is=trials]", "[data-is=finding]"):
             box = page.locator(part).bounding_box()
             assert box["y"] + box["height"] <= height
     assert not page.get_by_label("Task").is_visible()
     page.get_by_text("Try more").click()
     assert page.get_by_label("Task").is_visible()
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_every_goal_is_seen_on_screen_and_in_print(opened, width):
+    page = settled(opened(width=width, color_scheme="dark"))
+    stage, inset = (page.locator(f"[data-is={name}]").bounding_box() for name in STAGE)
+    beside, below = (inset[axis] >= stage[axis] + stage[size] for axis, size in SIDES)
+    assert (beside, below) == (width == 1280, width == 390)
+    for handle in page.locator(".handle").all():
+        assert handle.evaluate(IS_ON_TOP)
+    page.evaluate(RECORD_PRINT, STAGE)
+    page.emulate_media(media="null")  # as the browser sees it: screen, then print
+    page.pdf(format="A4")
+    for across, up, paper in page.evaluate("printed"):
+        assert across == pytest.approx(up, rel=0.01)  # pixels a CSS pixel
+        assert across > 2
+        assert min(paper) > 200  # not the dark colour of the screen
+    assert page.evaluate("printed.length") == 2
+
+
+STAGE = ["stage", "inset"]
+SIDES = (("x", "width"), ("y", "height"))
+IS_ON_TOP = """handle => {
+  const { left, top, width, height } = handle.getBoundingClientRect();
+  window.scrollTo(0, 0);
+  return document.elementFromPoint(left + width / 2, top + height / 2) === handle;
+}"""
+RECORD_PRINT = """names => {
+  window.printed = [];
+  matchMedia("print").addEventListener("change", ({ matches }) => matches && names.forEach(name => {
+    const canvas = document.querySelector(`[data-is=${name}]`);
+    const pixel = canvas.getContext("2d").getImageData(4, canvas.height / 2, 1, 1).data;
+    const density = [canvas.width / canvas.clientWidth, canvas.height / canvas.clientHeight];
+    printed.push([...density, [...pixel].slice(0, 3)]);
+  }));
+}"""
 
 
 def test_it_practises_plays_and_saves_pictures(opened):

@@ -113,7 +113,7 @@ HANDLED = {
                "crashed", "counter 'gradients': it counts to"),
     "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),
     "trials": ("for _ in range(9): session.trial(corrected(session))",
-               "crashed", "all 3 trials of the budget are made"),
+               "crashed", "the budget of 3 trials is spent"),
     "honest": ("return Result(corrected(session))", "ok", ""),
     "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
                "        return Result(corrected(session))", "ok", ""),

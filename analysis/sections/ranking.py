@@ -28,6 +28,7 @@ from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.analysis.words import capital, interval, marked, number
 from coartic.estimates import LEVEL
+from coartic.internal.text import counted
 
 SCORES = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
 """Columns of :func:`.ranking` that are in the table for all tasks and for parts of them."""
@@ -206,7 +207,7 @@ def draw_ranking(study: Study) -> Parts | None:
         mark = "D" if learner else "o"
         (dot,) = axes.plot(row["gap"], y, mark, markersize=2.6, markeredgewidth=0, **look)
         name = shown_name(study, row["method"])
-        style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
+        style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
         write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
     axes.spines["left"].set_visible(False)

@@ -51,7 +51,14 @@ def _options(
 
 
 class Command(TyperCommand):
-    """A command whose usage shows arguments without braces, which would look like a choice."""
+    """A command whose help shows arguments by their names: without braces, which would look like a
+    choice, and without types of Python."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the arguments and the options of the command."""
+        for parameter in self.params:
+            vars(parameter)["display_type_rich"] = lambda *_, **__: ""
+        super().format_options(ctx, formatter)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the words after the name of the command."""
@@ -85,8 +92,8 @@ def main() -> None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
             os.set_inheritable(getattr(sys, name).fileno(), True)
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
-            stream.reconfigure(errors="replace")
+        if isinstance(stream, io.TextIOWrapper):  # also for help and messages of libraries
+            stream.reconfigure(errors="replaced")
     warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
     logging.getLogger("coartic").setLevel(logging.INFO)
     logging.getLogger("coartic").addHandler(logging.StreamHandler())

@@ -29,7 +29,7 @@ def draw(
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
-    from coartic.internal.files import publish, write_output
+    from coartic.internal.files import check_ending, publish, write_output
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
@@ -43,8 +43,7 @@ def draw(
 
     drawing = picture_of_tasks(chosen[:_PICTURED])
     if out.suffix:
-        if out.suffix.lower() not in FORMATS:
-            raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")
+        check_ending(out, FORMATS)
         write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
@@ -107,11 +106,13 @@ def play(
     import webbrowser
 
     from coartic import load_task
-    from coartic.internal.files import write_output
+    from coartic.internal.files import check_ending, write_output
     from coartic.play.page import play_page
 
     if replace and out is None:
         raise CoarticError("--replace has no effect without --out")
+    if out is not None:
+        check_ending(out, [".html"])
     chosen = [] if task is None else given.tasks_meant([task])
     page = play_page(*map(load_task, chosen)).encode()
     if out is None:

@@ -77,7 +77,7 @@ def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     pairs = [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
     if what["failed"]:
-        failed = f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"
+        failed = f"{what['failed']} of {counted(what['runs'], 'run')}: {'; '.join(what['reasons'])}"
         pairs.append(("Failed", failed))
     say_pairs([*pairs, *more])
 

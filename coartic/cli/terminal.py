@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import shutil
 import sys
 import textwrap
@@ -9,18 +10,34 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, TextIO
 
-from coartic.internal.text import counted, one_line
+from coartic.internal.text import counted, one_line, plain
 
 if TYPE_CHECKING:
     from coartic.benchmarks.runner import Progress
     from coartic.runs.plan import Cell
 
 READABLE = 24  # least width of a column of text, characters
+_ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\u202f": " ", "\xa0": " "}
+
+
+def replaced(error: UnicodeError) -> tuple[str, int]:
+    """Return characters of ASCII for what a terminal lacks: - for a minus sign, ? for others."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lacking = error.object[error.start : error.end]
+    return "".join(_ASCII.get(c, "?") for c in lacking), error.end
+
+
+codecs.register_error("replaced", replaced)
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print lines; characters that do not print, such as line breaks in names, are replaced."""
-    print("\n".join(map(one_line, lines)), file=stream, end=end, flush=True)
+    """Print lines; characters that do not print, such as line breaks in names, are replaced, and
+    those that the terminal lacks (:func:`replaced`)."""
+    stream = stream or sys.stdout
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    text = "\n".join(map(one_line, lines)).encode(encoding, "replaced").decode(encoding)
+    print(text, file=stream, end=end, flush=True)
 
 
 def complain(kind: str, text: str) -> None:
@@ -95,20 +112,20 @@ class Display:
             return
         there, seconds, left = progress.present + progress.done, progress.time_left, ""
         if seconds > 0:  # False for NaN
-            left = f"about {seconds / 60:.0f} min left" if seconds > 99 else f"{seconds:.0f} s left"
-        text = f"{there:{len(str(total))}}/{total}  {progress.failed:3} failed  {left:18}"
+            left = f"{seconds / 60:.0f} min left" if seconds > 99 else f"{seconds:.0f} s left"
+        failed = f"{progress.failed} failed" * bool(progress.failed)
+        text = "  ".join(filter(None, [f"{there}/{total}", failed, left]))
         if self._is_live:
             last = "starting processes"
             if cell is not None:
                 last = f"{cell.task.label}, {title_of(cell.method.name)}"
             width = shutil.get_terminal_size().columns - 1
             print("\r", end="", file=sys.stderr)
-            words = one_line(f"{text}  {last}")
-            say(f"{words[:width]:{width}}", stream=sys.stderr, end="")
+            say(f"{plain(f'{text}  {last}', width):{width}}", stream=sys.stderr, end="")
             self._end = "\n"
         elif there == total or (self.done and time.monotonic() - self._last >= self.EVERY_S):
             self._last = time.monotonic()
-            self.line(text.rstrip())
+            self.line(text)
 
     def line(self, text: str) -> None:
         """Print a line; the progress continues below the line."""

@@ -90,6 +90,12 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
         write_atomically(path, data)
 
 
+def check_ending(path: Path, endings: Collection[str]) -> None:
+    """Raise CoarticError for a file whose name has none of some endings."""
+    if path.suffix.lower() not in endings:
+        raise CoarticError(f"{path}: the name must end in {' or '.join(endings)}")
+
+
 def check_output(path: Path, *, replace: bool) -> None:
     """Raises CoarticError where a file may not be written: its name has no folder, is that of
     a folder or a link, or, without ``replace``, is taken."""

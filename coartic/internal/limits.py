@@ -38,7 +38,7 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
     if not is_number or not least <= float(value) <= most:
         raise ValueError(
             f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
-            f"from {least:{'' if whole else 'g'}} to {most:{'_' if isinstance(most, int) else 'g'}}"
+            f"from {least:{'' if whole else 'g'}} to {most:{',' if isinstance(most, int) else 'g'}}"
         )
 
 

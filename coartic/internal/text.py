@@ -140,7 +140,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
         return f"{plain(name, LONGEST_LINE)}: coartic reads no .{ending} file; {wanted}."
     several = list(names)
     shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
-    more = f" and {len(several) - shown} others" if len(several) > shown else ""
+    more = f" and {counted(len(several) - shown, 'other')}" if len(several) > shown else ""
     known = f". Known: {', '.join(several[:shown])}{more}."
     hint = (did_you_mean(name, several) if isinstance(name, str) else "") or known
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"

@@ -185,7 +185,7 @@ def learn_many(
     ordered = [*islice(seeds, most + 1)]
     if len(ordered) > most:
         raise ValueError(
-            f"seeds has more than {most:_} entries, which are the most for runs of {trials:_} "
+            f"seeds has more than {most:,} entries, which are the most for runs of {trials:,} "
             "trials: the rewards of all are kept. Run some seeds after the others"
         )
     for seed in ordered:

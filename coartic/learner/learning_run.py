@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
-from coartic.internal.text import short_repr
+from coartic.internal.text import counted, short_repr
 from coartic.learner.conditions import ExplorationCondition
 from coartic.method import Meter
 from coartic.model import MotionModel
@@ -99,7 +99,7 @@ class LearningRun:
         if self.best_trial is not None:
             return "the replay of what was learned did not hit every goal"
         return (
-            f"the corrective process failed in all {self.counters.trials} trials; "
+            f"the corrective process failed in all {counted(self.counters.trials, 'trial')}; "
             "no trial hit every goal"
         )
 

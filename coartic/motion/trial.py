@@ -616,7 +616,7 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
         for sequence in dict.fromkeys(each)
     }
     if several and len(each) != count:
-        raise ValueError(f"{len(each)} hand sequences for {count} trials")
+        raise ValueError(f"{counted(len(each), 'hand sequence')} for {counted(count, 'trial')}")
     rows = np.empty((count, len(task.goals)), dtype=np.int64)
     rows[:] = np.reshape([codes[sequence] for sequence in each], (-1, len(task.goals)))
     return rows

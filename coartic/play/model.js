@@ -12,22 +12,13 @@ const BASE_DOF = 2;
 const MOST_LINKS = 100;
 const MOST_SEQUENCES = 4096; // hand sequences that are tried one by one
 
-/* coartic/model.py; a tolerance of null is a tenth of the goals' radius. */
-const PAPER = {
-  step: 0.01, arrival_tolerance: null, gain: 0.05, correction_tolerance: null, max_iterations: 20000,
-};
-
-function for_radius({ arrival_tolerance, correction_tolerance, ...model }, radius) {
-  const or_tenth = (tolerance) => tolerance ?? radius / 10;
-  return { ...model, arrival_tolerance: or_tenth(arrival_tolerance), correction_tolerance: or_tenth(correction_tolerance) };
-}
-
-/* coartic/motion/batch.py; `task` is one of the package as plain data. */
-function problem_of(task, model = PAPER) {
+/* coartic/motion/batch.py; `task` is one of the package as plain data. The model is the default of coartic/model.py. */
+function problem_of(task) {
   const { robot, goals, radius, start: { base, left, right } } = task;
+  const model = { step: 0.01, arrival_tolerance: radius / 10, gain: 0.05, correction_tolerance: radius / 10, max_iterations: 20000 };
   const arm = (first, links, [shoulder_x, shoulder_y]) => ({ first, links, shoulder_x, shoulder_y });
   return {
-    task, robot, goals, radius, model: for_radius(model, radius), scale: scale_of(robot), start: [...base, ...left, ...right],
+    task, robot, goals, radius, model, scale: scale_of(robot), start: [...base, ...left, ...right],
     hands: task.hands.map((hand) => HANDS.indexOf(hand)).sort(),
     arms: [
       arm(BASE_DOF, robot.left_links, robot.left_shoulder),
@@ -713,7 +704,8 @@ function receding_horizon(problem, horizon) {
         const corner = plan.corners[k];
         const beyond = THROUGH / (distance_of(corner, trial.q) + 1e-9);
         const target = corner.map((value, j) => value + beyond * (value - trial.q[j]));
-        trial.reaches(goal + k, plan.hands[k], target);
+        const hits = move(problem, trial.q.slice(), target, goal + k, plan.hands[k], true) > 0; // else a step passes over the goal
+        trial.reaches(goal + k, plan.hands[k], hits ? target : corner);
       }
     }
   }
@@ -722,7 +714,7 @@ function receding_horizon(problem, horizon) {
 
 if (typeof module !== "undefined") {
   module.exports = {
-    CONDITIONS, PAPER, Generator, Learner, execute, initial_hands, letters_of, make_trial, problem_of,
+    CONDITIONS, Generator, Learner, execute, initial_hands, letters_of, make_trial, problem_of,
     receding_horizon, trajectory,
   };
 }

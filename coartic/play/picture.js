@@ -3,15 +3,11 @@
 
 /* What is in sight of points, with a margin: left, bottom, right, top. */
 function around(points, margin = 0) {
-  const box = [Infinity, Infinity, -Infinity, -Infinity];
-  points.forEach(([x, y]) => {
-    box[0] = Math.min(box[0], x - margin);
-    box[1] = Math.min(box[1], y - margin);
-    box[2] = Math.max(box[2], x + margin);
-    box[3] = Math.max(box[3], y + margin);
-  });
-  return box;
+  const sides = [0, 1].map((axis) => points.map((point) => point[axis]));
+  return [...sides.map((side) => Math.min(...side) - margin), ...sides.map((side) => Math.max(...side) + margin)];
 }
+
+const PRINTED = 3; // pixels a CSS pixel in print
 
 class Picture {
   constructor(canvas) {
@@ -27,12 +23,10 @@ class Picture {
   /* Start again, with a box of the world in sight. */
   begin([left, bottom, right, top]) {
     const { canvas, context } = this;
-    const density = this.density || window.devicePixelRatio || 1;
+    const density = this.density || (window.matchMedia("print").matches ? PRINTED : window.devicePixelRatio || 1);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (canvas.width !== Math.round(width * density) || canvas.height !== Math.round(height * density)) {
-      canvas.width = Math.round(width * density);
-      canvas.height = Math.round(height * density);
-    }
+    const pixels = { width: Math.round(width * density), height: Math.round(height * density) };
+    if (canvas.width !== pixels.width || canvas.height !== pixels.height) Object.assign(canvas, pixels);
     this.scale = Math.min(width / (right - left), height / (top - bottom));
     this.centre = [(left + right) / 2, (bottom + top) / 2];
     this.size = [width, height];
@@ -79,7 +73,7 @@ class Picture {
     context.strokeStyle = ink;
     const [from, to] = [12, 12 + unit * scale].map((x) => this.toWorld([x, size[1] - 12]));
     this.line([from, to], 1.5);
-    this.text(`${unit} length unit${unit === 1 ? "" : "s"}`, [18 + unit * scale, size[1] - 12], ink, "left", 12);
+    this.text(counted(unit, "length unit"), [18 + unit * scale, size[1] - 12], ink, "left", 12);
   }
 
   /* What the box slides on, below it or beside it. */
@@ -144,7 +138,7 @@ class Picture {
   goal([x, y], radius, { label, colour, hit, held, movable }) {
     const { context } = this;
     const [px, py] = this.toScreen([x, y]);
-    const r = Math.max(4, radius * this.scale);
+    const r = Math.max(2, radius * this.scale); // to scale, unless it would not be seen
     if (movable) {
       context.fillStyle = colour;
       context.globalAlpha = held ? 0.3 : 0.13;
@@ -158,7 +152,7 @@ class Picture {
     context.fillStyle = hit ? colour : this.colour("page");
     context.fill();
     context.strokeStyle = colour;
-    context.lineWidth = 2;
+    context.lineWidth = Math.min(2, r / 2);
     context.stroke();
     context.fillStyle = colour;
     this.text(label, [px + r + 11, py - r - 6], colour, "center", 15, 600);

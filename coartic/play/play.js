@@ -80,7 +80,7 @@ class Mover {
 
 class Play {
   constructor(root, data, saved) {
-    Object.assign(this, { root, data, held: null, order: 0, busy: false, results: new Map(), playing: false });
+    Object.assign(this, { root, data, held: null, order: 0, busy: false, results: new Map(), handles: new Map(), playing: false });
     this.find = (name) => root.querySelector(`[data-is="${name}"]`);
     this.set = (property, values) => Object.entries(values).forEach(([name, value]) => { this.find(name)[property] = value; });
     this.stage = new Picture(this.find("stage"));
@@ -97,6 +97,7 @@ class Play {
     ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, () => { this.waits = false; }, true));
     this.restore(saved);
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
+    window.matchMedia("print").addEventListener("change", () => this.draw()); // at once, in the size and colours of the print
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.refresh());
     new MutationObserver(() => this.refresh()).observe(document.body, { attributeFilter: ["data-theme"] }); // of the site
     new IntersectionObserver((entries) => {
@@ -363,7 +364,7 @@ class Play {
 
   draw() {
     const { stage, state } = this;
-    const colours = Object.fromEntries(["first", "second", "dim", "ink", "line", "hit", "soft"].map((name) => [name, stage.colour(name)]));
+    const colours = Object.fromEntries(["first", "second", "dim", "ink", "line", "soft"].map((name) => [name, stage.colour(name)]));
     colours.ghost = colours.dim;
     this.colours = colours;
     const points = [...this.movers.flatMap((mover) => mover.seen()), ...this.problems.flatMap((problem) => problem.goals)];
@@ -469,10 +470,11 @@ class Play {
     const all = [...references, ...learned].filter(Number.isFinite);
     if (!all.length) return;
     let [low, high] = [Math.min(...all), Math.max(...all)];
-    [low, high] = [low - 0.12 * (high - low) - 2, high + 0.25 * (high - low) + 4];
+    [low, high] = [low - 0.2 * (high - low) - 2, high + 0.25 * (high - low) + 4];
     curve.begin([0, 0, 1, 1]);
     const { context, size: [width, height] } = curve;
-    const [left, right, top, bottom] = [40, width - 10, 8, height - 22];
+    curve.text("ticks, by trials", [0, 8], colours.soft, "left", 12);
+    const [left, right, top, bottom] = [40, width - 10, 20, height - 22];
     const x = (trials) => left + ((right - left) * Math.log(trials)) / Math.log(TRIALS);
     const y = (ticks) => bottom - ((bottom - top) * (ticks - low)) / (high - low);
     for (let trials = 1; trials <= TRIALS; trials *= 10) {
@@ -484,16 +486,26 @@ class Play {
     for (let ticks = step * Math.ceil(low / step); ticks < high; ticks += step) {
       curve.text(`${ticks}`, [left - 5, y(ticks)], colours.soft, "right", 12);
     }
+    const named = []; // heights of names
     this.problems.forEach((_, k) => {
-      const level = (reward, dash) => { if (Number.isFinite(reward)) curve.path([[left, y(-reward)], [right, y(-reward)]], 1.2, dash); };
-      context.strokeStyle = colours[ROLES[k]];
-      level(this.alone[k].reward, [2, 4]);
-      level(this.plan[k] && this.plan[k].reward, [8, 4]);
-      level(this.optimum || NaN, []);
+      const colour = colours[ROLES[k]];
+      const level = (name, reward, dash) => {
+        if (!Number.isFinite(reward)) return;
+        const at = y(-reward);
+        curve.path([[left, at], [right, at]], 1.2, dash);
+        const free = [at - 8, at + 9].find((place) => references.every((ticks) => Math.abs(y(ticks) - place) > 6)
+          && named.every((other) => Math.abs(other - place) > 12));
+        if (free === undefined) return;
+        named.push(free);
+        curve.text(name, [left + 4, free], colour, "left", 12);
+      };
+      context.strokeStyle = colour;
+      level(NAMES.alone, this.alone[k].reward, [2, 4]);
+      level("planner", this.plan[k] && this.plan[k].reward, [8, 4]);
+      level("proven optimum", this.optimum || NaN, []);
       runs_of(k).forEach(({ snapshots }) => curve.path(snapshots.flatMap(({ trials, reward }, i) => (
         [snapshots[Math.max(0, i - 1)].reward, reward].map((each) => [x(trials), y(-each)]))), 1.5));
     });
-    curve.text("ticks, by trials", [right, top + 8], colours.soft, "right", 12);
     const at = Math.min(this.shown, Math.max(1, ...runs.map(({ made }) => made)));
     context.fillStyle = colours.ink;
     context.fillRect(x(at) - 0.75, top, 1.5, bottom - top);
@@ -549,7 +561,7 @@ class Play {
     const random = Number.isFinite(by_chance) ? ` (random search: ${by_chance.toFixed(1)})` : "";
     return [
       `At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
-      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${runs} runs each).${random && " Random search keeps the best of as many random trials."}`,
+      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${counted(runs, "run")} each).${random && " Random search keeps the best of as many random trials."}`,
     ];
   }
 
@@ -557,13 +569,13 @@ class Play {
   get scores() {
     const { state, main } = this;
     const you = state.who === "you";
-    let names = you ? ["You", `Orange: ${this.nameOf(state.mate)}`] : ["Blue", "Orange"];
+    let names = you ? ["Blue: you", `Orange: ${this.nameOf(state.mate)}`] : ["Blue", "Orange"];
     if (this.announced) names = ["The learner's next trial", "The planner"];
     if (main.length < 2) names = [capital(this.nameOf(state.who))];
     const scores = main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
     if (main.length > 1 && !you) return scores;
     if (main.length < 2 && state.who !== "alone") scores.push(["ghost", "Corrective process alone", this.alone[0].reward]);
-    if (this.plan[0] && state.who !== "plan") scores.push(["bare", "Planner (local search)", this.plan[0].reward]);
+    if (this.plan[0] && state.who !== "plan") scores.push(["bare", `Planner (local search)${main.length > 1 ? ", blue goals" : ""}`, this.plan[0].reward]);
     if (this.optimum) scores.push(["bare", "Optimum (proven)", this.optimum]);
     return scores;
   }
@@ -586,7 +598,7 @@ class Play {
     const drift = state.drift ? `, drift ${state.drift}` : "";
     this.set("textContent", {
       lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", play: this.playing ? "Pause" : "Play",
-      count: `${this.main.map((mover, k) => `${this.main.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${mover.last + 1}`).join(", ")} ticks`,
+      count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : counted(mover.last + 1, "tick")}`).join(", "),
     });
     const stored = this.stored(state.who);
     this.find("film").hidden = !stored;
@@ -636,36 +648,22 @@ class Play {
         wanted.set(`${k} ${g}`, { at: goal, label: `Goal ${this.labelOf(k, g)}${whose}`, move: (to) => this.moveGoal(k, g, to) });
       }));
     }
-    const layer = this.find("handles");
-    let place = 0;
-    this.handles = this.handles || new Map();
-    this.handles.forEach((handle, name) => {
-      if (!wanted.has(name)) {
-        handle.remove();
-        this.handles.delete(name);
-      }
-    });
-    wanted.forEach(({ at, label, move }, name) => {
-      let handle = this.handles.get(name);
-      if (!handle) {
-        handle = document.createElement("button");
-        handle.type = "button";
-        handle.className = "handle";
-        this.drags(handle, name);
-        this.handles.set(name, handle);
-      }
-      const next = layer.children[place];
-      if (next !== handle) layer.insertBefore(handle, next || null); // in the order of the keyboard
-      place += 1;
+    const shown = [...wanted].map(([name, { at, label, move }]) => {
+      if (!this.handles.has(name)) this.handles.set(name, this.handle(name));
+      const handle = this.handles.get(name);
       const [x, y] = this.stage.toScreen(at);
       handle.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
       handle.classList.toggle("joint", this.editing);
       handle.setAttribute("aria-label", `${label}, at ${short(at[0])}, ${short(at[1])}. Arrow keys move it.`);
-      Object.assign(handle, { at, move });
+      return Object.assign(handle, { at, move });
     });
+    const layer = this.find("handles");
+    const there = [...layer.children];
+    if (there.length !== shown.length || shown.some((handle, k) => handle !== there[k])) layer.replaceChildren(...shown);
   }
 
-  drags(handle, name) {
+  handle(name) {
+    const handle = Object.assign(document.createElement("button"), { type: "button", className: "handle" });
     const to = (event) => {
       const box = this.find("stage").getBoundingClientRect();
       return this.stage.toWorld([event.clientX - box.left, event.clientY - box.top]);
@@ -696,6 +694,7 @@ class Play {
       handle.move(handle.at);
       this.keep();
     });
+    return handle;
   }
 
   /* The robots stand at the goal they share. */
@@ -777,7 +776,10 @@ class Play {
       this.keep();
     };
     on("preset", "change", (event) => choose(Number(event.target.value)));
-    on("reset", "click", () => choose(this.state.preset));
+    on("reset", "click", () => {
+      this.state.drift = this.first.drift;
+      choose(this.state.preset);
+    });
     on("more", "toggle", (event) => {
       this.state.open = Number(event.target.open);
       this.refresh();
@@ -821,6 +823,7 @@ class Play {
     on("trials", "input", (event) => {
       const trials = Math.max(1, Math.round(Math.exp((Number(event.target.value) / 1000) * Math.log(TRIALS))));
       this.state.trials = trials < TRIALS ? trials : 0;
+      this.showControls();
       this.showMeeting();
       this.answer();
     });
@@ -906,13 +909,13 @@ class Play {
     };
     state.ahead = Math.max(0, Math.min(Math.round(state.ahead), state.goals.length - 1));
     state.edited = Math.max(1, Math.min(Math.round(state.edited), state.goals.length));
-    const { who, goals, others, explores, drift, ahead, edited } = state;
+    const { who, goals, others, explores, trials, drift, ahead, edited } = state;
     const runs = preset.runs || [];
     const one = preset.task.hands.length < 2;
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
     fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
-    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => ticks).join(" and ")} ticks`])]);
-    fill("ahead", goals.map((_, k) => [k, k ? `${k} goal${k > 1 ? "s" : ""} ahead` : "no goal ahead"]));
+    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => counted(ticks, "tick")).join(" and ")}`])]);
+    fill("ahead", goals.map((_, k) => [k, k ? `${counted(k, "goal")} ahead` : "no goal ahead"]));
     fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
     this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores, drift: DRIFTS.indexOf(drift) });
     this.find("drift").setAttribute("aria-valuetext", `drift ${drift}`);
@@ -920,8 +923,9 @@ class Play {
     ["who", "reward"].forEach((name) => this.find(name).querySelectorAll("input").forEach((input) => { input.checked = input.value === state[name]; }));
     this.find("two").checked = Boolean(others);
     this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
-    const few = goals.length < 2;
-    this.set("disabled", { reset: !changed && !state.own, two: few, fewer: few, announced: few, add: goals.length >= MOST_GOALS });
+    const [few, full] = [goals.length < 2, goals.length >= MOST_GOALS];
+    this.set("disabled", { reset: !changed && !state.own && !trials && drift === this.first.drift, two: few, fewer: few, announced: few, add: full });
+    this.find("why").textContent = (few && "The only goal stays; it has no next goal.") || (full && `Goals can be added while there are fewer than ${MOST_GOALS}.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
       runs: !runs.length, dial: other, "for-learner": other, "for-dial": other, "for-two": other || one,
@@ -983,12 +987,13 @@ class Play {
     this.find("note").textContent = note;
   }
 
-  /* The stage at twice its size, with the words beside it. */
+  /* The stage at twice its size, above the postures at the shared goal and the words. */
   save() {
     const { stage, inset, data, colours } = this;
     [stage.density, inset.density] = [2, 2];
     this.draw();
-    const [width, height] = stage.size;
+    const [width, stage_height] = stage.size;
+    const height = stage_height + (inset.canvas.hidden ? 0 : inset.size[1]);
     const picture = new Picture(document.createElement("canvas"));
     const { canvas, context } = picture;
     const words = [[...this.find("score").children].map((line) => line.textContent).join("; "), ...this.finding, `${[this.find("preset").selectedOptions[0].text, this.nameOf(this.state.who), this.find("progress").textContent].filter(Boolean).join(", ")}; coartic ${data.version}`];
@@ -1001,7 +1006,7 @@ class Play {
     context.fillStyle = stage.colour("page");
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.drawImage(stage.canvas, 0, 0);
-    if (!inset.canvas.hidden) context.drawImage(inset.canvas, 2 * inset.canvas.offsetLeft, 2 * inset.canvas.offsetTop);
+    if (height > stage_height) context.drawImage(inset.canvas, 0, 2 * stage_height);
     lines.forEach((line, k) => picture.text(line, [24, 2 * height + 32 + 40 * k], colours.ink, "left", 28));
     [stage.density, inset.density] = [0, 0];
     this.draw();

@@ -297,7 +297,7 @@ def first_good(
         rejected.append(rule)
     rule, times = Counter(rejected).most_common(1)[0]
     raise TaskError(
-        f"{address}: {most:_} draws of family {family.name!r} broke a rule, {times:_} of "
+        f"{address}: {most:,} draws of family {family.name!r} broke a rule, {times:,} of "
         f"them {rule!r}"
     )
 
@@ -359,7 +359,7 @@ def named_by(text: str) -> list[str]:
     if last.number < first.number:
         raise TaskError(f"{text!r} goes backwards; put the lower number first")
     if last.number - first.number >= MOST_CELLS:
-        raise TaskError(f"{text!r} names more than {MOST_CELLS:_} instances")
+        raise TaskError(f"{text!r} names more than {MOST_CELLS:,} instances")
     numbers = range(first.number, last.number + 1)
     return [str(first._replace(number=number)) for number in numbers]
 
