@@ -124,10 +124,8 @@ def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.Dat
 
 
 def looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the colour and dash of each method, the same in all figures of a report.
-
-    Built-in methods may have a look of their own. Methods from files are brown; more than four of
-    them, and the others, get what is free.
+    """Yield colour and dash of each method: its own, brown for methods from files, else the next
+    that is unused.
     """
     fixed = {row["look"] for row in rows.values()}
     free = itertools.cycle((c, d) for d in DASHES for c in COLORS if (c, d) not in fixed)

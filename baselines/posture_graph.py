@@ -123,7 +123,7 @@ class PostureGraph:
         start = dict.fromkeys(HANDS, np.array(self.task.q0)[None, :])
         kept = [Beginning((), start, np.zeros((1, 1)), ())]
         for _ in range(len(self.task.goals)):
-            longer = [more for beginning in kept for more in self.longer(beginning)]
+            longer = [more for beginning in kept for more in self.extend(beginning)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
         chains: list[Chain] = []
@@ -144,8 +144,8 @@ class PostureGraph:
             chains.append((hands, np.array(configurations)))
         return chains
 
-    def longer(self, begun: Beginning) -> Iterator[Beginning]:
-        """Beginnings by one goal longer."""
+    def extend(self, begun: Beginning) -> Iterator[Beginning]:
+        """Extend the cheapest chains by one goal, with each hand."""
         hands, nodes, cost = begun.hands, begun.nodes, begun.cost
         goal = len(hands)
         for hand in HANDS:

@@ -80,7 +80,7 @@ class Rounding:
                 yield rounded
 
     def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Least number of ticks of any rounding of a plan as long as this one."""
+        """Return a lower bound of the ticks of every rounding of this plan."""
         length = float(plan.lengths().sum())
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved

@@ -30,7 +30,7 @@ from coartic.internal.limits import (
     number_or_range,
 )
 from coartic.internal.text import counted, unknown
-from coartic.internal.validation import FileData, error_saying, explain_inline
+from coartic.internal.validation import FileData, explain_inline, sentence_error
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, trials_in
 from coartic.tasks.families import instance_of, named_by, own_families, read_family
@@ -41,7 +41,7 @@ def task_or_name(value: Any) -> Task | str:
     """Return a task, or its name or path as a text."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
-    raise error_saying(f"{value!r} is no task; it should be a name, a path or a task")
+    raise sentence_error(f"{value!r} is no task; it should be a name, a path or a task")
 
 
 def runs_asked(value: Any) -> int | range | None:
@@ -50,7 +50,7 @@ def runs_asked(value: Any) -> int | range | None:
         example = "range(50, 100), or 50..99 in a command"
         return None if value is None else number_or_range("runs", value, example)
     except ValueError as error:
-        raise error_saying(str(error)) from None
+        raise sentence_error(str(error)) from None
 
 
 JobOf = Callable[..., Job]

@@ -19,7 +19,7 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_TRIALS, brief_value
 from coartic.internal.text import Line, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, error_saying, explain_file
+from coartic.internal.validation import FileData, explain_file, sentence_error
 from coartic.robot import Finite
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
@@ -89,11 +89,11 @@ class Block(FileData):
         grid."""
         for name, values in self.grid.items():
             if name in self.parameters:
-                raise error_saying(
+                raise sentence_error(
                     f"{brief_value(name)} stands among the parameters and in the grid"
                 )
             if len(set(values)) < len(values):
-                raise error_saying(f"{brief_value(name)} has the same value twice in the grid")
+                raise sentence_error(f"{brief_value(name)} has the same value twice in the grid")
         return self
 
 

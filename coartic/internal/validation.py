@@ -113,7 +113,7 @@ def explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[str
     return list(dict.fromkeys(sentences)), max(0, len(details) - _SHOWN)
 
 
-def error_saying(text: str) -> PydanticCustomError:
+def sentence_error(text: str) -> PydanticCustomError:
     """A validation error whose message needs no prefix."""
     return PydanticCustomError("sentence", "{text}", {"text": text})
 

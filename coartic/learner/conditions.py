@@ -33,7 +33,7 @@ from pydantic.dataclasses import dataclass
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import short_repr, unknown
-from coartic.internal.validation import error_saying, in_sentences
+from coartic.internal.validation import in_sentences, sentence_error
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     try:
         return validate(value)
     except ValidationError:
-        raise error_saying(
+        raise sentence_error(
             f"drift is {brief_value(value)}; it should be a number from 0 to 10, or a list of such "
             "numbers"
         ) from None

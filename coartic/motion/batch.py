@@ -192,7 +192,7 @@ def copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
 
 @inlined
 def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
-    """Load the arm of a run, which has this number, into a slot."""
+    """Copy goal, links and joints of run ``number`` into slot ``slot``."""
     at.run[slot], at.first[slot], at.links[slot] = number, arm.first, len(arm.links)
     at.shoulder[0, slot] = arm.shoulder_x
     at.shoulder[1, slot] = arm.shoulder_y

@@ -66,8 +66,8 @@ class Kernel:
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the compiled function, for which Numba takes a kernel that another
-        kernel calls."""
+        """Pass attribute access on to the compiled dispatcher: Numba then accepts a Kernel inside
+        kernels."""
         if name in ("_numba_type_", "py_func", "targetoptions"):
             return getattr(self.dispatcher, name)
         raise AttributeError(f"a kernel has no attribute {name!r}")

@@ -33,7 +33,7 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, check_limits
 from coartic.internal.text import Line, counted, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, error_saying, explain_file
+from coartic.internal.validation import FileData, explain_file, sentence_error
 from coartic.motion.movement import move
 from coartic.motion.trial import ranked_sequences, search_initial_hands
 from coartic.robot import HANDS, Hand, Robot
@@ -72,7 +72,7 @@ def in_thousandths(value: float) -> int:
     if not math.isfinite(value):
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
-        raise error_saying(f"{value} should have at most three decimals")
+        raise sentence_error(f"{value} should have at most three decimals")
     return round(value * _PARTS)
 
 

@@ -26,7 +26,7 @@ from coartic.internal.files import folder_named, write_output
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import Line, counted, did_you_mean, short_repr
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, error_saying, explain_file
+from coartic.internal.validation import FileData, explain_file, sentence_error
 from coartic.model import PAPER, PAPER_RADIUS, MotionModel, check_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 
@@ -207,9 +207,9 @@ class Task(FileData):
         """Read ``q0`` as the start, or let both arms point along +x without a start."""
         if isinstance(content, dict) and "penalty" in content:
             reads = "version 1.1.0 of coartic reads tasks with a penalty"
-            raise error_saying(f"{reads}; here a reward is minus the ticks")
+            raise sentence_error(f"{reads}; here a reward is minus the ticks")
         if isinstance(content, dict) and {"start", "q0"} <= content.keys():
-            raise error_saying("q0 and start both say where a trial begins: give one of them")
+            raise sentence_error("q0 and start both say where a trial begins: give one of them")
         if not isinstance(content, dict) or "start" in content:
             return content
         robot = content.get("robot", Robot())
@@ -221,11 +221,11 @@ class Task(FileData):
         try:
             q = real_array("q0", content.pop("q0", np.zeros(robot.dof)))
         except ValueError as error:
-            raise error_saying(str(error)) from None
+            raise sentence_error(str(error)) from None
         if q.shape != (robot.dof,):
-            raise error_saying(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
+            raise sentence_error(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
         if not np.isfinite(q).all():
-            raise error_saying(f"q0 is {brief_value(q.tolist())}; needed are finite numbers")
+            raise sentence_error(f"q0 is {brief_value(q.tolist())}; needed are finite numbers")
         left, right = (tuple(q[robot.joints(hand)].tolist()) for hand in HANDS)
         content["start"] = Start(base=tuple(q[:2].tolist()), left=left, right=right)
         return content
@@ -234,43 +234,43 @@ class Task(FileData):
     def _is_consistent(self, info: ValidationInfo) -> Task:
         for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
             if len(set(values)) < len(values):
-                raise error_saying(f"{key} names the same entry twice: {', '.join(values)}")
+                raise sentence_error(f"{key} names the same entry twice: {', '.join(values)}")
         for hand, angles in (("left", self.start.left), ("right", self.start.right)):
             joints = len(self.robot.left_links if hand == "left" else self.robot.right_links)
             if len(angles) != joints:
-                raise error_saying(
+                raise sentence_error(
                     f"start.{hand} has {len(angles)} joint angles; the {hand} arm has {joints} "
                     "joints"
                 )
             most = max(angles, key=abs)
             if abs(most) > 2 * math.pi:
-                raise error_saying(
+                raise sentence_error(
                     f"start.{hand} has the angle {most:g}; angles are in rad, from -2π to 2π. Did "
                     f"you mean {most:g}° = {math.radians(most):.3f}?"
                 )
         for key in self.provenance:
             if key not in Task.model_fields:
                 meant = did_you_mean(key, all_keys())
-                raise error_saying(f"provenance.{key} is not a key of a task{meant}")
+                raise sentence_error(f"provenance.{key} is not a key of a task{meant}")
         text = self.initial_hands
         if not self.initial_is_policy:
             if not text or set(text) - set(LETTERS):
-                raise error_saying(
+                raise sentence_error(
                     f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such "
                     f"as 'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
                 )
             if len(text) != len(self.goals):
-                raise error_saying(
+                raise sentence_error(
                     f"initial_hands {brief_value(text)} names {len(text)} hands for "
                     f"{counted(len(self.goals), 'goal')}"
                 )
             for hand in sorted({LETTERS[letter] for letter in text} - set(self.hands)):
-                raise error_saying(
+                raise sentence_error(
                     f"initial_hands {text!r} uses the {hand} hand, which is not among hands"
                 )
         # No model's corrective process ends farther from a goal than its rim (check_task).
         if info.context != WITHOUT_REACH and (far := out_of_reach(self, self.radius)) is not None:
-            raise error_saying(far)
+            raise sentence_error(far)
         return self
 
     @checked_arguments
@@ -349,10 +349,10 @@ def check_hands(task: Task, hands: str) -> str:
 
 
 def out_of_reach(task: Task, tolerance: float) -> str | None:
-    """The first goal of a task, in words, that no hand, or not the initial one, can hit.
+    """Name the first goal that no hand, or not the initial one, can hit; None if all can be hit.
 
     ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
-    length unit. None where all goals are within reach.
+    length unit.
     """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
