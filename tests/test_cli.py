@@ -51,7 +51,7 @@ def test_run_resumes(coartic, tmp_path):
     assert text.startswith("14 runs in ")
     assert len(text.splitlines()) <= 12
     assert max(map(len, text.splitlines())) <= max(80, len(str(out)) + 40)
-    assert "14/14    0 failed\n" in error  # plain lines without a terminal
+    assert "Runs: 14/14\n" in error  # plain lines without a terminal
     made_with = load(out).made_with
     assert made_with["packages"]["numba"]
     assert made_with["command"][1:3] == ["run", "paper"]
@@ -105,7 +105,7 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal,
     shown = capsys.readouterr().err.replace("\r", "\n").split("\n")
     words = "  1 failed" if failed else ""
     name = "Two-armed 2, corrective process alone, best hands"
-    lines = [f"63/63{words}"]
+    lines = [f"Runs: 63/63{words}"]
     if is_terminal:
         lines = [
             f"18/63{words}  {name}",

@@ -125,7 +125,7 @@ class Display:
             self._end = "\n"
         elif there == total or (self.done and time.monotonic() - self._last >= self.EVERY_S):
             self._last = time.monotonic()
-            self.line(text)
+            self.line(f"Runs: {text}")
 
     def line(self, text: str) -> None:
         """Print a line; the progress continues below the line."""
