@@ -35,33 +35,20 @@ KEPT = {
 """Tables and figures that are kept of each suite's report."""
 
 
-class Row:
-    """A row of a stored table, with its columns as attributes."""
-
-    def __init__(self, values: pd.Series) -> None:
-        self._values = values
-
-    def __getattr__(self, column: str) -> Any:
-        return self._values[column]
-
-    def __getitem__(self, column: str) -> Any:
-        return self._values[column]
-
-
 def table(suite: str, name: str) -> pd.DataFrame:
     """A stored table of a suite or a study, with its rows by name."""
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
     return pd.read_csv(folder / f"{name}.csv", index_col=0)
 
 
-def row(suite: str, name: str, which: str) -> Row:
+def row(suite: str, name: str, which: str) -> dict[Any, Any]:
     """A row of a stored table. Raises KeyError for one that is not there."""
-    return Row(table(suite, name).loc[which])
+    return table(suite, name).loc[which].to_dict()
 
 
-def claim(name: str, study: str = "replication") -> Row:
+def claim(name: str, study: str = "replication") -> dict[Any, Any]:
     """A judged claim of a study by its id."""
-    return Row(table(study, "claims").loc[name])
+    return row(study, "claims", name)
 
 
 def cells_of_the_paper() -> pd.DataFrame:
@@ -94,9 +81,9 @@ def seen(evidence: str, words: str, which: int = 0) -> str:
     return str(re.findall(number_behind, evidence, re.IGNORECASE)[which])
 
 
-def p_of_shares(values: Row, published_runs: int) -> float:
+def p_of_shares(values: dict[Any, Any], published_runs: int) -> float:
     """p of Fisher's exact test that runs learn a hand sequence as often as published ones."""
-    counts = (values.published_runs, published_runs), (values.runs, values.of_runs)
+    counts = (values["published_runs"], published_runs), (values["runs"], values["of_runs"])
     return float(stats.fisher_exact([[n, of - n] for n, of in counts]).pvalue)
 
 

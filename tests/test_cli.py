@@ -345,7 +345,7 @@ def test_help_has_no_types_of_python(coartic, command, _example):
 
 def test_ranges_are_written_for_people(coartic):
     code, _, error = coartic("run", "paper", "--seed", -1)
-    assert (code, "from 0 to 9,223,372,036,854,775,807" in error) == (2, True)
+    assert (code, "it should be at least 0" in error) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,8 @@ def test_trials_outside_the_session_stop_a_run(methods, means):
     for _ in range(2):
         (outcome,) = perform_job(Job(cell, 0, (0,)))
         assert outcome.status == "crashed"
-        assert f"made {OUTSIDE[means]} trials outside its session" in outcome.reason
+        made = "1 trial" if OUTSIDE[means] == 1 else f"{OUTSIDE[means]} trials"
+        assert f"made {made} outside its session" in outcome.reason
 
 
 CASES = [

@@ -103,7 +103,7 @@ NO_TABLE = {
     "line 3: it has 16 values, the headings are 15: subject,": lambda text: "".join(
         line[:-1] + ",7" * (n == 2) + "\n" for n, line in enumerate(text.splitlines(True))
     ).encode(),
-    "line 2: it has 14 entries": lambda text: text.replace("\na,", "\n", 1).encode(),
+    "line 2: it has 14 values": lambda text: text.replace("\na,", "\n", 1).encode(),
     "is in UTF-16, as Excel": lambda text: text.encode("utf-16"),
     "in UTF-16": lambda text: text.encode("utf-16-le"),
     "is not in UTF-8: save": lambda text: text.replace("\na,", "\nJos\xe9,").encode("latin-1"),

@@ -24,7 +24,7 @@ def test_a_budget_that_ends_within_a_batch():
     np.testing.assert_array_equal(rest.rewards, unlimited.rewards[4:7])
     assert (session.trials_made, session.trials_left, len(session.rewards)) == (7, 0, 7)
     assert len(session.trials([], targets[:0]).ticks) == 0
-    with pytest.raises(BudgetError, match="all 7 trials"):
+    with pytest.raises(BudgetError, match="the budget of 7 trials is spent"):
         session.trials(hands, targets)
 
 

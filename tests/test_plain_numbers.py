@@ -18,7 +18,7 @@ def test_stored_tables_have_the_numbers_of_the_plain_computation():
     assert not any(name.startswith("coartic") for name in imported)
     signs, scores, methods = (
         pd.read_csv(STORED / f"{name}.csv", index_col=0)
-        for name in ("signatures", "scores", "methods")
+        for name in ("signatures", "ranking", "methods")
     )
     plain = plain_numbers.numbers()
     stored = {
