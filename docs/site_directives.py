@@ -151,9 +151,24 @@ def plainly(
     return inspect.stringify_signature(shown, show_return_annotation=False), returns
 
 
+def define(app: Sphinx, page: nodes.document, name: str) -> None:
+    """Give links to terms of the glossary their definitions, which browsers show on hover."""
+    terms = {
+        key: section[1].astext().replace("\n", " ")
+        for section in app.env.get_doctree("glossary").findall(nodes.section)
+        for key in section["ids"]
+        if isinstance(section[1], nodes.paragraph)
+    }
+    for link in page.findall(nodes.reference):
+        place, _, term = link.get("refuri", "").partition("#")
+        if place.endswith("glossary.html") and term in terms:
+            link["reftitle"] = terms[term]
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the directive."""
+    """Register the directive, and what is done to each page and to the site."""
     app.add_directive("made", Made)
     app.connect("autodoc-process-signature", plainly)
+    app.connect("doctree-resolved", define)
     app.connect("build-finished", finish)
     return {"parallel_read_safe": True}
