@@ -64,16 +64,17 @@ PAGE = Path(__file__).parents[1] / "how-fast.md"
 HEAD = """\
 # How fast
 
-CPU microseconds of one core for a trial, by the function that makes it: medians, measured in one run by
-`make speed`. Times depend on the machine, ratios less.
+CPU microseconds of one core for a trial, by the function that makes it: medians, measured in one
+run by `make speed`. Times depend on the machine, ratios less.
 
 | way | {heads} |
 | --- | {rules} |
 """
 FOOT = """
-The *plain loop* is the model as a programmer would first write it with Numba (`docs/scripts/plain_loop.py`); it
-needs the same ticks. The kernel moves many arms side by side and skips steps in which the hand provably stays
-out of the goal. *Kinematics alone* is a lower limit for the kernel.
+The *plain loop* is the model as a programmer would first write it with Numba
+(`docs/scripts/plain_loop.py`); it needs the same ticks. The kernel moves many arms side by side and
+skips steps in which the hand provably stays out of the goal. *Kinematics alone* is a lower limit
+for the kernel.
 """
 
 
