@@ -33,6 +33,17 @@ html_show_sphinx = False
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_inline", "colon_fence"]
 
+# Pages that are folded under another page in the navigation.
+FOLDED = {
+    "findings": ("corrections", "foreign", "earlier"),
+    "paper": ("reconstruction", "claims"),
+    "tasks": ("families",),
+    "methods": ("beside",),
+    "howto/report": ("/gallery",),
+    "howto/share": ("/cluster",),
+    "howto/python": ("/how-fast",),
+}
+
 # Pages whose code is run whenever the site is built, so they show what came out.
 NOTEBOOKS = {"gallery", "tutorial"}
 nb_execution_mode = "force"
@@ -95,6 +106,11 @@ def setup(app):
 
         source[0] = _OUTSIDE.sub(path_of, source[0])
 
+    def fold(app, name, source):
+        """Add the pages that are folded under this one to its navigation."""
+        if name in FOLDED:
+            source[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(FOLDED[name]) + "\n```\n"
+
     def code(app, name, source):
         """Turn blocks of code into cells of a notebook: a file to save, commands, or Python."""
         if name not in NOTEBOOKS:
@@ -115,5 +131,6 @@ def setup(app):
         lines[:] = [_BAR.sub(r"\|", line) for line in lines]
 
     app.connect("source-read", links)
+    app.connect("source-read", fold)
     app.connect("source-read", code)
     app.connect("autodoc-process-docstring", bars)

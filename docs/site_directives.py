@@ -8,6 +8,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
+import pandas as pd
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util import inspect
@@ -42,7 +43,8 @@ def bare(kind: Any) -> Any:
 
 
 def claims() -> Iterator[str]:
-    """The paper's claims; each has its id for an anchor."""
+    """Yield the table of the paper's claims; each has its id for an anchor."""
+    judged = pd.read_csv(REPLICATION / "claims.csv", index_col=0).fillna("–")
 
     def goals(name: str, claim: dict[str, Any]) -> str:
         if name.endswith("-in-general"):
@@ -55,10 +57,13 @@ def claims() -> Iterator[str]:
             goals(name, c),
             f"{c['place']}: “{c['quote']}”",
             f"{c['test'][0].upper()}{c['test'][1:]}.",
+            judged.replicates[name],
+            judged.more_than_selection[name],
         )
         for name, c in tomllib.loads((REPLICATION / "claims.toml").read_text("utf-8")).items()
     )
-    yield from table(("claim", "goals", "the paper says", "how it is judged"), rows)
+    heads = "claim", "goals", "the paper says", "how it is judged", "replicates"
+    yield from table((*heads, "more than selection"), rows)
 
 
 def margins() -> Iterator[str]:
@@ -146,9 +151,24 @@ def plainly(
     return inspect.stringify_signature(shown, show_return_annotation=False), returns
 
 
+def define(app: Sphinx, page: nodes.document, name: str) -> None:
+    """Give links to terms of the glossary their definitions, which browsers show on hover."""
+    terms = {
+        key: section[1].astext().replace("\n", " ")
+        for section in app.env.get_doctree("glossary").findall(nodes.section)
+        for key in section["ids"]
+        if isinstance(section[1], nodes.paragraph)
+    }
+    for link in page.findall(nodes.reference):
+        place, _, term = link.get("refuri", "").partition("#")
+        if place.endswith("glossary.html") and term in terms:
+            link["reftitle"] = terms[term]
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the directive."""
+    """Register the directive, and what is done to each page and to the site."""
     app.add_directive("made", Made)
     app.connect("autodoc-process-signature", plainly)
+    app.connect("doctree-resolved", define)
     app.connect("build-finished", finish)
     return {"parallel_read_safe": True}

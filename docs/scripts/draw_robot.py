@@ -1,15 +1,17 @@
-"""Draw the robot with its joints named: ``python docs/scripts/draw_robot.py`` writes
-``docs/robot.svg``."""
+"""Draw the robot with its joints named, and its null space: ``python docs/scripts/draw_robot.py``
+writes ``docs/robot.svg`` and ``docs/nullspace.svg``."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Arc
+from matplotlib.patches import Arc, Circle
 
 from coartic import load_task
 from coartic.analysis.figures import GREY, TWO, panels, picture, styled
 from coartic.drawing import draw_robot
+from coartic.robot import Array
 
 Q = np.array([0, 0, 2.5, -0.8, 0.6, 0.5, 0.5, 0.6, -0.8, 0.5])
 """Configuration: base, left arm, right arm."""
@@ -49,5 +51,46 @@ def robot() -> Figure:
     return drawing
 
 
+@styled
+def nullspace() -> Figure:
+    """Draw postures that hit goal 1, the one nearest to a posture of goal 2 in black."""
+    task = load_task("ascending")
+    arm, goals = task.robot.joints("right"), np.array([(3.2, 1.4), (3.6, -0.4)])
+
+    def hitting(goal: Array, angles: Array) -> Array:
+        """Configuration that Newton's steps of the four joints find from some angles."""
+        q = np.zeros(task.robot.dof)
+        q[arm] = angles
+        for _ in range(200):
+            error = goal - task.robot.forward_kinematics(q, "right")
+            q[arm] += 0.5 * np.linalg.pinv(task.robot.jacobian(q, "right")[:, arm]) @ error
+        return q
+
+    starts = [np.array([a, 0.4 - 0.5 * a, 0.2 - 0.5 * a, -1.5]) for a in (1.6, 1.1, 0.6, 0.1, -0.4)]
+    after = hitting(goals[1], np.array([-0.4, 0.4, 0.2, -1.5]))
+    postures = sorted((hitting(goals[0], start) for start in starts), key=partial(distance, after))
+    drawing, (axes,) = panels((1, 1), (TWO, 0.42 * TWO))
+    for q, color, line in ((after, GREY, ":"), *((q, GREY, "-") for q in postures[1:]),
+                           (postures[0], "black", "-")):  # fmt: skip
+        joints = task.robot.joint_positions(q, "right")
+        axes.plot(*joints.T, line, marker="o", color=color, markersize=3)
+    for number, goal in enumerate(goals, 1):
+        axes.add_patch(Circle(goal, 0.1, fill=False))
+        axes.text(goal[0] + 0.2, goal[1], f"goal {number}", va="center")
+    axes.annotate("", goals[0], goals[0] + (1.2, 1.1), arrowprops={"arrowstyle": "->"})
+    axes.text(*goals[0] + (1.25, 1.1), "level 1 moves the hand", va="center")
+    axes.set_xlim(-0.3, 6.6)
+    axes.set_ylim(-1.4, 2.7)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    return drawing
+
+
+def distance(one: Array, other: Array) -> float:
+    """Euclidean distance of two configurations, rad."""
+    return float(np.linalg.norm(one - other))
+
+
 if __name__ == "__main__":
-    Path(__file__).parents[1].joinpath("robot.svg").write_bytes(picture(robot(), ".svg"))
+    for name, draw in (("robot", robot), ("nullspace", nullspace)):
+        Path(__file__).parents[1].joinpath(f"{name}.svg").write_bytes(picture(draw(), ".svg"))

@@ -64,20 +64,17 @@ PAGE = Path(__file__).parents[1] / "how-fast.md"
 HEAD = """\
 # How fast
 
-How much time a trial takes, by the function that makes it: CPU microseconds of one core, medians,
-all measured in one run by `make speed`. Trials lie around the solution of CMA-ES, so they miss
-few goals; trials of environments lie around the postures of the corrective process. Times depend on
-the machine, ratios less.
+CPU microseconds of one core for a trial, by the function that makes it: medians, measured in one
+run by `make speed`. Times depend on the machine, ratios less.
 
 | way | {heads} |
 | --- | {rules} |
 """
 FOOT = """
-The *plain loop* is the model as a programmer would first write it with Numba: trial after trial,
-control step after control step (`docs/scripts/plain_loop.py`). It needs the same ticks in each of
-1,000 trials. The kernel moves many arms side by side and skips steps in which the hand provably
-stays out of the goal. *Kinematics alone* is the time of the forward kinematics that the kernel
-computes, and so a lower limit for the kernel.
+The *plain loop* is the model as a programmer would first write it with Numba
+(`docs/scripts/plain_loop.py`); it needs the same ticks. The kernel moves many arms side by side and
+skips steps in which the hand provably stays out of the goal. *Kinematics alone* is a lower limit
+for the kernel.
 """
 
 
