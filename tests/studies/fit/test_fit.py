@@ -76,6 +76,7 @@ def test_motor_noise_is_a_parameter(people):
     assert ignored.sigma > 0.046
     assert given.sigma == pytest.approx(0.04, rel=0.1)
     assert given.kappa == pytest.approx(0.4, abs=0.05)
+    assert given.misfit == ""
     assert "Motor noise is more" in FIT.sentence(given)
 
 
@@ -103,7 +104,7 @@ def test_lost_trials_and_hits_are_counted(people):
     first = people[people.subject == 0]
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
     fitted = FIT.fit(kept, TASK).iloc[0]
-    assert (fitted.trials, fitted.lost, fitted.missing) == (60, 2, 2)
+    assert (fitted.trials, fitted.lost, fitted.missing, fitted.misfit) == (60, 2, 2, "")
     with pytest.warns(UserWarning, match="subject 0 is left out: .* two trials"):
         assert not len(FIT.fit(first[first.trial == 1], TASK))
     with pytest.raises(CoarticError, match="EC1 does not use the left hand"):
@@ -132,10 +133,14 @@ def test_an_arm_without_a_null_space_is_refused_before_any_fit():
         FIT.fit(pd.DataFrame(rows, columns=names), task)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.02])
 @pytest.mark.parametrize("model", ["averages", "recent", "by goal", "decays"])
-def test_people_of_other_models_are_none_of_the_six(model):
-    people = FOREIGN.simulate_foreign(TASK, model, 0.04, 0.3, seed=1, trials=100)
-    fitted = FIT.fit(people, TASK).iloc[0]
+def test_people_of_other_models_are_none_of_the_six(model, noise):
+    people, joints = FOREIGN.simulate_foreign(TASK, model, 0.04, 0.3, seed=1, trials=100), 10
+    people.iloc[:, -joints:] += noise * np.random.default_rng(1).standard_normal(
+        (len(people), joints)
+    )
+    fitted = FIT.fit(people, TASK, noise=noise).iloc[0]
     assert "none of the six models explains these trials" in FIT.sentence(fitted)
     assert "σ =" not in FIT.sentence(fitted)
 
