@@ -13,7 +13,7 @@ once.
 import numpy as np
 from evidence import DRIFTS, SHORT, evidence_in
 from models import HANDS, Trials, explored_by, starts, tables_before, trials_of
-from scipy import linalg, stats
+from scipy import linalg, sparse, stats
 from simulate import simulate
 
 from coartic import CoarticError
@@ -43,12 +43,15 @@ STILL = 1e-6
 
 
 def statistics_of(task, condition, trials, model, fitted, noise, plan):
-    """Return statistics by name, and the share and the SD of single outliers."""
+    """Return statistics by name, and the share and the SD of single outliers; None if no hit shows
+    anything."""
     sigma, _, kappa = fitted
     rule = {"walk": "walk", "memoryless": "memoryless", "planner": "memoryless"}.get(model, "best")
     drifts = DRIFTS if model == "drawn" else (kappa,)
     evidence = evidence_in(task, condition, trials, rule, plan if model == "planner" else None,
                            kappas=drifts)  # fmt: skip
+    if not len(evidence.trial):
+        return None
     number = np.unique(evidence.trial, return_inverse=True)[1]
     squares = (evidence.nodes**2).sum(axis=2)
     least = np.array([np.bincount(number, each) for each in squares]).argmin(axis=0)[number]
@@ -65,12 +68,11 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
     is_false = np.isin(evidence.records[1:], hit[is_far]).any(axis=0)
     is_own, use = is_far & ~is_false, ~(is_far | is_false)
     variance = np.where(use, scale**2, 4.0)  # of what is not used: nothing is expected
+    precision = sparse.diags_array(1 / variance)
     if noise:
         covariance = noise**2 * (weights @ weights.T).toarray() + np.diag(variance)
         precision = linalg.inv(covariance)
-        scores, diagonal = precision @ residual, precision.diagonal()
-    else:
-        scores, diagonal = residual / variance[:, None], 1 / variance
+    scores, diagonal = precision @ residual, precision.diagonal()
     noises = noise**2 * (weights.T @ scores)
     postures = trials.postures.reshape(-1, task.robot.dof)[: len(noises)] - noises
     z = np.where(use[:, None], scores * scale[:, None], 0.0)
@@ -95,7 +97,7 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
         mixed[place] = kept[state] - postures[place]
     moves = (1 - kappa) * evidence.at(kappa)[1][:, None] * mixed[stored]
     moves = np.where((use & (stored >= 0))[:, None], moves, 0.0)
-    power = np.sqrt((moves**2).sum(axis=1) @ diagonal)
+    power = np.sqrt((moves * (precision @ moves)).sum())
 
     late = evidence.trial - evidence.trial[use].mean()
     size = ((scores**2).sum(axis=1) / (diagonal * dimensions))[use]
@@ -107,7 +109,7 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
         "echo": echo / total,
         "offset": (sums**2).sum() / total,
         "mixture": (moves * scores).sum() / power if power else 0.0,
-        "fading": late @ (z**2).sum(axis=1) / (total * late[use].std()),
+        "fading": late @ (z**2).sum(axis=1) / (total * max(late[use].std(), 1.0)),
         "tails": np.log((size**2).mean() / size.mean() ** 2),
         "outliers": max(is_own.sum() / (~is_false).sum(), OUTLIERS[0]),
         "hands": explores[:half].mean() - explores[half:].mean(),
@@ -124,7 +126,8 @@ def compare(task, condition, trials, model, fitted, noise, plan):
     -------
     dict
         For each of :data:`STATISTICS` the difference from the median of simulated people, as a
-        share of the difference from which it does not fit.
+        share of the difference from which it does not fit; and the share of ``lapses``, single
+        outliers that the model does not make.
     """
     begin = int(np.flatnonzero(np.isfinite(trials.rewards))[0])
     trials = Trials(*(each[begin:] for each in trials))
@@ -146,6 +149,7 @@ def compare(task, condition, trials, model, fitted, noise, plan):
             known = np.where(lost.any(axis=1), np.nan, rewards)
             seen = Trials(np.where(lost, -1, hands), seen, known)
             each.append(statistics_of(task, condition, seen, model, fitted, noise, plan))
+        each = [one for one in each if one]
         found = {name: np.array([one[name] for one, _ in each]) for name in STATISTICS}
         return found, np.mean([single for _, (single, _) in each])
 
@@ -155,8 +159,9 @@ def compare(task, condition, trials, model, fitted, noise, plan):
     ratios = {}
     for name, values in simulated.items():
         off = np.abs(np.append(values, recorded[name]) - np.median(values))
-        ratios[name] = off[-1] / max(off[:-1].max(), LIMIT * values.std(), 1e-9)
-    return ratios
+        sd = max(values.std(), 1.0 if name == "mixture" else 1e-9)  # few people may have a mixture
+        ratios[name] = off[-1] / max(off[:-1].max(), LIMIT * sd)
+    return ratios | {"lapses": max(share - expected, 0.0)}
 
 
 def misfits(ratios):

@@ -111,7 +111,8 @@ COLUMNS = [
     "task", "trials", "data", "repeat", "person", "true", "true_sigma", "true_epsilon",
     "true_kappa", "replaced",
     *(f"{name}{end}" for name in ("sigma", "epsilon", "kappa") for end in ("", "_low", "_high")),
-    *(f"bic_{model}" for model in MODELS), *(f"check_{name}" for name in STATISTICS), "misfit",
+    *(f"bic_{model}" for model in MODELS), *(f"check_{name}" for name in (*STATISTICS, "lapses")),
+    "misfit",
 ]  # fmt: skip
 
 
