@@ -31,7 +31,7 @@ STATISTICS = {
 """Statistics, and what is wrong if the one of a person is far from those of simulated people."""
 SIMULATED = 59
 """Number of people who are simulated."""
-LIMIT = 4.0
+LIMIT = 3.5
 """Difference from the median of simulated people, in their SDs, from which a statistic does not fit
 if it is also larger than the difference of each of them."""
 RARE = 1e-4
@@ -158,9 +158,10 @@ def compare(task, condition, trials, model, fitted, noise, plan):
         simulated, _ = recordings(share - expected)
     ratios = {}
     for name, values in simulated.items():
-        off = np.abs(np.append(values, recorded[name]) - np.median(values))
-        sd = max(values.std(), 1.0 if name == "mixture" else 1e-9)  # few people may have a mixture
-        ratios[name] = off[-1] / max(off[:-1].max(), LIMIT * sd)
+        off, sd = np.append(values, recorded[name]) - np.median(values), values.std()
+        if name == "mixture":  # which cannot be negative, and of which some people have none
+            off, sd = np.maximum(off, 0.0), max(sd, 1.0)
+        ratios[name] = np.abs(off[-1]) / max(np.abs(off[:-1]).max(), LIMIT * sd, 1e-9)
     return ratios | {"lapses": max(share - expected, 0.0)}
 
 
