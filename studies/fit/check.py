@@ -59,8 +59,7 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
     dimensions, goals, weights = evidence.sizes, trials.hands.shape[1], evidence.weights(kappa)
     scale = sigma * evidence.at(kappa)[1]
     hit, stored = evidence.records[:2]
-    goal = hit % goals
-    hand = trials.hands[evidence.trial, goal]
+    goal, hand = hit % goals, trials.hands[evidence.trial, hit % goals]
 
     ratio = (residual**2).sum(axis=1) / (scale**2 + noise**2 * weights.power(2).sum(axis=1))
     middle = np.median(ratio / stats.chi2.median(dimensions))
@@ -101,8 +100,7 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
 
     late = evidence.trial - evidence.trial[use].mean()
     size = ((scores**2).sum(axis=1) / (diagonal * dimensions))[use]
-    explores = ~evidence.follows
-    half = len(explores) // 2
+    explores, half = ~evidence.follows, len(evidence.follows) // 2
     rewards = trials.rewards[np.isfinite(trials.rewards)][1:]
     third = max(len(rewards) // 3, 1)
     statistics = {

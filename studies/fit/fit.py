@@ -16,12 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more are slower on a machi
 
 import numpy as np
 import pandas as pd
-from check import (
-    compare,
-    misfits,
-    refuse_without_null_space,
-    why_not,
-)
+from check import compare, misfits, refuse_without_null_space, why_not
 from evidence import DRIFTS, NODES, evidence_in
 from models import condition_for, plan_for, trials_of
 from scipy import optimize, stats

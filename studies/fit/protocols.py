@@ -74,10 +74,8 @@ def recover(cell):
     plan, seed = plan_of(name), zlib.crc32(repr(cell).encode())
     for person, model in enumerate(PEOPLE):
         rng = np.random.default_rng([seed, person])
-        sigma, epsilon = (
-            np.exp(rng.uniform(np.log(0.01), np.log(0.1))),
-            rng.uniform(0.05, 0.5),
-        )
+        sigma = np.exp(rng.uniform(np.log(0.01), np.log(0.1)))
+        epsilon = rng.uniform(0.05, 0.5)
         kappa = rng.uniform(0.0, 1.0) if model == "informed" else 0.0
         if model in FOREIGN:
             frame = simulate_foreign(task, model, sigma, epsilon, seed=[seed, person, 1],
