@@ -1,107 +1,171 @@
 """Checks before a fit, whether trials show anything, and after it, the absolute one: could the
 model of least BIC have made these trials at all?
 
-Under the true model, standardised residuals of postures are independent, N(0, 1), and equal early
-and late; explored hands are as frequent early as late; and simulated people of the fitted model
-gain as many ticks as the recorded one. Each statistic is about N(0, 1) then; `study.py` has the
-limits' rates of false alarms.
+People of the fitted model are simulated under the conditions of the recording: from its first
+complete trial on, with its lost hits, its motor noise and as many outliers. Their statistics show
+what the model allows, so that no limit depends on task, noise or losses.
+
+Statistics are scores: derivatives of the likelihood by what may be wrong. With covariance Σ of
+residuals r they are made of Σ⁻¹ r, in which the noise of a posture that many residuals share counts
+once.
 """
 
 import numpy as np
-from evidence import DRIFTS, ELSEWHERE, SHORT
-from models import HANDS, explored_by, starts, tables_before
+from evidence import DRIFTS, SHORT, evidence_in
+from models import HANDS, Trials, explored_by, starts, tables_before, trials_of
+from scipy import linalg, sparse, stats
 from simulate import simulate
 
 from coartic import CoarticError
 
-LIMITS = {
-    "echo": (3.3, "residuals of successive trials are alike"),
-    "offset": (6.0, "residuals from one stored posture are alike"),
-    "tails": (15.0, "residuals are no normal distribution"),
-    "elsewhere": (6.0, "too many hits land elsewhere"),
-    "fading": (4.5, "residuals differ early and late"),
-    "hands": (4.0, "hands are explored more often early or late"),
-    "gain": (5.0, "simulated people of this model gain other numbers of ticks"),
+STATISTICS = {
+    "echo": "residuals of successive trials are alike",
+    "offset": "residuals from one stored posture are alike",
+    "mixture": "movements aim at a mixture of stored postures",
+    "fading": "residuals grow or shrink with practice",
+    "tails": "residuals are no normal distribution",
+    "outliers": "too many hits land elsewhere",
+    "hands": "hands are explored more often early or late",
+    "gain": "simulated people of this model gain other numbers of ticks",
 }
-"""Statistics with the limit of each, and what is wrong beyond it."""
+"""Statistics, and what is wrong if the one of a person is far from those of simulated people."""
+SIMULATED = 59
+"""Number of people who are simulated."""
+LIMIT = 3.5
+"""Difference from the median of simulated people, in their SDs, from which a statistic does not fit
+if it is also larger than the difference of each of them."""
+RARE = 1e-4
+"""Probability of a residual of the model from which a hit is an outlier."""
+OUTLIERS = 0.1, 0.005
+"""Share of outliers that is no misfit, and share that is simulated."""
 STILL = 1e-6
 """Spread of postures, or of ticks as a share, below which trials are equal."""
-SIMULATED = 8
-"""Number of people who are simulated for the gain."""
 
 
-def residuals_of(evidence, sigma, kappa, noise, drawn):
-    """Return standardised residuals ``(m, dof)`` and where hits landed elsewhere; for ``drawn``
-    drift by the drift of each trial that leaves the least."""
-    residual = evidence.at(kappa)[0]
-    if drawn:
-        values = np.array([evidence.at(each)[0] for each in DRIFTS])
-        number = np.unique(evidence.trial, return_inverse=True)[1]
-        squares = np.array([np.bincount(number, each) for each in (values**2).sum(axis=2)])
-        residual = values[squares.argmin(axis=0)[number], np.arange(len(number))]
-    z, _, elsewhere = evidence.standardised(sigma, kappa, noise, residual)
-    return z, elsewhere
+def statistics_of(task, condition, trials, model, fitted, noise, plan):
+    """Return statistics by name, and the share and the SD of single outliers; None if no hit shows
+    anything."""
+    sigma, _, kappa = fitted
+    rule = {"walk": "walk", "memoryless": "memoryless", "planner": "memoryless"}.get(model, "best")
+    drifts = DRIFTS if model == "drawn" else (kappa,)
+    evidence = evidence_in(task, condition, trials, rule, plan if model == "planner" else None,
+                           kappas=drifts)  # fmt: skip
+    if not len(evidence.trial):
+        return None
+    number = np.unique(evidence.trial, return_inverse=True)[1]
+    squares = (evidence.nodes**2).sum(axis=2)
+    least = np.array([np.bincount(number, each) for each in squares]).argmin(axis=0)[number]
+    residual = evidence.nodes[least, np.arange(len(least))]
+    dimensions, goals, weights = evidence.sizes, trials.hands.shape[1], evidence.weights(kappa)
+    scale = sigma * evidence.at(kappa)[1]
+    hit, stored = evidence.records[:2]
+    goal, hand = hit % goals, trials.hands[evidence.trial, hit % goals]
 
+    ratio = (residual**2).sum(axis=1) / (scale**2 + noise**2 * weights.power(2).sum(axis=1))
+    middle = np.median(ratio / stats.chi2.median(dimensions))
+    is_far = ratio > middle * stats.chi2.isf(RARE, dimensions)
+    is_false = np.isin(evidence.records[1:], hit[is_far]).any(axis=0)
+    is_own, use = is_far & ~is_false, ~(is_far | is_false)
+    variance = np.where(use, scale**2, 4.0)  # of what is not used: nothing is expected
+    precision = sparse.diags_array(1 / variance)
+    if noise:
+        covariance = noise**2 * (weights @ weights.T).toarray() + np.diag(variance)
+        precision = linalg.inv(covariance)
+    scores, diagonal = precision @ residual, precision.diagonal()
+    noises = noise**2 * (weights.T @ scores)
+    postures = trials.postures.reshape(-1, task.robot.dof)[: len(noises)] - noises
+    z = np.where(use[:, None], scores * scale[:, None], 0.0)
+    total = (z**2).sum()
 
-def statistics_of(evidence, trials, z, elsewhere):
-    """Return the statistics of residuals and hands, each about N(0, 1) under the true model."""
-    sizes, here = evidence.sizes, ~elsewhere
-    shares, half = (z**2).sum(axis=1) / sizes, np.median(evidence.trial[here])
-    goals = trials.hands.shape[1]
-    goal, last = evidence.records[0] % goals, {}
-    hand = trials.hands[evidence.trial, goal]
-    echo = weight = 0.0
-    for k in np.flatnonzero(here):
-        key = goal[k], hand[k]
-        if key in last:
-            echo, weight = echo + z[k] @ z[last[key]], weight + sizes[k]
-        last[key] = k
-    entries = np.stack([goal, evidence.records[1]])[:, here]
-    stored = np.unique(entries, axis=1, return_inverse=True)[1].ravel()
-    sums = np.array([np.bincount(stored, column) for column in z[here].T])
-    pairs = np.bincount(stored) ** 2 - np.bincount(stored)
-    offset = (sums**2).sum() - (z[here] ** 2).sum()
-    spread = (shares[here] - 1) ** 2 * sizes[here] / 2 - 1
-    halves = [here & (evidence.trial < half), here & (evidence.trial >= half)]
-    counts = [sizes[each].sum() for each in halves]
-    means = [(shares * sizes)[each].sum() / sizes[each].sum() for each in halves]
-    explores = ~evidence.follows
-    middle, rate = len(explores) // 2, explores.mean()
-    off = explores[:middle].mean() - explores[middle:].mean()
-    return {
-        "echo": echo / np.sqrt(max(weight, 1.0)),
-        "offset": offset / np.sqrt(max(2 * pairs.sum() * sizes.mean(), 1.0)),
-        "tails": spread.sum() / np.sqrt((2 + 12 / sizes[here]).sum()),
-        "elsewhere": (elsewhere.sum() - ELSEWHERE * len(here))
-        / np.sqrt(ELSEWHERE * (1 - ELSEWHERE) * len(here)),
-        "fading": np.log(means[0] / means[1]) / np.sqrt(sum(2 / count for count in counts)),
-        "hands": off / np.sqrt(max(rate * (1 - rate), 1e-9) * 4 / len(explores)),
-    }
+    last, recent, echo, is_single = {}, {}, 0.0, is_own.copy()
+    for k, key in enumerate(zip(goal, hand, strict=True)):
+        if is_own[k] and key in last and is_own[last[key]]:
+            is_single[[last[key], k]] = False
+        last[key], mean = k, recent.get(key, 0.0 * z[k])
+        echo += z[k] @ mean
+        if use[k]:
+            recent[key] = 0.8 * mean + 0.2 * z[k]
+    entry = np.unique([stored, goal, hand], axis=1, return_inverse=True)[1].ravel()
+    sums = np.array([np.bincount(entry, column) for column in z.T])
 
+    kept, mixed = {}, np.zeros_like(postures)
+    for place in np.unique(stored[stored >= 0]):
+        t, g = divmod(int(place), goals)
+        state = g, trials.hands[t, g - 1] if g else 2, trials.hands[t, g]
+        kept[state] = (kept.get(state, postures[place]) + postures[place]) / 2
+        mixed[place] = kept[state] - postures[place]
+    moves = (1 - kappa) * evidence.at(kappa)[1][:, None] * mixed[stored]
+    moves = np.where((use & (stored >= 0))[:, None], moves, 0.0)
+    power = np.sqrt((moves * (precision @ moves)).sum())
 
-def gain_of(rewards):
-    """Return the share of ticks by which the last third of trials is faster than the first."""
-    rewards = rewards[np.isfinite(rewards)]
+    late = evidence.trial - evidence.trial[use].mean()
+    size = ((scores**2).sum(axis=1) / (diagonal * dimensions))[use]
+    explores, half = ~evidence.follows, len(evidence.follows) // 2
+    rewards = trials.rewards[np.isfinite(trials.rewards)][1:]
     third = max(len(rewards) // 3, 1)
-    return 1 - rewards[-third:].mean() / rewards[:third].mean()
+    statistics = {
+        "echo": echo / total,
+        "offset": (sums**2).sum() / total,
+        "mixture": (moves * scores).sum() / power if power else 0.0,
+        "fading": late @ (z**2).sum(axis=1) / (total * max(late[use].std(), 1.0)),
+        "tails": np.log((size**2).mean() / size.mean() ** 2),
+        "outliers": max(is_own.sum() / (~is_false).sum(), OUTLIERS[0]),
+        "hands": explores[:half].mean() - explores[half:].mean(),
+        "gain": 1 - rewards[-third:].mean() / rewards[:third].mean(),
+    }
+    spread = (residual[is_single] ** 2).sum() / max(dimensions[is_single].sum(), 1)
+    return statistics, (is_single.mean(), np.sqrt(spread))
 
 
-def gain_statistic(task, condition, trials, model, sigma, epsilon, kappa, plan):
-    """Return how far the recorded gain lies from those of simulated people, in their SDs: they
-    begin in the postures of the first complete trial, after which gains count."""
+def compare(task, condition, trials, model, fitted, noise, plan):
+    """Compare a person with simulated people of a fitted model (σ, ε, κ).
+
+    Returns
+    -------
+    dict
+        For each of :data:`STATISTICS` the difference from the median of simulated people, as a
+        share of the difference from which it does not fit; and the share of ``lapses``, single
+        outliers that the model does not make.
+    """
     begin = int(np.flatnonzero(np.isfinite(trials.rewards))[0])
-    people = simulate(task, model, sigma, epsilon, kappa, seeds=range(SIMULATED),
-                      trials=len(trials.rewards) - begin, condition=condition, plan=plan,
-                      first=(trials.hands[begin], trials.postures[begin]))  # fmt: skip
-    totals = people.groupby(["subject", "trial"]).ticks.sum()
-    gains = [gain_of(-each.to_numpy()[1:]) for _, each in totals.groupby("subject")]
-    deviation = np.std(gains, ddof=1) * np.sqrt(1 + 1 / len(gains)) + 0.01
-    return (gain_of(trials.rewards[begin + 1 :]) - np.mean(gains)) / deviation
+    trials = Trials(*(each[begin:] for each in trials))
+    recorded, (share, spread) = statistics_of(task, condition, trials, model, fitted, noise, plan)
+    people = simulate(task, model, *fitted, seeds=range(SIMULATED), trials=len(trials.hands),
+                      condition=condition, plan=plan,
+                      first=(trials.hands[0], trials.postures[0]))  # fmt: skip
+    people = [trials_of(person, task) for _, person in people.groupby("subject")]
+
+    def recordings(share):
+        """Return statistics of simulated people, and the mean share of single outliers."""
+        each = []
+        for number, (hands, postures, rewards) in enumerate(people):
+            rng, lost = np.random.default_rng(number), trials.hands[: len(hands)] < 0
+            added = noise * rng.standard_normal(postures.shape)
+            is_outlier = rng.random(hands.shape) < share
+            added[is_outlier] += spread * rng.standard_normal(added[is_outlier].shape)
+            seen = np.where(lost[..., None], np.nan, postures + added)
+            known = np.where(lost.any(axis=1), np.nan, rewards)
+            seen = Trials(np.where(lost, -1, hands), seen, known)
+            each.append(statistics_of(task, condition, seen, model, fitted, noise, plan))
+        each = [one for one in each if one]
+        found = {name: np.array([one[name] for one, _ in each]) for name in STATISTICS}
+        return found, np.mean([single for _, (single, _) in each])
+
+    simulated, expected = recordings(0.0)
+    if share - expected > OUTLIERS[1]:
+        simulated, _ = recordings(share - expected)
+    ratios = {}
+    for name, values in simulated.items():
+        off, sd = np.append(values, recorded[name]) - np.median(values), values.std()
+        if name == "mixture":  # which cannot be negative, and of which some people have none
+            off, sd = np.maximum(off, 0.0), max(sd, 1.0)
+        ratios[name] = np.abs(off[-1]) / max(np.abs(off[:-1]).max(), LIMIT * sd, 1e-9)
+    return ratios | {"lapses": max(share - expected, 0.0)}
 
 
-def misfits(statistics):
+def misfits(ratios):
     """Return what does not fit, in words."""
-    return [words for name, (limit, words) in LIMITS.items() if abs(statistics[name]) > limit]
+    return [words for name, words in STATISTICS.items() if ratios[name] > 1]
 
 
 def refuse_without_null_space(task, condition):

@@ -17,7 +17,7 @@ from scipy import linalg, sparse
 DRIFTS = (0.0, 0.03, 0.1, 0.3, 1.0)
 """Values of κ for drawn drift: each trial draws one."""
 NODES = (*DRIFTS[:3], 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0)
-"""Values of κ at which landings are simulated; between them residuals are interpolated."""
+"""Values of κ at which landings are simulated for a fit."""
 SHORT = 0.1
 """Way, length unit and rad, below which a movement does not show what it aimed at."""
 ELSEWHERE = 0.02
@@ -28,8 +28,10 @@ noise can make a movement cross the goal at once or not; the residual then has a
 class Evidence(NamedTuple):
     """Evidence on a model in the trials of a subject: m postures and n choices of a hand."""
 
+    kappas: tuple
+    """K values of κ; between them residuals are interpolated."""
     nodes: np.ndarray
-    """Residuals at each of :data:`NODES`, or for κ = 0 alone, shape ``(K, m, dof)``."""
+    """Residuals at each value of κ, shape ``(K, m, dof)``."""
     sizes: np.ndarray
     """Dimensions of a residual, shape ``(m,)``."""
     shares: np.ndarray
@@ -48,8 +50,8 @@ class Evidence(NamedTuple):
         """Return residuals and shares at a drift."""
         if len(self.nodes) == 1:
             return self.nodes[0], self.shares[0]
-        k = int(np.clip(np.searchsorted(NODES, kappa), 1, len(NODES) - 1))
-        w = (kappa - NODES[k - 1]) / (NODES[k] - NODES[k - 1])
+        k = int(np.clip(np.searchsorted(self.kappas, kappa), 1, len(self.kappas) - 1))
+        w = (kappa - self.kappas[k - 1]) / (self.kappas[k] - self.kappas[k - 1])
         share = self.shares[k - 1] + np.clip(w, 0, 1) * (self.shares[k] - self.shares[k - 1])
         return (1 - w) * self.nodes[k - 1] + w * self.nodes[k], share
 
@@ -83,12 +85,7 @@ class Evidence(NamedTuple):
 
     def log_likelihood(self, sigma, kappa, noise):
         """Return the logarithm of the likelihood of the postures."""
-        z, scale, elsewhere = self.standardised(sigma, kappa, noise, self.at(kappa)[0])
-        logs = (z**2).sum() / 2 + self.sizes @ np.log(np.sqrt(2 * np.pi) * scale)
-        return prior_of(elsewhere) - logs
-
-    def standardised(self, sigma, kappa, noise, residual):
-        """Return residuals as N(0, 1), their scales, and where hits landed elsewhere."""
+        residual = self.at(kappa)[0]
         covariance, elsewhere = self.covariance(sigma, kappa, noise, residual)
         if noise:
             root = linalg.cholesky(covariance, lower=True)
@@ -96,7 +93,8 @@ class Evidence(NamedTuple):
         else:
             scale = np.sqrt(covariance)
             z = residual / scale[:, None]
-        return z, scale, elsewhere
+        logs = (z**2).sum() / 2 + self.sizes @ np.log(np.sqrt(2 * np.pi) * scale)
+        return prior_of(elsewhere) - logs
 
     def hands(self, epsilon):
         """Return the logarithm of the likelihood of the choices of hands."""
@@ -132,9 +130,9 @@ def prior_of(elsewhere):
     return np.log(np.where(elsewhere, ELSEWHERE, 1 - ELSEWHERE)).sum()
 
 
-def evidence_in(task, condition, trials, rule, plan=None, simulated=None):
+def evidence_in(task, condition, trials, rule, plan=None, simulated=None, kappas=None):
     """Return the evidence on models with a rule of :func:`tables_before` in the trials of a
-    subject; ``plan`` replaces tables where it has the hand."""
+    subject, at drifts ``kappas``; ``plan`` replaces tables where it has the hand."""
     rows = tables_before(task, condition, trials, rule)
     q = starts(task, trials, rows)
     follows = (rows.hand == (plan[0][rows.goal] if plan else rows.greedy)).to_numpy()
@@ -145,7 +143,7 @@ def evidence_in(task, condition, trials, rule, plan=None, simulated=None):
         explored = (far.argmin(axis=0) == rows.hand).to_numpy(float)
     way = np.linalg.norm(trials.postures[rows.trial, rows.goal] - q, axis=1)
     rows = rows[(rows.stored >= 0) & (way > SHORT)]
-    kappas = NODES if rule == "best" else NODES[:1]
+    kappas = kappas or (NODES if rule == "best" else NODES[:1])
     nodes, sizes, shares = landings(task, condition, trials, rows, kappas, plan, simulated)
     trial, goal, following = (rows[name].to_numpy() for name in ("trial", "goal", "following"))
     stored, count = rows.stored.to_numpy(), len(task.goals)
@@ -155,4 +153,4 @@ def evidence_in(task, condition, trials, rule, plan=None, simulated=None):
     records = [posture, np.where(stored >= 0, stored * count + goal, -1),
                np.where(goal > 0, posture - 1, -1),
                np.where(following >= 0, following * count + goal + 1, -1)]  # fmt: skip
-    return Evidence(nodes, sizes, shares, np.array(records), trial, follows, explored)
+    return Evidence(kappas, nodes, sizes, shares, np.array(records), trial, follows, explored)

@@ -12,22 +12,13 @@ import sys
 import warnings
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more are slower on a machine that others use
+
 import numpy as np
 import pandas as pd
-from check import (
-    gain_statistic,
-    misfits,
-    refuse_without_null_space,
-    residuals_of,
-    statistics_of,
-    why_not,
-)
+from check import compare, misfits, refuse_without_null_space, why_not
 from evidence import DRIFTS, NODES, evidence_in
-from models import (
-    condition_for,
-    plan_for,
-    trials_of,
-)
+from models import condition_for, plan_for, trials_of
 from scipy import optimize, stats
 from sentences import CLEAR, LEARNERS, MODELS, sentence
 
@@ -145,26 +136,17 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
             log_sigma, best = maximum(postures, middle - 3.0, middle + 1.5)
             kappa = float(np.mean(DRIFTS)) if model == "drawn" else 0.0
         row[f"bic_{model}"] = free * np.log(count) - 2 * (total + best)
-        fitted[model] = evidence, np.exp(log_sigma), epsilon, kappa
+        fitted[model] = np.exp(log_sigma), epsilon, kappa
     model, others = judge(row)
-    statistics = {}
+    ratios = {}
     for name in (model, *others):  # one of those that BIC cannot distinguish may fit
-        each = checked(task, condition, trials, name, fitted[name], noise, plan)
-        statistics = statistics or each
+        each = compare(task, condition, trials, name, fitted[name], noise, plan)
+        ratios = ratios or each
         if not misfits(each):
-            statistics = each
+            ratios = each
             break
-    row |= {f"check_{name}": value for name, value in statistics.items()}
-    return row | {"misfit": "; ".join(misfits(statistics))}
-
-
-def checked(task, condition, trials, model, fitted, noise, plan):
-    """Return the statistics of :mod:`check` for a fitted model."""
-    evidence, sigma, epsilon, kappa = fitted
-    z, elsewhere = residuals_of(evidence, sigma, kappa, noise, model == "drawn")
-    drift = kappa if model == "informed" else 0.0
-    gain = gain_statistic(task, condition, trials, model, sigma, epsilon, drift, plan)
-    return statistics_of(evidence, trials, z, elsewhere) | {"gain": gain}
+    row |= {f"check_{name}": value for name, value in ratios.items()}
+    return row | {"misfit": "; ".join(misfits(ratios))}
 
 
 def judge(row):

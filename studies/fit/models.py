@@ -119,7 +119,7 @@ def landings(task, condition, trials, rows, kappas, plan, simulated):
         return projection(each[np.arange(len(at)), hand], explored[hand])
 
     d = np.zeros_like(t)
-    if len(kappas) > 1:
+    if any(kappas):
         following = rows.following.to_numpy()
         towards = (q + trials.postures[following, np.minimum(goal + 1, len(task.goals) - 1)]) / 2
         moves = explored[rows.follower] & (following >= 0)[:, None]

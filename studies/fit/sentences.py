@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from check import OUTLIERS
 
 MODELS = {
     "best": "keep the best",
@@ -27,8 +28,8 @@ def sentence(row):
             f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
             f"{row.missing}): none of the six models explains these trials ({row.misfit}). The "
             f"nearest is {MODELS[row.model]}. No parameters are given."
-            + " With motor noise or lost trials this answer is often wrong."
-            * bool(row.noise or row.lost + row.missing)
+            + f" Outliers ({100 * row.check_lapses:.0f} % of hits) can cause this: look at them."
+            * bool(row.check_lapses > OUTLIERS[1])
         )
     text = (
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "

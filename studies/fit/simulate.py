@@ -59,6 +59,7 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
         visits = []
         for goal in range(goals):
             hands, targets = np.zeros(people, int), np.full((people, dof), np.nan)
+            ways, noises, explores = *np.zeros((2, people, dof)), np.zeros(people, bool)
             for n, rng in enumerate(rngs):
                 entries, where = value[n, goal, before[n]], stored[n, goal, before[n]]
                 hand = max(allowed, key=lambda each: entries[each])  # of equal ones the first
@@ -75,21 +76,24 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
                 if plan and hand == plan[0][goal]:
                     target = plan[1][goal]
                 if np.isfinite(target[0]) and (trial or plan):
-                    explored = masks[hand]
-                    mean, idle = np.array(target), robot.joints(HANDS[1 - hand])
-                    if not condition.modify_other:
-                        mean[idle] = q[n][idle]
-                    if drift[n]:
-                        p = np.array(q[n])
-                        if goal + 1 < goals and np.isfinite(value[n, goal + 1, hand]).any():
-                            following = value[n, goal + 1, hand]
-                            best = max(allowed, key=lambda each: following[each])
-                            middle = (q[n] + stored[n, goal + 1, hand, best]) / 2
-                            p = np.where(masks[best], middle, p)
-                        jacobian = robot.jacobian(target, HANDS[hand])
-                        mean += drift[n] * projection(jacobian, explored) @ (p - target)
-                    mean[explored] += sigma[n] * rng.standard_normal(int(explored.sum()))
-                    targets[n] = mean
+                    p = q[n]
+                    if goal + 1 < goals and np.isfinite(value[n, goal + 1, hand]).any():
+                        following = value[n, goal + 1, hand]
+                        best = max(allowed, key=lambda each: following[each])
+                        middle = (q[n] + stored[n, goal + 1, hand, best]) / 2
+                        p = np.where(masks[best], middle, p)
+                    targets[n], ways[n], explores[n] = target, p - target, True
+                    noises[n, masks[hand]] = rng.standard_normal(int(masks[hand].sum()))
+            moves = sigma[:, None] * noises
+            if drift.any() and explores.any():
+                each = [robot.jacobian(targets[explores], hand) for hand in HANDS]
+                own = np.where((hands[explores] == 0)[:, None, None], *each)
+                pull = projection(own, masks[hands[explores]]) @ ways[explores, :, None]
+                moves[explores] += drift[explores, None] * pull[..., 0]
+            targets[explores] += moves[explores]
+            for n in np.flatnonzero(explores) if not condition.modify_other else []:
+                idle = robot.joints(HANDS[1 - hands[n]])
+                targets[n, idle] = q[n, idle]
             reached = reach_goals(robot, q, hands, task.goal_array[[goal] * people], task.radius,
                                   targets, locked_base=task.locked_base)  # fmt: skip
             going &= reached.hit

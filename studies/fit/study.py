@@ -90,10 +90,16 @@ def covers(people, name):
 
 
 def answer(people):
-    """Count people with 100 trials by data, arms, true model and answer, one of six or none."""
+    """Count people with 100 trials by data, arms, true model and answer, one of six or none; of
+    those who average, ``nothing`` if no recorded trial replaces what was kept. Data are ``quiet``
+    if people with motor noise explore by more than this."""
     chosen = people[(people.trials == 100) & people.task.isin(TASKS)]
+    quiet = chosen[(chosen.data == "noisy") & (chosen.true_sigma >= NOISE)]
+    chosen = pd.concat([chosen, quiet.assign(data="quiet")], ignore_index=True)
     arms = np.where(chosen.task.isin(TASKS[:2]), " one ", " two ")
-    counts = pd.crosstab((chosen.data + arms + chosen.true).rename("row"), chosen.answer)
+    nothing = (chosen.true == "averages") & (chosen.replaced == 0)
+    row = chosen.data + arms + chosen.true.mask(nothing, "averages nothing")
+    counts = pd.crosstab(row.rename("row"), chosen.answer)
     return counts.reindex(columns=[*MODELS, "none"], fill_value=0)
 
 

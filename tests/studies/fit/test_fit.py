@@ -76,6 +76,7 @@ def test_motor_noise_is_a_parameter(people):
     assert ignored.sigma > 0.046
     assert given.sigma == pytest.approx(0.04, rel=0.1)
     assert given.kappa == pytest.approx(0.4, abs=0.05)
+    assert given.misfit == ""
     assert "Motor noise is more" in FIT.sentence(given)
 
 
@@ -132,10 +133,14 @@ def test_an_arm_without_a_null_space_is_refused_before_any_fit():
         FIT.fit(pd.DataFrame(rows, columns=names), task)
 
 
-@pytest.mark.parametrize("model", ["averages", "recent", "by goal", "decays"])
-def test_people_of_other_models_are_none_of_the_six(model):
+@pytest.mark.parametrize(
+    ("model", "noise"), [("averages", 0.0), ("recent", 0.02), ("by goal", 0.0), ("decays", 0.02)]
+)
+def test_people_of_other_models_are_none_of_the_six(model, noise):
     people = FOREIGN.simulate_foreign(TASK, model, 0.04, 0.3, seed=1, trials=100)
-    fitted = FIT.fit(people, TASK).iloc[0]
+    joints = [*TASK.robot.joint_names]
+    people[joints] += noise * np.random.default_rng(1).standard_normal((len(people), len(joints)))
+    fitted = FIT.fit(people, TASK, noise=noise).iloc[0]
     assert "none of the six models explains these trials" in FIT.sentence(fitted)
     assert "σ =" not in FIT.sentence(fitted)
 
