@@ -20,64 +20,26 @@ the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 
 Each of these leaves no solution out. The subproblem with the least bound is next, so that the
 search can end at any time. The proven bound is then the least bound of the open subproblems or the
-bound from the speed of the hands (:func:`ticks_for_distance`), whichever is more.
+bound from the speed of the hands (:func:`least_ticks`), whichever is more.
 """
 
 import heapq
 import itertools
 import math
+import time
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from lagrangian import Array, Lagrangian
 from relaxation import PartialSequence, Relaxation, Relaxed, split
+from speed import TOLERANCE, least_ticks
 
 from coartic import PAPER
 
-_TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
-_MOST_SEQUENCES = 4096  # hand sequences that are bounded by distances
+_CHAINS = 20  # open subproblems that solutions are sought from
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
-
-
-def fastest_hand(task, hand):
-    """Return the largest norm of the hand's Jacobian: its path per joint-space path, length unit.
-
-    The column of a joint is at right angles to its lever, which is no longer than the links beyond
-    it; a base that moves has the unit vectors as its columns. The square of the norm is the largest
-    eigenvalue of J Jᵀ, a sum of the columns' dyads, and so at most 1, where the base moves at all,
-    plus the sum of the squared levers. A straight arm at right angles to a free axis has just that.
-    Source: Craig (2004), the Jacobian of a planar chain.
-    """
-    levers = np.cumsum(task.robot.arm(hand).links[::-1])
-    return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
-
-
-def ticks_for_distance(task, hands):
-    """Return ticks that every solution takes with one of these hand sequences: by Cauchy and
-    Schwarz.
-
-    A hand that is in one disc and then in another goes at least the distance of their centres less
-    both radii, from the start that of the first goal less one. Per tick it goes no farther than a
-    step in joint space times :func:`fastest_hand`, and one movement at least is made on the way,
-    whose arrival takes a tick beyond its steps. So a goal is hit no earlier than the goal before
-    it, nor than that many ticks after the goal that the same hand hit last.
-    """
-    speed = {hand: PAPER.step * fastest_hand(task, hand) for hand in task.hands}
-    start = {hand: task.robot.forward_kinematics(task.q0, hand) for hand in task.hands}
-
-    def least(sequence):
-        where, when = {hand: (start[hand], 0.0, 0) for hand in task.hands}, 0
-        for hand, goal in zip(sequence, task.goals, strict=True):
-            place, radius, ticks = where[hand]
-            distance = math.dist(place, goal) - radius - task.radius - _TOLERANCE
-            if distance > 0.0:
-                when = max(when, ticks + math.ceil(distance / speed[hand]) + 1)
-            where[hand] = np.array(goal), task.radius, when
-        return when
-
-    return min(map(least, hands))
 
 
 def mergeable(task, hands):
@@ -130,21 +92,33 @@ class Node(NamedTuple):
     lagrangian: Lagrangian
 
 
-def certify(task, ticks, most_nodes, *, still=False):
+class Proof(NamedTuple):
+    """Ticks of which a search proved that no solution takes fewer, and its effort."""
+
+    ticks: int
+    nodes: int
+    """Cone programmes."""
+    seconds: float
+    """CPU time of this process."""
+    chains: list
+    """Hands and configurations of the open subproblems of least bound: starts for solutions."""
+
+
+def certify(task, ticks, most_nodes=math.inf, most_seconds=math.inf, *, still=False):
     """Prove that no solution takes fewer than ``ticks``, or as much as can be proven.
 
-    Returns the proven ticks, and how many cone programmes this took. The search ends when all is
-    proven or after ``most_nodes`` of them. ``still`` holds the arm that is not chosen.
+    The search ends when all is proven, after so many cone programmes or so many seconds of CPU
+    time. ``still`` holds the arm that is not chosen.
     """
-    search = ProofSearch(task, ticks, still)
-    least = 0
-    if len(task.hands) ** len(task.goals) <= _MOST_SEQUENCES:
-        sequences = itertools.product(task.hands, repeat=len(task.goals))
-        least = ticks_for_distance(task, sequences)
-    while search.heap and search.solved < most_nodes and least < ticks:
+    begin, search, least = time.process_time(), ProofSearch(task, ticks, still), least_ticks(task)
+    seconds = 0.0
+    while search.heap and search.solved < most_nodes and seconds < most_seconds and least < ticks:
         search.branch(heapq.heappop(search.heap))
+        seconds = time.process_time() - begin
     proven = math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks
-    return min(max(least, proven), ticks), search.solved
+    decided = (node for node in search.heap if None not in node.problem.hands)
+    chains = [(node.problem.hands, node.relaxed.q) for node in heapq.nsmallest(_CHAINS, decided)]
+    return Proof(min(max(least, proven), ticks), search.solved, seconds, chains)
 
 
 class ProofSearch:
@@ -222,7 +196,7 @@ class ProofSearch:
         root = self.relaxation(problem.hands, problem.merged)
         relaxed = root.solve(problem.box)
         self.solved += 1
-        lagrangian = root.lagrangian(relaxed.pulls, relaxed.forces, self.longest(0))
+        lagrangian = root.lagrangian(relaxed.multipliers, self.longest(0))
         slack = self.shortfall(lagrangian, problem.box, problem.moves)
         length = max(parent, self.longest(problem.moves) - slack)
         if slack < 0.0 or length > self.longest(problem.moves):
@@ -237,4 +211,4 @@ class ProofSearch:
 
     def shortfall(self, lagrangian, box, moves):
         """Return by how much a bound is short of the longest path of interest."""
-        return self.longest(moves) - (lagrangian.bound(box) - _TOLERANCE)
+        return self.longest(moves) - (lagrangian.bound(box) - TOLERANCE)

@@ -1,6 +1,8 @@
 """Shipped best rewards: they hold, are taken over from folders, and get bounds."""
 
 import json
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -149,35 +151,62 @@ def test_a_solution_with_another_reward_is_refused():
         SHIPPED.solution_in_short(load_task("ascending"), movements, -291)
 
 
-def test_proofs_are_written_and_the_sharper_bound_is_kept(files):
-    sentences = [*PROVE.proofs(["descending"], 400, False)]
-    assert sentences == [
-        "descending: -304, proven optimal",
-        "descending (base task, other arm still): -304, proven optimal",
-    ]
-    again = SHIPPED.read()
-    assert again["descending", *SHIPPED.FREE] == ENTRIES["descending", *SHIPPED.FREE] | {
-        "nodes": 400
-    }
-    (sentence,) = PROVE.proofs(["two-armed/v1/i000"], 1, False)
-    entry = ENTRIES["two-armed/v1/i000", *SHIPPED.FREE]
-    assert sentence.startswith(f"two-armed/v1/i000: {entry['reward']}, no solution exceeds -")
-    assert SHIPPED.read()["two-armed/v1/i000", *SHIPPED.FREE]["bound"] == entry["bound"]
+def prove(folder, *asked):
+    """What ``prove.py`` prints, in a process of its own, and its log."""
+    command = [sys.executable, FOLDER / "prove.py", *asked, "--out", folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines(), SHIPPED.read_log(folder)
 
 
-def test_what_is_done_is_left_out_if_it_is_said_so(files):
-    assert [*PROVE.proofs(["ascending", "two-armed/v1/i000..i001"], 1, True)] == []
+def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(files, tmp_path):
+    """A log whose last line was cut off, as where a process was killed."""
+    folder, names = tmp_path / "optima", ("two-armed/v1/i032", "two-armed/v1/i002..i003")
+    shown, log = prove(folder, *names, "--seconds", "0.1")
+    assert [row["task"] for row in log] == [names[0]]  # the others are proven
+    assert shown[0].startswith("two-armed/v1/i032: -292, no solution exceeds -")
+    with (folder / SHIPPED.LOG).open("a") as file:
+        file.write('{"task": "two-armed/v1/i0')
+    assert prove(folder, *names, "--seconds", "0.1") == ([], log)
+    _, longer = prove(folder, *names, "--seconds", "0.2")
+    assert [row["asked"] for row in longer] == [0.1, 0.2]
+    known = SHIPPED.read()
+    key = SHIPPED.key_of(log[0])
+    assert not SHIPPED.take_proof(known, log[0])
+    assert known == ENTRIES
+    assert SHIPPED.take_proof(known, log[0] | {"bound": -292, "nodes": 7})
+    assert known[key] == ENTRIES[key] | {"bound": -292, "nodes": 7}
 
 
-def test_a_task_of_ones_own_is_searched_and_proven(files, tmp_path):
+def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refused():
+    row = {"task": "two-armed/v1/i002", "base": "task", "other_arm": "free", "reward": -255}
+    with pytest.raises(CoarticError, match="i002: bound -256 is below -255"):
+        SHIPPED.take_proof(SHIPPED.read(), row | {"bound": -256, "nodes": 1})
+    entry = ENTRIES["two-armed/v1/i002", *SHIPPED.FREE]
+    better = row | {key: entry[key] for key in ("hands", "solution")} | {"bound": -255, "nodes": 1}
+    known = SHIPPED.read()
+    known["two-armed/v1/i002", *SHIPPED.FREE]["reward"] = -300
+    assert SHIPPED.take_proof(known, better)
+    assert known == ENTRIES
+    with pytest.raises(CoarticError, match="the solution does not come to -254"):
+        SHIPPED.take_proof(known, better | {"reward": -254})
+
+
+def test_a_better_solution_is_found_on_the_way():
+    """From the open subproblems of least bound, if the reward that is known is poor."""
+    entry = ENTRIES["two-armed/v1/i001", *SHIPPED.FREE] | {"reward": -400}
+    row = PROVE.prove(entry, 4.0)
+    assert -400 < row["reward"] <= row["bound"]
+    execution = execute(load_task(row["task"]), SHIPPED.movements_of(row["solution"]))
+    assert (execution.reward, execution.hands) == (row["reward"], row["hands"])
+
+
+def test_a_task_of_ones_own_is_searched_and_proven(tmp_path):
     task = load_task("ascending").model_copy(update={"name": "mine", "goals": ((6.0, 0.5),)})
     task = task.model_copy(update={"initial_hands": "R", "provenance": {}})
     task.save(tmp_path / "mine.toml")
-    before = files["DATA"].read_bytes()
-    (sentence,) = PROVE.proofs([str(tmp_path / "mine.toml")], 500, False)
-    assert sentence.startswith("mine: -1")
-    assert sentence.endswith(", proven optimal")
-    assert files["DATA"].read_bytes() == before
+    (sentence,), _ = prove(tmp_path / "out", tmp_path / "mine.toml")
+    assert "mine.toml: -1" in sentence
+    assert ", proven optimal, " in sentence
 
 
 def test_the_table_is_of_the_shipped_data():
