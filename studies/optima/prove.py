@@ -59,7 +59,7 @@ def prove(entry, seconds):
     task, still = load_task(entry["task"]), entry["other_arm"] == "still"
     restricted = with_locks(task, entry["base"])
     proof = certify(restricted, -entry["reward"], most_seconds=seconds, still=still)
-    better = polished(restricted, proof.chains, still)
+    better = polished(restricted, proof.chains, still) if proof.chains else None
     row = {key: entry[key] for key in ("task", "base", "other_arm", "reward")}
     row |= {"bound": -proof.ticks, "nodes": proof.nodes, "seconds": round(proof.seconds, 2)}
     if better is not None and better.execution.reward > entry["reward"]:

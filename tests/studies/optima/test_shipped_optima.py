@@ -1,9 +1,12 @@
 """Shipped best rewards: they hold, are taken over from folders, and get bounds."""
 
 import json
+import lzma
+import sqlite3
 import subprocess
 import sys
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +23,9 @@ from coartic.tasks.task import hands_of
 from tests.support.processes import program
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
-FOLDER = Path(__file__).parents[3] / "studies" / "optima"
+ROOT = Path(__file__).parents[3]
+FOLDER = ROOT / "studies" / "optima"
+THIRD_VERSION = "dcb24843"
 RENEW, PROVE, STUDY = (program(FOLDER / f"{name}.py") for name in ("renew", "prove", "study"))
 SHIPPED = RENEW.shipped
 ENTRIES = SHIPPED.read()
@@ -94,6 +99,32 @@ def test_the_optimum_of_every_task_is_proven_or_bounded(name):
     assert ((name, "y", "free") in ENTRIES) == (name != "two-armed-1")  # its base is on a rail
     if name == "two-armed-2":
         assert ENTRIES[name, "y", "free"]["reward"] < free["reward"]
+
+
+@pytest.mark.parametrize(
+    ("commit", "suite", "runs"),
+    [(None, "comparison", 3104), (None, "families", 1130),
+     (THIRD_VERSION, "comparison", 5508), (THIRD_VERSION, "families", 2350)],
+)  # fmt: skip
+def test_no_run_exceeds_a_bound(tmp_path, commit, suite, runs):
+    """All runs that ship, and those that shipped with version 3.0.0, from its commit."""
+    place = f"benchmarks/shipped/{suite}.sqlite.xz"
+    if commit is None:
+        packed = (ROOT / place).read_bytes()
+    else:
+        shown = subprocess.run(
+            ["git", "-C", ROOT, "show", f"{commit}:{place}"], capture_output=True
+        )
+        if shown.returncode:
+            pytest.skip("the commit is not in this clone")
+        packed = shown.stdout
+    (tmp_path / "runs.sqlite").write_bytes(lzma.decompress(packed))
+    with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as file:
+        best = file.execute("SELECT task, max(reward), count(*) FROM runs GROUP BY task").fetchall()
+    assert sum(count for *_, count in best) == runs
+    for name, reward, _ in best:
+        assert ENTRIES[name, *SHIPPED.FREE]["bound"] >= reward
+        assert ENTRIES[name, *SHIPPED.FREE]["reward"] >= reward
 
 
 @pytest.fixture
@@ -211,7 +242,18 @@ def test_a_task_of_ones_own_is_searched_and_proven(tmp_path):
 
 def test_the_table_is_of_the_shipped_data():
     stored = pd.read_csv(FOLDER / "results.csv", index_col=0)
-    table = STUDY.tabulate()
-    pd.testing.assert_frame_equal(table, stored, check_dtype=False, rtol=1e-5)
+    table, _ = STUDY.count(STUDY.distances())
+    counted = stored[table.columns]
+    pd.testing.assert_frame_equal(table, counted, check_dtype=False, rtol=1e-5)
     assert table.instances["all families"] == len(DRAWN)
     assert table.proven["all families"] == sum(e["bound"] == e["reward"] for e in DRAWN)
+    before = pd.read_csv(FOLDER / "before.csv", index_col=0)
+    assert (counted[["proven", "within_1", "within_5"]] >= before.drop(columns="bounded")).all(axis=None)
+
+
+def test_open_tasks_are_those_farther_than_five_per_cent_and_all_have_a_bound():
+    stored = pd.read_csv(FOLDER / "open.csv", index_col=0)
+    far = {e["task"] for e in DRAWN if e["bound"] - e["reward"] > 0.05 * -e["reward"]}
+    assert far == set(stored.index)
+    page = (FOLDER / "open.md").read_text()
+    assert all(f"`{name}`" in page for name in far)
