@@ -38,7 +38,6 @@ from speed import TOLERANCE, least_ticks
 from coartic import PAPER
 
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
-_CHAINS = 20  # open subproblems that solutions are sought from
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
@@ -92,43 +91,27 @@ class Node(NamedTuple):
     lagrangian: Lagrangian
 
 
-class Proof(NamedTuple):
-    """Ticks of which a search proved that no solution takes fewer, and its effort."""
-
-    ticks: int
-    nodes: int
-    """Cone programmes."""
-    seconds: float
-    """CPU time of this process."""
-    chains: list
-    """Hands and configurations of the open subproblems of least bound: starts for solutions."""
-
-
 def certify(task, ticks, most_nodes=math.inf, most_seconds=math.inf, *, still=False):
     """Prove that no solution takes fewer than ``ticks``, or as much as can be proven.
 
-    The search ends when all is proven, after so many cone programmes or so many seconds of CPU
-    time. ``still`` holds the arm that is not chosen.
+    Returns the :class:`ProofSearch`, which has the proven ticks. It ends when all is proven, after
+    so many cone programmes or so many seconds of CPU time. ``still`` holds the arm that is not
+    chosen.
     """
-    begin, search, least = time.process_time(), ProofSearch(task, ticks, still), least_ticks(task)
-    seconds = 0.0
-    while search.heap and search.solved < most_nodes and seconds < most_seconds and least < ticks:
+    begin, search = time.process_time(), ProofSearch(task, ticks, still)
+    while search.ticks < ticks and search.nodes < most_nodes and search.seconds < most_seconds:
         search.branch(heapq.heappop(search.heap))
-        seconds = time.process_time() - begin
-    proven = math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks
-    decided = (node for node in search.heap if None not in node.problem.hands)
-    chains = [(node.problem.hands, node.relaxed.q) for node in heapq.nsmallest(_CHAINS, decided)]
-    return Proof(min(max(least, proven), ticks), search.solved, seconds, chains)
+        search.seconds = time.process_time() - begin
+    return search
 
 
 class ProofSearch:
-    """The open subproblems, and the number of cone programmes so far."""
+    """The open subproblems, and the effort so far: cone programmes and seconds of CPU time."""
 
     def __init__(self, task, ticks, still):
-        self.heap = []
-        self.solved = 0
-        self._task, self._ticks, self._hands = task, ticks, sorted(task.hands)
-        self._numbers = itertools.count()
+        self.heap, self.nodes, self.seconds = [], 0, 0.0
+        self._task, self._claim, self._hands = task, ticks, sorted(task.hands)
+        self._least, self._numbers = least_ticks(task), itertools.count()
 
         @lru_cache(maxsize=1024)
         def relaxation(hands, merged):
@@ -144,16 +127,28 @@ class ProofSearch:
             box = relaxation(hands, ()).first_box(self.longest(0))
             self.add(Subproblem(hands, (), mergeable(task, hands), box), 0.0)
 
+    @property
+    def ticks(self):
+        """Ticks of which it is proven that no solution takes fewer; no more than the claim."""
+        proven = math.ceil(self.heap[0].ticks - 1e-9) if self.heap else self._claim
+        return min(max(self._least, proven), self._claim)
+
+    def chains(self, most):
+        """Return hands and configurations of the subproblems of least bound whose hands are
+        decided: starts for solutions."""
+        decided = (node for node in self.heap if None not in node.problem.hands)
+        return [(node.problem.hands, node.relaxed.q) for node in heapq.nsmallest(most, decided)]
+
     def longest(self, moves):
         """Return the longest path of solutions that take fewer ticks with so many movements."""
-        return max(0, self._ticks - 1 - moves) * PAPER.step
+        return max(0, self._claim - 1 - moves) * PAPER.step
 
     def branch(self, node):
         """Split a subproblem into others that together hold every solution in it."""
         problem, q = node.problem, node.relaxed.q
         moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
-        bounded = node.length > self.longest(moves) or moves >= self._ticks
+        bounded = node.length > self.longest(moves) or moves >= self._claim
         # How far the nearer hand is from its goal, where the hand is undecided.
         far = {
             g: min(
@@ -191,11 +186,11 @@ class ProofSearch:
 
     def add(self, problem, parent):
         """Bound a subproblem; add it to the open ones if its bound is too low."""
-        if problem.moves >= self._ticks:
+        if problem.moves >= self._claim:
             return
         root = self.relaxation(problem.hands, problem.merged)
         relaxed = root.solve(problem.box)
-        self.solved += 1
+        self.nodes += 1
         lagrangian = root.lagrangian(relaxed.multipliers, self.longest(0))
         slack = self.shortfall(lagrangian, problem.box, problem.moves)
         length = max(parent, self.longest(problem.moves) - slack)

@@ -30,6 +30,8 @@ from coartic.tasks.optima import essence
 
 SECONDS = 100
 """CPU time for each task, some 500 cone programmes a second with five goals."""
+CHAINS = 20
+"""Open subproblems that better solutions are sought from."""
 
 
 def entries_of(name, known):
@@ -59,7 +61,8 @@ def prove(entry, seconds):
     task, still = load_task(entry["task"]), entry["other_arm"] == "still"
     restricted = with_locks(task, entry["base"])
     proof = certify(restricted, -entry["reward"], most_seconds=seconds, still=still)
-    better = polished(restricted, proof.chains, still) if proof.chains else None
+    chains = proof.chains(CHAINS)
+    better = polished(restricted, chains, still) if chains else None
     row = {key: entry[key] for key in ("task", "base", "other_arm", "reward")}
     row |= {"bound": -proof.ticks, "nodes": proof.nodes, "seconds": round(proof.seconds, 2)}
     if better is not None and better.execution.reward > entry["reward"]:
@@ -82,13 +85,13 @@ def polished(task, chains, still):
 
 def in_words(row):
     """Return a sentence about a row of the log."""
-    restriction = (row["base"], row["other_arm"])
-    which = "" if restriction == shipped.FREE else " (base {}, other arm {})".format(*restriction)
-    proven = row["bound"] == row["reward"]
-    proof = "proven optimal" if proven else f"no solution exceeds {row['bound']}"
-    effort = f"{row['nodes']} programmes, {row['seconds']:.1f} s"
+    proof = f"no solution exceeds {row['bound']}"
+    proof = "proven optimal" if row["bound"] == row["reward"] else proof
+    which = "{task} (base {base}, other arm {other_arm})".format(**row)
     better = ", a better solution" if "solution" in row else ""
-    return f"{row['task']}{which}: {row['reward']}, {proof}, {effort}{better}"
+    return (
+        f"{which}: {row['reward']}, {proof}, {row['nodes']} programmes, {row['seconds']} s{better}"
+    )
 
 
 def proofs(names, seconds, folder, processes):
