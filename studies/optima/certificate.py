@@ -38,6 +38,7 @@ from speed import TOLERANCE, least_ticks
 from coartic import PAPER
 
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
+_MANY_GOALS = 7  # from which hands are decided from the first goal on
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
@@ -129,7 +130,7 @@ class ProofSearch:
 
     @property
     def ticks(self):
-        """Ticks of which it is proven that no solution takes fewer; no more than the claim."""
+        """Proven ticks, at most the claimed ones: no solution takes fewer."""
         proven = math.ceil(self.heap[0].ticks - 1e-9) if self.heap else self._claim
         return min(max(self._least, proven), self._claim)
 
@@ -158,11 +159,12 @@ class ProofSearch:
             for g, decided in enumerate(problem.hands)
             if decided is None
         }
-        goal = max(far, key=lambda g: far[g], default=None)
+        farthest = max(far, key=lambda g: far[g], default=None)
         wrong = node.relaxed.wrong.max(initial=0.0)
-        if goal is not None and (
-            bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3)
+        if farthest is not None and (
+            bounded or wrong <= max(_HAND_FIRST * (far[farthest] - self._task.radius), 1e-3)
         ):
+            goal = min(far) if len(problem.hands) >= _MANY_GOALS else farthest
             # One subproblem for each hand, the new angles anywhere on a path of interest.
             for hand in self._hands:
                 hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])

@@ -71,5 +71,6 @@ class Programme:
 
 
 def finite(numbers):
-    """Return numbers as an array in which those that are none are zero."""
+    """Return numbers as an array, with zeros for NaN and infinite numbers."""
+    numbers = np.asarray(numbers)
     return np.where(np.isfinite(numbers), numbers, 0.0)

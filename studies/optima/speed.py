@@ -14,7 +14,7 @@ import numpy as np
 from coartic import PAPER
 
 TOLERANCE = 1e-6
-"""What a bound gives away to rounding, length unit; rounding is far below."""
+"""Length by which bounds are lowered, length unit: far more than rounding changes."""
 
 
 def fastest_hand(task, hand):
@@ -73,7 +73,7 @@ def soonest(task, hands, last, cost):
 
 
 def efficient(points):
-    """Return the points of which no other is as soon in all coordinates (one or two)."""
+    """Return points (of one or two coordinates) without those that another is as soon as in all."""
     kept = []
     for point in sorted(points):
         if not kept or point[-1] < kept[-1][-1]:
