@@ -121,13 +121,11 @@ def solution_in_short(task, movements, reward):
 
 def movements_of(content):
     """Return the movements of :func:`solution_in_short`."""
+
+    def long(joints):
+        return None if joints is None else np.array(joints, dtype=np.float64)
+
     return tuple(
-        Movement(
-            goal,
-            hand,
-            kind,
-            None if target is None else np.array(target, dtype=np.float64),
-            waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
-        )
+        Movement(goal, hand, kind, long(target), waypoints=long(waypoints))
         for goal, hand, kind, target, waypoints in content
     )
