@@ -13,7 +13,8 @@ the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 - an interval of a link angle, in two;
 - a goal whose hand is undecided, into one subproblem for each hand. With five goals and more the
   search begins with all of them undecided, so that a bound for the hands of some goals serves every
-  sequence with these hands; a hand is decided where that matters more than the angles do;
+  sequence with these hands; a hand is decided where that matters more than the angles do. With
+  seven goals and more these are hands from the first goal on, else those that are most wrong;
 - goals that may be hit without a movement, if only their ticks are still missing: into one
   subproblem for each, in which it is the first such goal. The subproblem without such goals is
   bounded already.
