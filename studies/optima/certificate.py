@@ -13,71 +13,34 @@ the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 - an interval of a link angle, in two;
 - a goal whose hand is undecided, into one subproblem for each hand. With five goals and more the
   search begins with all of them undecided, so that a bound for the hands of some goals serves every
-  sequence with these hands; a hand is decided where that matters more than the angles do;
+  sequence with these hands; a hand is decided where that matters more than the angles do. With
+  seven goals and more these are hands from the first goal on, else those that are most wrong;
 - goals that may be hit without a movement, if only their ticks are still missing: into one
   subproblem for each, in which it is the first such goal. The subproblem without such goals is
   bounded already.
 
 Each of these leaves no solution out. The subproblem with the least bound is next, so that the
 search can end at any time. The proven bound is then the least bound of the open subproblems or the
-bound from the speed of the hands (:func:`ticks_for_distance`), whichever is more.
+bound from the speed of the hands (:func:`least_ticks`), whichever is more.
 """
 
 import heapq
 import itertools
 import math
+import time
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from lagrangian import Array, Lagrangian
 from relaxation import PartialSequence, Relaxation, Relaxed, split
+from speed import TOLERANCE, least_ticks
 
 from coartic import PAPER
 
-_TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
-_MOST_SEQUENCES = 4096  # hand sequences that are bounded by distances
+_MANY_GOALS = 7  # from which hands are decided from the first goal on
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
-
-
-def fastest_hand(task, hand):
-    """Return the largest norm of the hand's Jacobian: its path per joint-space path, length unit.
-
-    The column of a joint is at right angles to its lever, which is no longer than the links beyond
-    it; a base that moves has the unit vectors as its columns. The square of the norm is the largest
-    eigenvalue of J Jᵀ, a sum of the columns' dyads, and so at most 1, where the base moves at all,
-    plus the sum of the squared levers. A straight arm at right angles to a free axis has just that.
-    Source: Craig (2004), the Jacobian of a planar chain.
-    """
-    levers = np.cumsum(task.robot.arm(hand).links[::-1])
-    return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
-
-
-def ticks_for_distance(task, hands):
-    """Return ticks that every solution takes with one of these hand sequences: by Cauchy and
-    Schwarz.
-
-    A hand that is in one disc and then in another goes at least the distance of their centres less
-    both radii, from the start that of the first goal less one. Per tick it goes no farther than a
-    step in joint space times :func:`fastest_hand`, and one movement at least is made on the way,
-    whose arrival takes a tick beyond its steps. So a goal is hit no earlier than the goal before
-    it, nor than that many ticks after the goal that the same hand hit last.
-    """
-    speed = {hand: PAPER.step * fastest_hand(task, hand) for hand in task.hands}
-    start = {hand: task.robot.forward_kinematics(task.q0, hand) for hand in task.hands}
-
-    def least(sequence):
-        where, when = {hand: (start[hand], 0.0, 0) for hand in task.hands}, 0
-        for hand, goal in zip(sequence, task.goals, strict=True):
-            place, radius, ticks = where[hand]
-            distance = math.dist(place, goal) - radius - task.radius - _TOLERANCE
-            if distance > 0.0:
-                when = max(when, ticks + math.ceil(distance / speed[hand]) + 1)
-            where[hand] = np.array(goal), task.radius, when
-        return when
-
-    return min(map(least, hands))
 
 
 def mergeable(task, hands):
@@ -130,31 +93,27 @@ class Node(NamedTuple):
     lagrangian: Lagrangian
 
 
-def certify(task, ticks, most_nodes, *, still=False):
+def certify(task, ticks, most_nodes=math.inf, most_seconds=math.inf, *, still=False):
     """Prove that no solution takes fewer than ``ticks``, or as much as can be proven.
 
-    Returns the proven ticks, and how many cone programmes this took. The search ends when all is
-    proven or after ``most_nodes`` of them. ``still`` holds the arm that is not chosen.
+    Returns the :class:`ProofSearch`, which has the proven ticks. It ends when all is proven, after
+    so many cone programmes or so many seconds of CPU time. ``still`` holds the arm that is not
+    chosen.
     """
-    search = ProofSearch(task, ticks, still)
-    least = 0
-    if len(task.hands) ** len(task.goals) <= _MOST_SEQUENCES:
-        sequences = itertools.product(task.hands, repeat=len(task.goals))
-        least = ticks_for_distance(task, sequences)
-    while search.heap and search.solved < most_nodes and least < ticks:
+    begin, search = time.process_time(), ProofSearch(task, ticks, still)
+    while search.ticks < ticks and search.nodes < most_nodes and search.seconds < most_seconds:
         search.branch(heapq.heappop(search.heap))
-    proven = math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks
-    return min(max(least, proven), ticks), search.solved
+        search.seconds = time.process_time() - begin
+    return search
 
 
 class ProofSearch:
-    """The open subproblems, and the number of cone programmes so far."""
+    """The open subproblems, and the effort so far: cone programmes and seconds of CPU time."""
 
     def __init__(self, task, ticks, still):
-        self.heap = []
-        self.solved = 0
-        self._task, self._ticks, self._hands = task, ticks, sorted(task.hands)
-        self._numbers = itertools.count()
+        self.heap, self.nodes, self.seconds = [], 0, 0.0
+        self._task, self._claim, self._hands = task, ticks, sorted(task.hands)
+        self._least, self._numbers = least_ticks(task), itertools.count()
 
         @lru_cache(maxsize=1024)
         def relaxation(hands, merged):
@@ -170,16 +129,28 @@ class ProofSearch:
             box = relaxation(hands, ()).first_box(self.longest(0))
             self.add(Subproblem(hands, (), mergeable(task, hands), box), 0.0)
 
+    @property
+    def ticks(self):
+        """Proven ticks, at most the claimed ones: no solution takes fewer."""
+        proven = math.ceil(self.heap[0].ticks - 1e-9) if self.heap else self._claim
+        return min(max(self._least, proven), self._claim)
+
+    def chains(self, most):
+        """Return hands and configurations of the subproblems of least bound whose hands are
+        decided: starts for solutions."""
+        decided = (node for node in self.heap if None not in node.problem.hands)
+        return [(node.problem.hands, node.relaxed.q) for node in heapq.nsmallest(most, decided)]
+
     def longest(self, moves):
         """Return the longest path of solutions that take fewer ticks with so many movements."""
-        return max(0, self._ticks - 1 - moves) * PAPER.step
+        return max(0, self._claim - 1 - moves) * PAPER.step
 
     def branch(self, node):
         """Split a subproblem into others that together hold every solution in it."""
         problem, q = node.problem, node.relaxed.q
         moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
-        bounded = node.length > self.longest(moves) or moves >= self._ticks
+        bounded = node.length > self.longest(moves) or moves >= self._claim
         # How far the nearer hand is from its goal, where the hand is undecided.
         far = {
             g: min(
@@ -189,11 +160,12 @@ class ProofSearch:
             for g, decided in enumerate(problem.hands)
             if decided is None
         }
-        goal = max(far, key=lambda g: far[g], default=None)
+        farthest = max(far, key=lambda g: far[g], default=None)
         wrong = node.relaxed.wrong.max(initial=0.0)
-        if goal is not None and (
-            bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3)
+        if farthest is not None and (
+            bounded or wrong <= max(_HAND_FIRST * (far[farthest] - self._task.radius), 1e-3)
         ):
+            goal = min(far) if len(problem.hands) >= _MANY_GOALS else farthest
             # One subproblem for each hand, the new angles anywhere on a path of interest.
             for hand in self._hands:
                 hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
@@ -217,12 +189,12 @@ class ProofSearch:
 
     def add(self, problem, parent):
         """Bound a subproblem; add it to the open ones if its bound is too low."""
-        if problem.moves >= self._ticks:
+        if problem.moves >= self._claim:
             return
         root = self.relaxation(problem.hands, problem.merged)
         relaxed = root.solve(problem.box)
-        self.solved += 1
-        lagrangian = root.lagrangian(relaxed.pulls, relaxed.forces, self.longest(0))
+        self.nodes += 1
+        lagrangian = root.lagrangian(relaxed.multipliers, self.longest(0))
         slack = self.shortfall(lagrangian, problem.box, problem.moves)
         length = max(parent, self.longest(problem.moves) - slack)
         if slack < 0.0 or length > self.longest(problem.moves):
@@ -237,4 +209,4 @@ class ProofSearch:
 
     def shortfall(self, lagrangian, box, moves):
         """Return by how much a bound is short of the longest path of interest."""
-        return self.longest(moves) - (lagrangian.bound(box) - _TOLERANCE)
+        return self.longest(moves) - (lagrangian.bound(box) - TOLERANCE)

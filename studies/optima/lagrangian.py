@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
-_PARABOLAS = 10  # steps by which an interval's end moves inwards
+_PARABOLAS = 4  # steps by which an interval's end moves inwards
 
 
 class Lagrangian(NamedTuple):

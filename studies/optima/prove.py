@@ -1,96 +1,132 @@
-"""Prove a reward that no solution of a task exceeds.
+"""Prove rewards that no solution of tasks exceeds, and log them.
 
-    python studies/optima/prove.py ascending two-armed/v1/i000..i039
-    python studies/optima/prove.py shelf.toml --nodes 2000
+    python studies/optima/prove.py two-armed/v1/i000..i039 two-armed-1 --processes 2
+    python studies/optima/prove.py shelf.toml --seconds 20
 
-Tasks are the names of shipped tasks, ranges of instances, or files. The bound of a shipped task is
-written into the shipped data, in which the sharper bound is kept. For any other task a good reward
-is searched first (``optimum/search``), and the bound is only shown. It takes hours for many
-tasks; ``--open`` leaves out what is proven, and what was tried with as many nodes.
+Tasks are the names of shipped tasks, ranges of instances, or files; of a file that does not ship a
+good reward is searched first (``optimum/search``). Tasks that are nearest to a proof are first.
+Each proof is appended to the log as it ends, with a solution if a better one was found on the way.
+The same command goes on where it was stopped: it leaves out what is proven, and what the log has
+with as many seconds. ``renew.py`` takes the log over into the shipped data.
 """
 
 import argparse
+import json
+import math
 import sys
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
 
 import shipped
 from certificate import certify
 
-from coartic import CoarticError, execute, load_task
+from coartic import PAPER, CoarticError, execute, load_task
 from coartic.baselines.optimum import OptimumSearch, with_locks
-from coartic.method import run_method
+from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
+from coartic.baselines.trajectory_problem import trajectory_problem
+from coartic.method import MethodError, Session, run_method
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import essence
 
-NODES = 20_000
-"""Cone programmes for each task, some 300 a second with five goals."""
+SECONDS = 100
+"""CPU time for each task, some 500 cone programmes a second with five goals."""
+CHAINS = 20
+"""Open subproblems that better solutions are sought from."""
 
 
-def entries_of(task, known):
-    """Return the shipped entries of a task that have a reward: one for each restriction."""
+def entries_of(name, known):
+    """Return the entries of a task that have a reward: one for each restriction.
+
+    Of a task that does not ship the entry of the best solution that a search finds.
+    """
+    task = load_task(name)
     same = essence(task)
-    return [each for each in known.values() if each["essence"] == same and "reward" in each]
-
-
-def searched(task):
-    """Return an entry of the best solution that a search finds."""
+    entries = [each for each in known.values() if each["essence"] == same and "reward" in each]
+    if entries:
+        return entries
+    base, other_arm = shipped.FREE
     result, _ = run_method(OptimumSearch(), task)
     reward = execute(task, result.solution).reward
-    base, other_arm = shipped.FREE
-    return {"task": task.name, "base": base, "other_arm": other_arm, "reward": reward}
+    return [{"task": name, "base": base, "other_arm": other_arm, "reward": reward}]
 
 
-def is_open(entry, nodes):
-    """Return whether an entry has no proof, and a bound of fewer nodes."""
-    return entry.get("bound") != entry["reward"] and (entry.get("nodes") or 0) < nodes
+def distance(entry):
+    """Return the distance of a bound from the reward, a share; infinite without a bound."""
+    bound = entry.get("bound")
+    return math.inf if bound is None else (bound - entry["reward"]) / max(-entry["reward"], 1)
 
 
-def prove(task, entry, nodes):
-    """Prove a bound with so many nodes; the entry keeps the sharper one."""
-    still = entry["other_arm"] == "still"
+def prove(entry, seconds):
+    """Return what the log has of a proof: bound, nodes, seconds, and a solution if it is better."""
+    task, still = load_task(entry["task"]), entry["other_arm"] == "still"
     restricted = with_locks(task, entry["base"])
-    ticks, _ = certify(restricted, -entry["reward"], nodes, still=still)
-    if ticks:
-        entry["bound"] = min(-ticks, entry.get("bound") or 0)
-    entry["nodes"] = nodes
+    proof = certify(restricted, -entry["reward"], most_seconds=seconds, still=still)
+    chains = proof.chains(CHAINS)
+    better = polished(restricted, chains, still) if chains else None
+    row = {key: entry[key] for key in ("task", "base", "other_arm", "reward")}
+    row |= {"bound": -proof.ticks, "nodes": proof.nodes, "seconds": round(proof.seconds, 2)}
+    if better is not None and better.execution.reward > entry["reward"]:
+        reward = better.execution.reward
+        row |= {"reward": reward, "hands": better.execution.hands}
+        row["solution"] = shipped.solution_in_short(task, better.movements, reward)
+    return row | {"asked": seconds}
 
 
-def in_words(entry):
-    """Return a sentence about an entry."""
-    restriction = (entry["base"], entry["other_arm"])
-    which = "" if restriction == shipped.FREE else " (base {}, other arm {})".format(*restriction)
-    bound, reward = entry.get("bound"), entry["reward"]
-    proof = f"no solution exceeds {bound}" if bound else "nothing is proven"
-    proof = "proven optimal" if bound == reward else proof
-    return f"{entry['task']}{which}: {reward}, {proof}"
+def polished(task, chains, still):
+    """Return the solution of fewest ticks that plans from these starts lead to; None without."""
+    session = Session(task, 0, REWARD_INFORMATION, model=PAPER, trusted=True)
+    problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
+    try:
+        plans = shortest_plans(session, task, problem, chains, still=still)
+        return fewest_ticks(session, task, problem, plans)
+    except MethodError:
+        return None
 
 
-def proofs(names, nodes, open_alone):
-    """Prove bounds for tasks and write them; yield a sentence for each.
+def in_words(row):
+    """Return a sentence about a row of the log."""
+    proof = f"no solution exceeds {row['bound']}"
+    proof = "proven optimal" if row["bound"] == row["reward"] else proof
+    which = "{task} (base {base}, other arm {other_arm})".format(**row)
+    better = ", a better solution" if "solution" in row else ""
+    return (
+        f"{which}: {row['reward']}, {proof}, {row['nodes']} programmes, {row['seconds']} s{better}"
+    )
+
+
+def proofs(names, seconds, folder, processes):
+    """Prove bounds for tasks and log them; yield a sentence for each.
 
     Raises CoarticError for a task that cannot be used.
     """
-    known = shipped.read()
-    for name in (each for text in names for each in named_by(text)):
-        task = load_task(name)
-        ships = entries_of(task, known)
-        for entry in ships or [searched(task)]:
-            if open_alone and not is_open(entry, nodes):
-                continue
-            prove(task, entry, nodes)
-            if ships:
-                shipped.write(known)
-            yield in_words(entry)
+    known, done = shipped.read(), set()
+    for row in shipped.read_log(folder):
+        shipped.take_proof(known, row)
+        if row["asked"] >= seconds:
+            done.add(shipped.key_of(row))
+    named = [each for text in names for each in named_by(text)]
+    entries = [entry for name in named for entry in entries_of(name, known)]
+    entries = [e for e in entries if distance(e) and shipped.key_of(e) not in done]
+    folder.mkdir(parents=True, exist_ok=True)
+    log = folder / shipped.LOG
+    with ProcessPoolExecutor(processes) as pool, log.open("a", encoding="ascii") as file:
+        tasks = [pool.submit(prove, e, seconds) for e in sorted(entries, key=distance)]
+        for task in as_completed(tasks):
+            file.write(f"\n{json.dumps(task.result())}\n")  # a line may have been cut off
+            file.flush()
+            yield in_words(task.result())
 
 
 def main():
     """Prove bounds for the tasks of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("tasks", nargs="+", metavar="TASK", help="name, range or file of a task")
-    parser.add_argument("--nodes", type=int, default=NODES, help="cone programmes for each task")
-    parser.add_argument("--open", action="store_true", help="leave out what is done")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="CPU time for each task")
+    parser.add_argument("--out", type=Path, default=shipped.OUT, help="folder of the log")
+    parser.add_argument("--processes", type=int, default=1, help="tasks at the same time")
     asked = parser.parse_args()
     try:
-        for sentence in proofs(asked.tasks, asked.nodes, asked.open):
+        for sentence in proofs(asked.tasks, asked.seconds, asked.out, asked.processes):
             print(sentence, flush=True)
     except CoarticError as error:
         sys.exit(str(error))

@@ -3,30 +3,39 @@
 The relaxation is a second-order cone programme over the configurations q_g and, for the chosen arm
 at each goal, the direction u_gk = (c, s) of every link::
 
-    min   Σ_g |q_g - q_(g-1)|
+    min   Σ_g d_g,   |q_g - q_(g-1)| <= d_g
     s.t.  |base_g + shoulder + Σ_k l_k u_gk - goal_g| <= r,   |u_gk| <= 1
           (u_gk, φ_gk) in the half-spaces of its interval,    φ_gk = Σ_(j<=k) q_gj
+          Σ_(g in span) d_g >= the path on which a hand covers its distance in this span
 
 The only part that is not convex, u = (cos φ, sin φ), is replaced by half-spaces that hold all
-points (cos φ, sin φ, φ) with φ in its interval; their offsets are exact maxima.
+points (cos φ, sin φ, φ) with φ in its interval; their offsets are exact maxima. A goal whose angles
+are not narrowed adds nothing by itself, but the spans of :mod:`speed` do.
 
-The solver's dual point gives good multipliers; the bound is :mod:`lagrangian`'s, which holds for
-any multipliers.
+CVXPY states the programme once; nodes change the half-spaces in its canonical data, which the
+solver Clarabel has (a third of the time that CVXPY took for each node). The solver's dual point
+gives good multipliers; the bound is :mod:`lagrangian`'s, which holds for any multipliers. In a box
+without a path they are a ray along which the bound grows.
 
 The hand of a goal may be undecided. Either hand is then within a disc around the middle of the
 shoulders, whatever the arms do, and both arms may move: a relaxation of either choice.
+
+Not worth it: a second cone for each movement, by which a chord is no longer than its turn, raises
+bounds at equal nodes and makes a node 1.5 to 2.4 times as slow.
 """
 
-import contextlib
 import math
-import warnings
 from typing import NamedTuple
 
 import cvxpy as cp
 import numpy as np
 from lagrangian import Array, Lagrangian, least
+from programme import LARGEST, Programme, finite
+from speed import spans_of
 
 from coartic import Hand
+from coartic.baselines.trajectory_problem import held_joints
+from coartic.robot import directions
 
 PartialSequence = tuple[Hand | None, ...]
 """A hand for each goal, None if it is undecided."""
@@ -35,13 +44,11 @@ HALF_SPACES = 9
 """Half-spaces of each link."""
 _BASE_DOF = 2
 _TOWARDS_POINT = 0.25  # of the way from an interval's middle to the relaxation's angle
-# Any multipliers give a bound: those of the solver need not be exact.
-_EXACT = {"tol_gap_abs": 1e-5, "tol_gap_rel": 1e-5, "tol_feas": 1e-7}
 
 
 class Relaxed(NamedTuple):
-    """Shortest path of the relaxation in a box, and its multipliers; zeros if the box has no
-    path."""
+    """Shortest path of the relaxation in a box, and its multipliers; of any values if the box has
+    no path or the solver fails."""
 
     q: Array
     """Configurations, shape ``(G, dof)``."""
@@ -49,10 +56,9 @@ class Relaxed(NamedTuple):
     """Absolute angles of the links, shape ``(links,)``, rad."""
     wrong: Array
     """Error of each link's end against its angle, shape ``(links,)``, length unit."""
-    pulls: Array
-    """p of the movements, shape ``(G, dof)``, of norm at most 1 over the joints that may move."""
-    forces: Array
-    """λ of the hands at their goals, shape ``(G, 2)``."""
+    multipliers: tuple
+    """p of the movements, ``(G, dof)``; λ of the hands at their goals, ``(G, 2)``; μ of the spans,
+    ``(spans,)``."""
 
 
 class Relaxation:
@@ -69,8 +75,11 @@ class Relaxation:
         self._radii = np.array([radius for _, radius in discs])
         self._offsets = np.array([shoulder for shoulder, _ in discs]) - task.goal_array
         self._q0 = q0
-        self._held = held_joints(task, hands, still)
-        self._held[list(merged)] = True
+        undecided = np.array([hand is None for hand in hands])
+        self.held = held_joints(task, hands, still=still)
+        self.held[undecided] = held_joints(task, hands, still=False)[undecided]
+        self.held[list(merged)] = True
+        self._spans, self._paths = spans_of(task, hands)
 
         arms = [(g, task.robot.arm(hand)) for g, hand in enumerate(hands) if hand is not None]
         links = [(g, arm, k) for g, arm in arms for k in range(len(arm.links))]
@@ -83,27 +92,7 @@ class Relaxation:
         self._sums = sums.reshape(len(links), goals * dof)
         self._slopes = np.linalg.pinv(self._sums.T).round()  # of joints, as those of angles
         self._start_angles = self._sums @ np.tile(q0, goals)
-
-        self._q, self._u = cp.Variable((goals, dof)), cp.Variable((len(links), 2))
-        lengths = cp.Variable(goals)
-        changes = self._q - cp.vstack([q0[None], self._q[:-1]])
-        of_goal = (self.goal_of == np.arange(goals)[:, None]) * self._lengths
-        misses = self._q[:, :_BASE_DOF] + of_goal @ self._u + self._offsets
-        angles = self._sums @ cp.vec(self._q, order="C")
-        self._half_spaces = cp.Parameter((4, HALF_SPACES, len(links)))
-        a, b, k, most = (self._half_spaces[i] for i in range(4))
-        self._movements = cp.SOC(lengths, changes, axis=1)
-        self._hits = cp.SOC(self._radii, misses, axis=1)
-        self._holds = changes[self._held] == 0.0
-        constraints = [
-            self._movements,
-            self._hits,
-            self._holds,
-            cp.SOC(np.ones(len(links)), self._u, axis=1),
-            cp.multiply(a, self._u[:, 0]) + cp.multiply(b, self._u[:, 1]) + cp.multiply(k, angles)
-            <= most,
-        ]
-        self._problem = cp.Problem(cp.Minimize(cp.sum(lengths)), constraints)
+        self._programme = None
 
     def first_box(self, longest):
         """Return intervals that hold every link angle on a path no longer than ``longest``.
@@ -114,40 +103,59 @@ class Relaxation:
         reach = np.sqrt(self._sums.sum(axis=1)) * longest
         return np.stack([self._start_angles - reach, self._start_angles + reach], axis=1)
 
+    def state(self):
+        """Return the programme in CVXPY, with its half-spaces as the parameter; q and u."""
+        goals, links = len(self._radii), len(self._lengths)
+        q, u, distances = cp.Variable(self.held.shape), cp.Variable((links, 2)), cp.Variable(goals)
+        changes = q - cp.vstack([self._q0[None], q[:-1]])
+        of_goal = (self.goal_of == np.arange(goals)[:, None]) * self._lengths
+        misses = q[:, :_BASE_DOF] + of_goal @ u + self._offsets
+        angles = self._sums @ cp.vec(q, order="C")
+        a, b, k, most = (half_spaces := cp.Parameter((4, HALF_SPACES, links)))
+        constraints = [
+            changes[self.held] == 0.0,
+            self._spans @ distances >= self._paths,
+            cp.multiply(a, u[:, 0]) + cp.multiply(b, u[:, 1]) + cp.multiply(k, angles) <= most,
+            cp.SOC(distances, changes, axis=1),
+            cp.SOC(self._radii, misses, axis=1),
+            cp.SOC(np.ones(links), u, axis=1),
+        ]
+        return cp.Problem(cp.Minimize(cp.sum(distances)), constraints), half_spaces, [q, u]
+
     def solve(self, box):
         """Return the relaxation's shortest path in a box, and multipliers for the box."""
-        self._half_spaces.value = half_spaces(box)
-        # If the solver fails, what was found for the box before serves as well.
-        with (
-            contextlib.suppress(cp.SolverError),
-            warnings.catch_warnings(action="ignore", category=UserWarning),  # of inexactness
-        ):
-            self._problem.solve(
-                cp.CLARABEL, canon_backend=cp.SCIPY_CANON_BACKEND, warm_start=False, **_EXACT
-            )
-        q, u = value_of(self._q), value_of(self._u)
+        values = half_spaces(box)
+        self._programme = self._programme or Programme(*self.state(), values)
+        (q, u), (held, speeds, _, pulls, forces, _) = self._programme.solve(values)
+        pulls, forces = (-each.reshape(len(q), -1)[:, 1:] for each in (pulls, forces))
+        pulls[self.held] += held
         angles = self._sums @ q.ravel()
-        pulls = -value_of(self._movements.dual_variables[1])
-        pulls[self._held] += value_of(self._holds.dual_variables[0])
-        # Within the unit ball over the joints that may move; without limit over the others.
-        norms = np.linalg.norm(np.where(self._held, 0.0, pulls), axis=1, keepdims=True)
-        return Relaxed(
-            q=q,
-            angles=angles,
-            wrong=np.hypot(*(u - directions(angles)).T) * self._lengths,
-            pulls=np.where(self._held, pulls, pulls / np.maximum(norms, 1.0)),
-            forces=-value_of(self._hits.dual_variables[1]),
-        )
+        wrong = np.hypot(*(u - directions(angles)).T) * self._lengths
+        return Relaxed(q, angles, wrong, (pulls, forces, speeds))
 
-    def lagrangian(self, pulls, forces, longest):
-        """Return the Lagrangian of multipliers, for paths that are no longer than ``longest``."""
+    def lagrangian(self, multipliers, longest):
+        """Return the Lagrangian of multipliers, for paths that are no longer than ``longest``.
+
+        Multipliers of any values serve: those that are no numbers count as zero, and all others are
+        scaled until they are valid.
+        """
+        pulls, forces, speeds = map(finite, multipliers)
+        size = min(1.0, LARGEST / max(np.abs(m).max(initial=1.0) for m in (pulls, forces, speeds)))
+        pulls, forces, speeds = size * pulls, size * forces, size * np.maximum(speeds, 0.0)
+        speeds = speeds / max(1.0, (speeds @ self._spans).max(initial=0.0))
+        # Joints that may move: within the ball that the spans leave. Others: without limit.
+        norms = np.linalg.norm(np.where(self.held, 0.0, pulls), axis=1)
+        left = np.maximum(1.0 - speeds @ self._spans, 0.0)
+        shares = np.minimum(1.0, left / np.maximum(norms, 1e-300))[:, None]
+        pulls = np.where(self.held, pulls, shares * pulls)
         weights = pulls.copy()  # of the joints' changes from the start
         weights[:-1] -= pulls[1:]
         weights[:, :_BASE_DOF] += forces
         slopes = self._slopes @ weights.ravel()
         rest = weights.ravel() - slopes @ self._sums
         constant = (
-            float((forces * (self._q0[:_BASE_DOF] + self._offsets)).sum())
+            float(speeds @ self._paths)
+            + float((forces * (self._q0[:_BASE_DOF] + self._offsets)).sum())
             - float(self._radii @ np.linalg.norm(forces, axis=1))
             - longest * float(np.abs(rest).sum())
             - float(slopes @ self._start_angles)
@@ -155,20 +163,6 @@ class Relaxation:
         of_link = forces[self.goal_of] * self._lengths[:, None]
         sizes, towards = np.hypot(*of_link.T), np.arctan2(of_link[:, 1], of_link[:, 0])
         return Lagrangian(constant, slopes, sizes, towards)
-
-
-def held_joints(task, hands, still):
-    """Return whether joints cannot move on the way to each goal, shape ``(G, dof)``.
-
-    ``still`` holds the arm that is not chosen; neither arm if the hand is undecided.
-    """
-    held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
-    held[:, ["xy".index(axis) for axis in task.locked_base]] = True
-    for goal, hand in enumerate(hands):
-        for arm in ("left", "right"):
-            if arm not in task.hands or (still and hand not in (arm, None)):
-                held[goal, task.robot.joints(arm)] = True
-    return held
 
 
 def disc_of(task, hand):
@@ -229,15 +223,3 @@ def half_spaces(box):
 def offset_of(a, b, k, half):
     """Return the maximum of ``a cos δ + b sin δ + k δ`` over |δ| <= half, exactly."""
     return -least(-k, np.hypot(a, b), np.arctan2(-b, -a), -half, half)
-
-
-def directions(angles):
-    """Return unit vectors of links at absolute angles (rad), shape ``(..., 2)``."""
-    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-
-
-def value_of(variable):
-    """Return the value of a variable or multiplier; zeros if the solver gives no value."""
-    if variable.value is None:
-        return np.zeros(variable.shape)
-    return np.array(variable.value, dtype=np.float64)

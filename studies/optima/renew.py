@@ -1,7 +1,8 @@
-"""Take over better rewards from results folders into the shipped data.
+"""Take over better rewards and sharper bounds from results folders into the shipped data.
 
     python studies/optima/renew.py results/families results/optima
 
+A folder of ``prove.py`` has proofs, any other one runs.
 A task of the paper, or one of the first 40 test instances of a shipped family, gets the reward and
 the solution of the best run of any method, if the reward is better than the shipped one. Tasks of
 the paper have an entry for each restriction of the search (``base``, ``other_arm``).
@@ -9,6 +10,7 @@ the paper have an entry for each restriction of the search (``base``, ``other_ar
 
 import argparse
 import sys
+from pathlib import Path
 
 import shipped
 
@@ -74,7 +76,11 @@ def main():
     known = shipped.read()
     try:
         for folder in parser.parse_args().folders:
-            print(f"{folder}: {take_over(load(folder), known)} better rewards")
+            if rows := shipped.read_log(Path(folder)):
+                changed = sum(shipped.take_proof(known, row) for row in rows)
+                print(f"{folder}: {changed} proofs that say more")
+            else:
+                print(f"{folder}: {take_over(load(folder), known)} better rewards")
     except CoarticError as error:
         sys.exit(str(error))
     shipped.write(known)

@@ -4,6 +4,7 @@
 of families, whose solutions are in ``solutions.json.xz`` here.
 """
 
+import contextlib
 import csv
 import io
 import json
@@ -12,12 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from coartic import CoarticError, Movement, execute
+from coartic import CoarticError, Movement, execute, load_task
 from coartic.tasks.optima import BASE, BEST_KNOWN, DATA, entries
 
 SOLUTIONS = Path(__file__).with_name("solutions.json.xz")
 FREE = (BASE, "free")
 """Restriction of entries without restriction: base and other arm."""
+OUT, LOG = Path("results", "optima"), "proofs.jsonl"
+"""Folder of the log of proofs unless stated otherwise; name of the log."""
 _COLUMNS = ("instance", "reward", "bound", "nodes", "hands", "essence")
 _DIGITS = 5  # of joints, where this does not change the reward
 
@@ -35,7 +38,45 @@ def read():
             }
             entry = {"task": name, "base": BASE, "other_arm": "free", "solution": solutions[name]}
             known.append(row | numbers | entry)
-    return {(entry["task"], entry["base"], entry["other_arm"]): entry for entry in known}
+    return {key_of(entry): entry for entry in known}
+
+
+def key_of(entry):
+    """Return task, lock of the base and other arm of an entry."""
+    return entry["task"], entry["base"], entry["other_arm"]
+
+
+def read_log(folder):
+    """Return the rows of a log of proofs; none without a log, nor of a line that was cut off."""
+    rows, log = [], folder / LOG
+    for line in log.read_text(encoding="ascii").splitlines() if log.exists() else ():
+        with contextlib.suppress(json.JSONDecodeError):
+            rows.append(json.loads(line))
+    return rows
+
+
+def take_proof(known, row):
+    """Take over a better solution of a logged proof, and its bound if it is sharper.
+
+    Returns whether a shipped entry changed. Raises CoarticError for a solution that does not give
+    its reward, and for a bound below a reward: one of both must be wrong.
+    """
+    entry = known.get(key_of(row), {})
+    before = entry.get("reward"), entry.get("bound")
+    if before[0] is None:
+        return False
+    if row["reward"] > entry["reward"]:
+        execution = execute(load_task(row["task"]), movements_of(row["solution"]))
+        if (execution.reward, execution.hands) != (row["reward"], row["hands"]):
+            raise CoarticError(f"{row['task']}: the solution does not come to {row['reward']}")
+        entry |= {key: row[key] for key in ("reward", "hands", "solution")}
+        if "searches" in entry:
+            entry["searches"] |= {"studies/optima": row["reward"]}
+    if row["bound"] < entry["reward"]:
+        raise CoarticError(f"{row['task']}: bound {row['bound']} is below {entry['reward']}")
+    if before[1] is None or row["bound"] < before[1]:
+        entry |= {"bound": row["bound"], "nodes": row["nodes"]}
+    return before != (entry["reward"], entry["bound"])
 
 
 def write(known):
@@ -80,13 +121,11 @@ def solution_in_short(task, movements, reward):
 
 def movements_of(content):
     """Return the movements of :func:`solution_in_short`."""
+
+    def long(joints):
+        return None if joints is None else np.array(joints, dtype=np.float64)
+
     return tuple(
-        Movement(
-            goal,
-            hand,
-            kind,
-            None if target is None else np.array(target, dtype=np.float64),
-            waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
-        )
+        Movement(goal, hand, kind, long(target), waypoints=long(waypoints))
         for goal, hand, kind, target, waypoints in content
     )

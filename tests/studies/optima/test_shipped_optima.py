@@ -1,7 +1,12 @@
 """Shipped best rewards: they hold, are taken over from folders, and get bounds."""
 
 import json
+import lzma
+import sqlite3
+import subprocess
+import sys
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +23,9 @@ from coartic.tasks.task import hands_of
 from tests.support.processes import program
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
-FOLDER = Path(__file__).parents[3] / "studies" / "optima"
+ROOT = Path(__file__).parents[3]
+FOLDER = ROOT / "studies" / "optima"
+THIRD_VERSION = "dcb24843"
 RENEW, PROVE, STUDY = (program(FOLDER / f"{name}.py") for name in ("renew", "prove", "study"))
 SHIPPED = RENEW.shipped
 ENTRIES = SHIPPED.read()
@@ -94,6 +101,32 @@ def test_the_optimum_of_every_task_is_proven_or_bounded(name):
         assert ENTRIES[name, "y", "free"]["reward"] < free["reward"]
 
 
+@pytest.mark.parametrize(
+    ("commit", "suite", "runs"),
+    [(None, "comparison", 3104), (None, "families", 1130),
+     (THIRD_VERSION, "comparison", 5508), (THIRD_VERSION, "families", 2350)],
+)  # fmt: skip
+def test_no_run_exceeds_a_bound(tmp_path, commit, suite, runs):
+    """All runs that ship, and those that shipped with version 3.0.0, from its commit."""
+    place = f"benchmarks/shipped/{suite}.sqlite.xz"
+    if commit is None:
+        packed = (ROOT / place).read_bytes()
+    else:
+        shown = subprocess.run(
+            ["git", "-C", ROOT, "show", f"{commit}:{place}"], capture_output=True
+        )
+        if shown.returncode:
+            pytest.skip("the commit is not in this clone")
+        packed = shown.stdout
+    (tmp_path / "runs.sqlite").write_bytes(lzma.decompress(packed))
+    with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as file:
+        best = file.execute("SELECT task, max(reward), count(*) FROM runs GROUP BY task").fetchall()
+    assert sum(count for *_, count in best) == runs
+    for name, reward, _ in best:
+        assert ENTRIES[name, *SHIPPED.FREE]["bound"] >= reward
+        assert ENTRIES[name, *SHIPPED.FREE]["reward"] >= reward
+
+
 @pytest.fixture
 def files(tmp_path, monkeypatch):
     """The shipped files, as copies that may be written."""
@@ -149,40 +182,79 @@ def test_a_solution_with_another_reward_is_refused():
         SHIPPED.solution_in_short(load_task("ascending"), movements, -291)
 
 
-def test_proofs_are_written_and_the_sharper_bound_is_kept(files):
-    sentences = [*PROVE.proofs(["descending"], 400, False)]
-    assert sentences == [
-        "descending: -304, proven optimal",
-        "descending (base task, other arm still): -304, proven optimal",
-    ]
-    again = SHIPPED.read()
-    assert again["descending", *SHIPPED.FREE] == ENTRIES["descending", *SHIPPED.FREE] | {
-        "nodes": 400
-    }
-    (sentence,) = PROVE.proofs(["two-armed/v1/i000"], 1, False)
-    entry = ENTRIES["two-armed/v1/i000", *SHIPPED.FREE]
-    assert sentence.startswith(f"two-armed/v1/i000: {entry['reward']}, no solution exceeds -")
-    assert SHIPPED.read()["two-armed/v1/i000", *SHIPPED.FREE]["bound"] == entry["bound"]
+def prove(folder, *asked):
+    """What ``prove.py`` prints, in a process of its own, and its log."""
+    command = [sys.executable, FOLDER / "prove.py", *asked, "--out", folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines(), SHIPPED.read_log(folder)
 
 
-def test_what_is_done_is_left_out_if_it_is_said_so(files):
-    assert [*PROVE.proofs(["ascending", "two-armed/v1/i000..i001"], 1, True)] == []
+def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(files, tmp_path):
+    """A log whose last line was cut off, as where a process was killed."""
+    folder, names = tmp_path / "optima", ("two-armed/v1/i032", "two-armed/v1/i002..i003")
+    shown, log = prove(folder, *names, "--seconds", "0.1")
+    assert [row["task"] for row in log] == [names[0]]  # the others are proven
+    assert shown[0].startswith("two-armed/v1/i032 (base task, other arm free): -292, no solution ")
+    with (folder / SHIPPED.LOG).open("a") as file:
+        file.write('{"task": "two-armed/v1/i0')
+    assert prove(folder, *names, "--seconds", "0.1") == ([], log)
+    _, longer = prove(folder, *names, "--seconds", "0.2")
+    assert [row["asked"] for row in longer] == [0.1, 0.2]
+    known = SHIPPED.read()
+    key = SHIPPED.key_of(log[0])
+    assert not SHIPPED.take_proof(known, log[0])
+    assert known == ENTRIES
+    assert SHIPPED.take_proof(known, log[0] | {"bound": -292, "nodes": 7})
+    assert known[key] == ENTRIES[key] | {"bound": -292, "nodes": 7}
 
 
-def test_a_task_of_ones_own_is_searched_and_proven(files, tmp_path):
+def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refused():
+    row = {"task": "two-armed/v1/i002", "base": "task", "other_arm": "free", "reward": -255}
+    with pytest.raises(CoarticError, match="i002: bound -256 is below -255"):
+        SHIPPED.take_proof(SHIPPED.read(), row | {"bound": -256, "nodes": 1})
+    entry = ENTRIES["two-armed/v1/i002", *SHIPPED.FREE]
+    better = row | {key: entry[key] for key in ("hands", "solution")} | {"bound": -255, "nodes": 1}
+    known = SHIPPED.read()
+    known["two-armed/v1/i002", *SHIPPED.FREE]["reward"] = -300
+    assert SHIPPED.take_proof(known, better)
+    assert known == ENTRIES
+    with pytest.raises(CoarticError, match="the solution does not come to -254"):
+        SHIPPED.take_proof(known, better | {"reward": -254})
+
+
+def test_a_better_solution_is_found_on_the_way():
+    """From the open subproblems of least bound, if the reward that is known is poor."""
+    entry = ENTRIES["two-armed/v1/i001", *SHIPPED.FREE] | {"reward": -400}
+    row = PROVE.prove(entry, 4.0)
+    assert -400 < row["reward"] <= row["bound"]
+    execution = execute(load_task(row["task"]), SHIPPED.movements_of(row["solution"]))
+    assert (execution.reward, execution.hands) == (row["reward"], row["hands"])
+
+
+def test_a_task_of_ones_own_is_searched_and_proven(tmp_path):
     task = load_task("ascending").model_copy(update={"name": "mine", "goals": ((6.0, 0.5),)})
     task = task.model_copy(update={"initial_hands": "R", "provenance": {}})
     task.save(tmp_path / "mine.toml")
-    before = files["DATA"].read_bytes()
-    (sentence,) = PROVE.proofs([str(tmp_path / "mine.toml")], 500, False)
-    assert sentence.startswith("mine: -1")
-    assert sentence.endswith(", proven optimal")
-    assert files["DATA"].read_bytes() == before
+    (sentence,), _ = prove(tmp_path / "out", tmp_path / "mine.toml")
+    assert "mine.toml (base task, other arm free): -1" in sentence
+    assert ", proven optimal, " in sentence
 
 
 def test_the_table_is_of_the_shipped_data():
     stored = pd.read_csv(FOLDER / "results.csv", index_col=0)
-    table = STUDY.tabulate()
-    pd.testing.assert_frame_equal(table, stored, check_dtype=False, rtol=1e-5)
+    table, _ = STUDY.count(STUDY.distances())
+    counted = stored[table.columns]
+    pd.testing.assert_frame_equal(table, counted, check_dtype=False, rtol=1e-5)
     assert table.instances["all families"] == len(DRAWN)
     assert table.proven["all families"] == sum(e["bound"] == e["reward"] for e in DRAWN)
+    before = pd.read_csv(FOLDER / "before.csv", index_col=0)
+    before = before.drop(columns="bounded")
+    assert (counted[before.columns] >= before).all(axis=None)
+
+
+def test_open_tasks_are_those_farther_than_five_per_cent_and_all_have_a_bound():
+    stored = pd.read_csv(FOLDER / "open.csv", index_col=0)
+    far = {e["task"] for e in DRAWN if e["bound"] - e["reward"] > 0.05 * -e["reward"]}
+    assert far == set(stored.index)
+    page = (FOLDER / "open.md").read_text()
+    assert all(f"`{name}`" in page for name in far)

@@ -1,0 +1,76 @@
+"""A cone programme that CVXPY states once and Clarabel solves, with numbers changed in place."""
+
+import math
+
+import clarabel
+import cvxpy as cp
+import numpy as np
+from scipy import sparse
+
+LARGEST = 1e4
+"""Largest multiplier that is used: rounding is then far below the tolerance of a bound."""
+_PLANTED = 1e6  # more than any number of the programme
+# Any multipliers give a bound: those of the solver need not be exact.
+_SETTINGS = {
+    "verbose": False, "max_threads": 1, "presolve_enable": False, "input_sparse_dropzeros": False,
+    "tol_gap_abs": 1e-3, "tol_gap_rel": 1e-3, "tol_feas": 1e-5,
+}  # fmt: skip
+
+
+class Programme:
+    """Canonical data of a problem of CVXPY with one parameter, in a solver.
+
+    The constraints of the problem are equations, then inequalities, then second-order cones, which
+    is the order of the canonical data. Each number of the parameter is planted as a number of its
+    own, which shows its places in the data.
+    """
+
+    def __init__(self, problem, parameter, variables, values):
+        parameter.value = _PLANTED + np.arange(values.size, dtype=float).reshape(values.shape)
+        data, _, _ = problem.get_problem_data(cp.CLARABEL, canon_backend=cp.SCIPY_CANON_BACKEND)
+        self._places = []  # numbers, places in them, numbers of the parameter there
+        for numbers in (data["A"].data, data["b"]):
+            places = np.flatnonzero(numbers >= _PLANTED)
+            self._places.append((numbers, places, (numbers[places] - _PLANTED).astype(np.intp)))
+        first = data["param_prob"].var_id_to_col
+        self._variables = [(first.get(each.id, 0), each.shape) for each in variables]
+        self._ends = np.cumsum([constraint.size for constraint in problem.constraints])[:-1]
+        self._fill(values)
+        dims, settings = data["dims"], clarabel.DefaultSettings()
+        for name, value in _SETTINGS.items():
+            setattr(settings, name, value)
+        cones = [clarabel.ZeroConeT(dims.zero), clarabel.NonnegativeConeT(dims.nonneg)]
+        cones += [clarabel.SecondOrderConeT(size) for size in dims.soc]
+        quadratic = sparse.csc_array((len(data["c"]),) * 2)
+        self._solver = clarabel.DefaultSolver(
+            quadratic, data["c"], data["A"], data["b"], cones, settings
+        )
+
+    def _fill(self, values):
+        for numbers, places, sources in self._places:
+            numbers[places] = values.ravel()[sources]
+        return [numbers for numbers, _, _ in self._places]
+
+    def solve(self, values):
+        """Return the values of the variables, and the multipliers of the constraints.
+
+        If there is no solution, the multipliers are far out on a ray, along which the dual
+        objective grows. If the solver fails, they may be any numbers.
+        """
+        matrix, right = self._fill(values)
+        self._solver.update(A=matrix, b=right)
+        solution = self._solver.solve()
+        x, z = finite(solution.x), finite(solution.z)
+        if solution.status == clarabel.SolverStatus.PrimalInfeasible:
+            z *= LARGEST / max(1.0, np.abs(z).max())
+        variables = [
+            x[first : first + math.prod(shape)].reshape(shape, order="F")
+            for first, shape in self._variables
+        ]
+        return variables, np.split(z, self._ends)
+
+
+def finite(numbers):
+    """Return numbers as an array, with zeros for NaN and infinite numbers."""
+    numbers = np.asarray(numbers)
+    return np.where(np.isfinite(numbers), numbers, 0.0)
