@@ -153,6 +153,51 @@ class Study:
         )
         return f"<p>{html.escape(repr(self))}</p>{counts.reset_index().to_html(index=False)}"
 
+    def only(
+        self, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
+    ) -> Study:
+        """Return the study of some methods on some tasks.
+
+        Parameters
+        ----------
+        methods : sequence of str, optional
+            Ids, labels with a setting, or labels of the ranking, such as ``"dual-process (EC1,
+            EC4)"``; by default all.
+        tasks : sequence of str, optional
+            Names of tasks; by default all.
+
+        Returns
+        -------
+        Study
+            Gaps stay: best known rewards are of all methods.
+
+        Raises
+        ------
+        CoarticError
+            The folder has no such method or task, or no run of them.
+        """
+        jobs, known = list(self.plan), {*self.methods.index, *self.methods.base}
+        for kind, names, there in (("method", methods, known), ("task", tasks, {*self.tasks})):
+            for name in names or ():
+                if name not in there:
+                    raise CoarticError(unknown(kind, name, sorted(there)))
+        if methods is not None:
+            rows = self.methods[self.methods.index.isin(methods) | self.methods.base.isin(methods)]
+            labels = {label for parts in rows.parts for label in parts}
+            jobs = [job for job in jobs if job.cell.label in labels]
+        if tasks is not None:
+            jobs = [job for job in jobs if job.cell.task.name in tasks]
+        if not jobs:
+            raise CoarticError("the folder has no runs of these methods on these tasks")
+        kept = pd.MultiIndex.from_tuples([(job.cell.task.name, job.cell.label) for job in jobs])
+        of = pd.MultiIndex.from_frame(self.runs[["task", "label"]])
+        stored = self.stored[of.isin(kept)]
+        part = Study(self.folder, jobs, self.made_with, stored)
+        vars(part)["optima"] = {
+            name: self.optima[name] for name in part.tasks if name in self.optima
+        }
+        return part
+
     @property
     def suite(self) -> str:
         """Name of the suite that was run."""

@@ -6,15 +6,22 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from coartic import drawing, load_task
+from coartic import CoarticError, drawing, load_task
+from coartic.analysis import load
 from coartic.analysis.figures.plot import FORMATS, for_page, picture
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.learning import learning_curves
 from coartic.analysis.sections.ranking import name_in_figure
 from coartic.analysis.study import solved
+from tests.support.figures import misplaced
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, ROOT
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return load("shipped")
 
 
 def test_robots_and_goals_are_drawn_where_they_are():
@@ -31,7 +38,7 @@ def test_robots_and_goals_are_drawn_where_they_are():
 
 
 def test_a_long_name_keeps_its_end(traced):
-    for letters, name in ((44, 22 * "a" + 22 * "b"), (60, f"{24 * 'a'}…{19 * 'b'}")):
+    for letters, name in ((44, 22 * "a" + 22 * "b"), (60, f"{22 * 'a'}…{21 * 'b'}")):
         assert name_in_figure(traced, letters // 2 * "a" + letters // 2 * "b") == name
 
 
@@ -44,6 +51,33 @@ def test_every_figure_that_runs_allow(traced):
         assert plot.alt
         assert plot.caption
         assert len(plot.data)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_no_text_leaves_a_figure_of_any_width_or_lies_on_another(name, shipped):
+    drawn = FIGURES[name](shipped)
+    if drawn is None:
+        pytest.skip("the shipped results have no such figure")
+    for width in (None, 3.4, 5.5, 7.2):
+        plot = FIGURES[name](shipped, width=width)
+        assert misplaced(plot.figure) == ([], []), width
+        assert plot.figure.get_figwidth() == (width or drawn.figure.get_figwidth())
+
+
+def test_a_figure_has_chosen_methods_tasks_and_style(shipped, tmp_path):
+    chosen = {"methods": ["cma-es/bandit", "dual-process (EC1, EC4)"], "tasks": ["ascending"]}
+    plot = FIGURES["ranking"](shipped, style={"axes.labelsize": 20.0}, **chosen)
+    every = FIGURES["ranking"](shipped, tasks=["ascending"])
+    assert plot.data.method.tolist() == ["cma-es/bandit", "dual-process/EC1"]
+    gaps = every.data.set_index("method").gap
+    assert plot.data.gap.tolist() == gaps[plot.data.method].tolist()
+    assert plot.figure.axes[0].xaxis.label.get_fontsize() == 20.0
+    plot.save(tmp_path / "mine.pdf")
+    assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")
+    with pytest.raises(CoarticError, match=r"a picture ends in \.svg, \.pdf, \.png"):
+        plot.save(tmp_path / "mine.doc")
+    with pytest.raises(CoarticError, match="unknown method 'cma-es/bandits'.*cma-es/bandit"):
+        FIGURES["ranking"](shipped, methods=["cma-es/bandits"])
 
 
 def test_the_gallery_shows_every_figure():

@@ -5,20 +5,25 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import wraps
+from pathlib import Path
+from typing import Any, Protocol
 
 import pandas as pd
 from matplotlib import rc_context
+from matplotlib import style as styles
 from matplotlib.figure import Figure
 
 from coartic import Task
 from coartic.analysis.figures import style
+from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
+from coartic.internal.files import errors_in_words
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
 from coartic.internal.threads import environment
@@ -41,6 +46,12 @@ class Plot:
     data: pd.DataFrame
     """Drawn numbers as a tidy frame, enough to draw the figure again."""
 
+    def save(self, path: str | Path) -> None:
+        """Write the picture into a file, whose name ends in ``.svg``, ``.pdf`` or ``.png``."""
+        path = Path(path)
+        with errors_in_words(path):
+            path.write_bytes(picture(self.figure, path.suffix))
+
     def _repr_html_(self) -> str:
         """Return the picture that a notebook shows, with title and caption."""
         words = html.escape(one_line(f"{self.title}. {self.caption}"))
@@ -55,26 +66,54 @@ Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 """Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and its tasks."""
 
 
-def figure(
-    title: str, caption: str
-) -> Callable[[Callable[[Study], Parts | None]], Callable[[Study], Plot | None]]:
+class Draws(Protocol):
+    """A figure of the report, as a function of a study."""
+
+    def __call__(
+        self,
+        study: Study,
+        /,
+        *,
+        width: float | None = None,
+        methods: Sequence[str] | None = None,
+        tasks: Sequence[str] | None = None,
+        style: Any = (),
+    ) -> Plot | None:
+        """Draw the figure, or return None if the folder has no runs for it.
+
+        ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks`` as
+        :meth:`.Study.only` takes them; ``style``: settings of Matplotlib that count more than the
+        project's, as ``matplotlib.style.use`` takes them.
+        """
+
+
+def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], Draws]:
     """Return a decorator that turns a drawing function of a study into a figure of the report.
 
     The figure is in the style of all figures; its id is the name of the function. The caption
     explains the dagger if a task is reconstructed; ``{n}`` in it is the range of the column
-    ``runs`` of the drawn numbers. The function returns None if the folder has no
-    runs for the figure.
+    ``runs`` of the drawn numbers.
     """
 
-    def as_figure(draw: Callable[[Study], Parts | None]) -> Callable[[Study], Plot | None]:
+    def as_figure(draw: Callable[[Study], Parts | None]) -> Draws:
         @wraps(draw)
-        @style.styled
-        def plot(study: Study) -> Plot | None:
+        def plot(
+            study: Study,
+            /,
+            *,
+            width: float | None = None,
+            methods: Sequence[str] | None = None,
+            tasks: Sequence[str] | None = None,
+            style: Any = (),
+        ) -> Plot | None:
             check_study(study)
-            if (parts := draw(study)) is None:
-                return None
-            drawing, data, alt, tasks = parts
-            dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
+            if methods is not None or tasks is not None:
+                study = study.only(methods, tasks)
+            with styles.context(["default", RC, *([style] if style else [])]), drawn_at(width):
+                if (parts := draw(study)) is None:
+                    return None
+                drawing, data, alt, shown = parts
+            dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in shown) else ""
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
             n = " to ".join(dict.fromkeys(map(number, ends)))
             return Plot(id_of(draw), title, caption.format(n=n) + dagger, alt, drawing, data)

@@ -7,7 +7,9 @@ All colours are legible on white and on #111. Dashes distinguish the same lines 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
@@ -33,6 +35,9 @@ TALLEST = 225 / INCH
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Matplotlib's settings of all figures."""
+LEAST_PANEL = 2.2
+"""Least width of a panel next to another one in a figure of chosen width, inches."""
+_width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
 BACKGROUND = "#ffffff"
@@ -81,10 +86,25 @@ def grid(panels: int) -> tuple[int, int]:
     return -(-panels // columns), columns
 
 
+@contextmanager
+def drawn_at(width: float | None) -> Iterator[None]:
+    """Make :func:`panels` of this block make figures of a width, inches; None: of their own."""
+    before = _width.set(width)
+    try:
+        yield
+    finally:
+        _width.reset(before)
+
+
+def is_narrow() -> bool:
+    """Return whether figures are drawn at less than five inches."""
+    return (_width.get() or TWO) < 5
+
+
 def panels(
     shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure with panels.
+    """Make a figure with panels, fewer side by side in a figure of a chosen narrower width.
 
     Parameters
     ----------
@@ -103,9 +123,14 @@ def panels(
     (Figure, list of Axes)
         The figure, and its panels row by row.
     """
+    used = used or shape[0] * shape[1]
+    if (width := _width.get()) is not None:
+        columns = min(shape[1], max(1, int(width // LEAST_PANEL)))
+        rows = -(-used // columns)
+        shape, size = (rows, columns), (width, size[1] * rows / shape[0])
     figure = Figure(figsize=size, layout="constrained")
     every = figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
-    for axes in every[used or len(every) :]:
+    for axes in every[used:]:
         axes.set_axis_off()
     return figure, every[:used]
 
@@ -118,7 +143,11 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """Draw a legend below all panels."""
+    """Draw a legend below all panels; for more than two lines the figure becomes taller."""
+    widest = 0.45 + 0.06 * max(len(str(handle.get_label())) for handle in handles)  # inches
+    columns = min(columns, max(1, int(figure.get_figwidth() // widest)))
+    lines = -(-len(handles) // columns)
+    figure.set_figheight(figure.get_figheight() + 0.15 * max(0, lines - 2))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
 
 

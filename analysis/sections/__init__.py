@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from coartic.analysis.figures.plot import Plot
+from coartic.analysis.figures.plot import Draws
 from coartic.analysis.sections import (
     coarticulation,
     costs,
@@ -16,7 +15,6 @@ from coartic.analysis.sections import (
     ranking,
     tasks,
 )
-from coartic.analysis.study import Study
 from coartic.analysis.table import Table
 from coartic.analysis.words import id_of
 
@@ -28,7 +26,7 @@ class Section:
     id: str
     title: str
     tables: tuple[Table, ...]
-    figures: tuple[Callable[[Study], Plot | None], ...] = ()
+    figures: tuple[Draws, ...] = ()
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
     folds all figures but the first."""
     sentence: str = ""

@@ -196,7 +196,8 @@ def draw_ranking(study: Study) -> Parts | None:
         axes.annotate(gap, (1, y), (8, 0), color=color, **beside)
         axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **beside)
 
-    write_right(1, f"gap (%) [{style.COVERAGE}]", "n", style.GREY)
+    if not style.is_narrow():
+        write_right(1, f"gap (%) [{style.COVERAGE}]", "n", style.GREY)
     for place, (row, label) in enumerate(zip(lines, axes.get_yticklabels(), strict=True)):
         if isinstance(row, str):
             label.set_color(style.GREY)
@@ -209,7 +210,8 @@ def draw_ranking(study: Study) -> Parts | None:
         name = shown_name(study, row["method"])
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
-        write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
+        if not style.is_narrow():
+            write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)
     where = "" if len(tasks) > 1 else f"{study.tasks[tasks[0]].label}: "
@@ -222,6 +224,7 @@ def draw_ranking(study: Study) -> Parts | None:
 def name_in_figure(study: Study, line: Any) -> str:
     """Return the name left of a line of the figure: a heading, or a row with a method."""
     name = line if isinstance(line, str) else shown_name(study, line["method"])
-    if len(name) > LONGEST:  # its end may say on how many tasks
-        name = f"{name[: LONGEST - 20]}…{name[-19:]}"
+    longest = LONGEST // 2 if style.is_narrow() else LONGEST
+    if len(name) > longest:  # its end may say on how many tasks
+        name = f"{name[: longest // 2]}…{name[1 - longest // 2 :]}"
     return name
