@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from coartic.estimates import Estimate
 
 _LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
-Digits = Annotated[int, 0, 30]
-"""Number of decimals."""
+_Digits = Annotated[int, 0, 30]
 NONE = "–"
 """Text of a missing value."""
 MOST_NAMED = 3
@@ -61,7 +60,7 @@ def id_of(function: Callable[..., Any]) -> str:
 
 
 @checked_arguments
-def number(value: float, digits: Digits | None = None) -> str:
+def number(value: float, digits: _Digits | None = None) -> str:
     """Write a number, with a true minus and spaces between thousands; a dash for NaN.
 
     ``digits``: decimals; by default integers are whole and others have three figures.
@@ -118,7 +117,7 @@ def estimate(value: Estimate, digits: int | None = None) -> str:
 def interval(
     row: Mapping[Any, Any] | pd.Series,
     column: str,
-    digits: Digits = 1,
+    digits: _Digits = 1,
     scale: float = 1.0,
     unit: str = "",
 ) -> str:
