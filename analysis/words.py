@@ -14,8 +14,6 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from coartic import Task
     from coartic.estimates import Estimate
 
@@ -114,13 +112,7 @@ def estimate(value: Estimate, digits: int | None = None) -> str:
 
 
 @checked_arguments
-def interval(
-    row: Mapping[Any, Any] | pd.Series,
-    column: str,
-    digits: _Digits = 1,
-    scale: float = 1.0,
-    unit: str = "",
-) -> str:
+def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
     """Write a number of a table with its interval.
 
     Parameters
@@ -146,10 +138,11 @@ def interval(
     >>> interval({"gap": 0.078, "gap_low": 0.073, "gap_high": 0.081}, "gap", scale=100, unit=" %")
     '7.8 % [7.3, 8.1]'
     """
-    names = [f"{column}{end}" for end in ("", "_low", "_high")]
-    if missing := [name for name in names if name not in getattr(row, "keys", tuple)()]:
-        raise CoarticError(f"the row has no {', '.join(missing)}")
-    value, low, high = (scale * float(row[name]) for name in names)
+    names = column, f"{column}_low", f"{column}_high"
+    try:
+        value, low, high = (scale * float(row[name]) for name in names)
+    except (KeyError, IndexError, TypeError):
+        raise CoarticError(f"the row has no numbers {', '.join(names)}") from None
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 
