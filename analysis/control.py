@@ -28,8 +28,6 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
 
-Runs = Annotated[int, 1, MOST_RUNS]
-"""Number of runs of a cell."""
 LEAST_SHARE = 0.1
 """Share of a method's runs that a hand sequence has at least where it is compared."""
 
@@ -133,7 +131,7 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 
 @checked_arguments
-def control_suite(study: Study, *, runs: Runs = 20) -> str:
+def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> str:
     """Return a suite of random search for the hands with which methods end that have no control.
 
     Run it with the folder of the study included, and all signatures have a control.

@@ -254,9 +254,7 @@ def means(
     if not by:
         raise CoarticError("by is empty: needed are names of columns")
     if both := [name for name in columns if name in by]:
-        raise CoarticError(
-            f"column {shown(both[0])} is in by and in columns: needed is one of both"
-        )
+        raise CoarticError(f"column {shown(both[0])} is in by and in columns: needed is one")
     values, rows = checked(frame, numbers=columns, others=by), []
     for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
@@ -458,8 +456,6 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     CoarticError
         The frame has no trial with all goals, or is wrong as a file of ``read_hits`` can be.
     """
-    if not isinstance(hits, pd.DataFrame):
-        raise CoarticError(f"needed is a pandas.DataFrame, not a {type(hits).__name__}")
     names = [f"row {brief_value(row)}" for row in hits.index.tolist()]
     joints, runs = [*task.robot.joint_names], {}
     columns = checked_hits(hits, task, "the frame", names)

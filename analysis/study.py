@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from pathlib import Path
-from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
+from typing import Any, Concatenate, Literal
 
 import numpy as np
 import pandas as pd
@@ -31,7 +31,7 @@ from coartic.analysis.signatures.measures import signature_named
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
-from coartic.internal.arguments import checker_of
+from coartic.internal.arguments import Asked, Computed, checker_of
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
@@ -70,8 +70,6 @@ def typical_run(runs: pd.DataFrame) -> str:
     return str(runs.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
 
-Asked = ParamSpec("Asked")
-Computed = TypeVar("Computed")
 Part = Literal["solution", "replay"]
 """Part of a run that can be executed."""
 MOST_EXECUTED = 500

@@ -14,14 +14,11 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from coartic import Task
     from coartic.estimates import Estimate
 
 _LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
-Digits = Annotated[int, 0, 30]
-"""Number of decimals."""
+_Digits = Annotated[int, 0, 30]
 NONE = "–"
 """Text of a missing value."""
 MOST_NAMED = 3
@@ -61,7 +58,7 @@ def id_of(function: Callable[..., Any]) -> str:
 
 
 @checked_arguments
-def number(value: float, digits: Digits | None = None) -> str:
+def number(value: float, digits: _Digits | None = None) -> str:
     """Write a number, with a true minus and spaces between thousands; a dash for NaN.
 
     ``digits``: decimals; by default integers are whole and others have three figures.
@@ -115,13 +112,7 @@ def estimate(value: Estimate, digits: int | None = None) -> str:
 
 
 @checked_arguments
-def interval(
-    row: Mapping[Any, Any] | pd.Series,
-    column: str,
-    digits: Digits = 1,
-    scale: float = 1.0,
-    unit: str = "",
-) -> str:
+def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
     """Write a number of a table with its interval.
 
     Parameters
@@ -147,10 +138,11 @@ def interval(
     >>> interval({"gap": 0.078, "gap_low": 0.073, "gap_high": 0.081}, "gap", scale=100, unit=" %")
     '7.8 % [7.3, 8.1]'
     """
-    names = [f"{column}{end}" for end in ("", "_low", "_high")]
-    if missing := [name for name in names if name not in getattr(row, "keys", tuple)()]:
-        raise CoarticError(f"the row has no {', '.join(missing)}")
-    value, low, high = (scale * float(row[name]) for name in names)
+    names = column, f"{column}_low", f"{column}_high"
+    try:
+        value, low, high = (scale * float(row[name]) for name in names)
+    except (KeyError, IndexError, TypeError):
+        raise CoarticError(f"the row has no numbers {', '.join(names)}") from None
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 

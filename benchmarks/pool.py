@@ -59,8 +59,6 @@ _IDLE_S = 60.0  # longest wait of a process for jobs
 _END_S = 1.0  # time for a killed process to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 MORE_FILES = "after `ulimit -n 1024`, which allows more open files"
-WAITED = "it waited"
-"""End of the reason of a run that used up its wall time without its CPU time."""
 _BEGUN, _SAID = "begun", "said"  # files among the answers of a process
 
 
@@ -69,10 +67,9 @@ class Local:
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
-    time is repeated once. Then its runs end as crashed, with a reason that ends in :data:`WAITED`;
-    :func:`~coartic.benchmarks.runner.perform` does not keep them, so that the next command performs
-    them again. The time in which coartic's kernels are compiled does not count. ``verbose`` shows
-    what methods print and log, and their tracebacks.
+    time is repeated once. Then its runs end as crashed, and a suite does not keep them, so that the
+    next command performs them again. The time in which coartic's kernels are compiled does not
+    count. ``verbose`` shows what methods print and log, and their tracebacks.
     """
 
     @checked_arguments
@@ -265,7 +262,7 @@ class Worker:
         """Return the outcomes of the current job of a process that has ended or is late."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None:
-            reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: {WAITED}"
+            reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
             return fail(job, "crashed", reason, wall_s=self.wall_limit_s)
         if exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME:
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
@@ -373,16 +370,6 @@ _START = "forkserver" if _HAS_SERVER and len(tempfile.gettempdir()) <= 70 else "
 CONTEXT: Any = multiprocessing.get_context(_START)
 
 
-def files_allowed() -> float:
-    """Return the number of files that this process may open."""
-    try:
-        import resource
-    except ImportError:
-        return math.inf
-    most, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return math.inf if most == resource.RLIM_INFINITY else most
-
-
 def start_process(process: Any) -> None:
     """Start a process of :data:`CONTEXT` with one thread for BLAS, without running the main program
     again in it. Raises OSError or EOFError if the process does not start."""
@@ -393,8 +380,11 @@ def start_process(process: Any) -> None:
         raise FileNotFoundError(errno.ENOENT, text) from None
     # Without PYTHONSAFEPATH Python imports from the working folder first, whoever wrote it.
     safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    if files_allowed() < _LEAST_FILES:
-        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+    with contextlib.suppress(ImportError):
+        import resource
+
+        if 0 <= resource.getrlimit(resource.RLIMIT_NOFILE)[0] < _LEAST_FILES:  # -1: no limit
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
     main = sys.modules["__main__"]
     with environment(ONE_THREAD | safe):
         if _START == "forkserver":

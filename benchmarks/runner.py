@@ -19,7 +19,7 @@ from typing import Any
 
 from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.pool import WAITED, Local
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.reproduce import doubts_of
 from coartic.benchmarks.scoring import score
@@ -222,10 +222,7 @@ def perform(
                     if len(runs) > 1:  # a failure may come from other runs of the job
                         alone += [run.job for run in runs if run.outcome.status not in _SURE]
                         runs = [run for run in runs if run.outcome.status in _SURE]
-                    for run in runs:
-                        if run.outcome.reason.endswith(WAITED):
-                            warnings.warn(waited(run), stacklevel=2)
-                    runs = [run for run in runs if not run.outcome.reason.endswith(WAITED)]
+                    runs = [run for run in runs if not has_waited(run)]
                     store.write(runs)
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
@@ -239,13 +236,14 @@ def perform(
         return progress
 
 
-def waited(run: Run) -> str:
-    """Return a sentence on a run that waited and is not kept."""
-    name, task = run.cell.label, run.cell.task.name
-    return (
-        f"run {run.number} of {name} on {task}: {run.outcome.reason}, so it is not kept. Repeat "
-        "the command, on a machine with less to do"
-    )
+def has_waited(run: Run) -> bool:
+    """Return whether a run was ended by its limit of wall time, which is no result. Warns of it."""
+    times = run.outcome.times
+    if run.outcome.status != "crashed" or times.wall_s is None or times.cpu_s is not None:
+        return False
+    where = f"run {run.number} of {run.cell.label} on {run.cell.task.name}"
+    warnings.warn(f"{where} is not kept: {run.outcome.reason}. Repeat the command", stacklevel=3)
+    return True
 
 
 def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:

@@ -520,7 +520,7 @@ def test_all_functions_are_called_wrongly():
         (lambda: Movement(1, "right", "path", waypoints=[MASKED]), "waypoints has masked"),
         (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), "p_values has masked entries"),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
-        (lambda: interval({}, "gap"), "the row has no gap, gap_low, gap_high"),
+        (lambda: interval({}, "gap"), "the row has no numbers gap, gap_low, gap_high"),
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
         (
             lambda: Task(goals=[(3.0, 2.0)], q0=TASK.q0 * np.nan),

@@ -34,8 +34,8 @@ from coartic.internal.limits import MOST_RUNS, real_array
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
-Count = Annotated[int, 0, MOST_RUNS]
-Share = Annotated[float, 0.0, 1.0]
+_Count = Annotated[int, 0, MOST_RUNS]
+_Share = Annotated[float, 0.0, 1.0]
 
 
 @checked_arguments
@@ -123,7 +123,7 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
 
 
 @checked_arguments
-def share_test(count: Count, total: Count, share: Share, alternative: Alternative) -> Estimate:
+def share_test(count: _Count, total: _Count, share: _Share, alternative: Alternative) -> Estimate:
     """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
     The value of the estimate is the difference ``count / total - share``.

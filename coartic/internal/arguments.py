@@ -51,33 +51,24 @@ def checker_of(function: Callable[..., Any]) -> Callable[..., None]:
     def hint_of(name: str) -> Any:
         try:
             return eval(signature.parameters[name].annotation, inspect.unwrap(function).__globals__)
-        except NameError:
+        except (NameError, TypeError):  # TypeError: self has none
             return Any
 
     def check(*args: Any, **named: Any) -> None:
         try:
             given = signature.bind(*args, **named).arguments
+            for name, value in given.items():
+                parameter, hint = signature.parameters[name], hint_of(name)
+                for each in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
+                    if type(each) is not hint and not fits(name, each, hint):
+                        needed = _WORDS.get(parameter.annotation, parameter.annotation)
+                        raise ValueError(f"{name} is {brief_value(each)}; needed is {needed}")
         except TypeError as error:
             raise ArgumentError(f"{function.__name__}: {error}") from None
-        for name, value in given.items():
-            parameter = signature.parameters[name]
-            if parameter.kind is parameter.VAR_POSITIONAL:
-                for each in value:
-                    check_argument(name, each, hint_of(name), parameter.annotation)
-            elif parameter.kind is not parameter.VAR_KEYWORD and name != "self":
-                check_argument(name, value, hint_of(name), parameter.annotation)
+        except ValueError as error:
+            raise ArgumentError(str(error)) from None
 
     return check
-
-
-def check_argument(name: str, value: Any, hint: Any, words: str) -> None:
-    """Raise ArgumentError for a value that a hint, which is written as ``words``, excludes."""
-    try:
-        if type(value) is not hint and not fits(name, value, hint):
-            needed = _WORDS.get(words, words)
-            raise ValueError(f"{name} is {brief_value(value)}; needed is {needed}")
-    except ValueError as error:
-        raise ArgumentError(str(error)) from None
 
 
 def fits(name: str, value: Any, hint: Any) -> bool:
