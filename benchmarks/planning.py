@@ -18,7 +18,7 @@ from coartic.benchmarks.suites import (
     Seconds,
     Suite,
     TaskNamed,
-    Trials,
+    TrialCount,
     check_kind,
     load_suite,
     tasks_of,
@@ -78,14 +78,14 @@ class Request(FileData):
     runs: Annotated[Any, PlainValidator(runs_asked)] = None
     """Number of runs of each cell; by default the number of the suite. A range such as
     ``range(50, 100)`` is a part of the runs, for a job of an array."""
-    trials: Annotated[Trials, _plain] | None = None
+    trials: Annotated[TrialCount, _plain] | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
     suite."""
     seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True), _plain] = 0
     """Seed of the suite."""
     time_limit_s: Annotated[Seconds, _plain] | None = None
     """CPU time of a run, s; by default the limit of the suite."""
-    trial_budget: Annotated[Trials, _plain] | None = None
+    trial_budget: Annotated[TrialCount, _plain] | None = None
     """Most physical trials of a run, whatever its method."""
 
 

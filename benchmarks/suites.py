@@ -44,8 +44,8 @@ def plain_value(value: Any) -> Value:
     raise PydanticCustomError("scalar", "{text}", {"text": problem})
 
 
-Runs = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
-Trials = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
+RunCount = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
+TrialCount = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
 Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
 _Value = Annotated[Value, PlainValidator(plain_value)]
 _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
@@ -74,7 +74,7 @@ class Block(FileData):
     """True to free the base in x and y on every task."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
     """Numbers of goals: the block has only tasks with so many; by default all."""
-    runs: Runs | None = None
+    runs: RunCount | None = None
     """Runs of each method on each task; by default the number of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
     """Parameters of the methods, by name."""
@@ -106,9 +106,9 @@ class Suite(FileData):
     """Title in lists and reports."""
     description: Line
     """Sentence in lists and reports."""
-    runs: Runs
+    runs: RunCount
     """Runs of each stochastic method on each task; other methods are run once."""
-    trials: Trials | None = None
+    trials: TrialCount | None = None
     """Trials of a run, for methods that have this parameter."""
     time_limit_s: Seconds | None = 600.0
     """CPU time of a job, s: of one run, or of runs that are performed side by side."""

@@ -643,7 +643,7 @@ _DAMAGED = (
     "it is damaged. Move it away and repeat the `coartic run` command, or restore a copy: the file "
     "itself, no dump, nor a pointer of Git LFS, for which `git lfs pull` brings the file"
 )
-_WORDS = {
+_SENTENCES = {
     "SQLITE_BUSY": _BUSY,
     "SQLITE_LOCKED": _BUSY,
     "SQLITE_READONLY": "it or its folder cannot be written. If a `coartic run` was interrupted "
@@ -667,7 +667,7 @@ def explain(path: Path, error: Exception) -> str:
         path, said = Path(error.filename or path), error.strerror or said
     elif isinstance(error, sqlite3.Error):
         name = getattr(error, "sqlite_errorname", "")
-        said = _WORDS.get(name, _WORDS.get("_".join(name.split("_")[:2]), said))
+        said = _SENTENCES.get(name, _SENTENCES.get("_".join(name.split("_")[:2]), said))
         if name.startswith("SQLITE_CANTOPEN"):
             said = why_not_opened(path) or said
         if "decode to UTF-8" in said:
