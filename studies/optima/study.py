@@ -20,6 +20,7 @@ BOUNDS = {
     "within_20": "within 20 %", "instances": "farther",
 }  # fmt: skip
 """Columns of the table that the figure shows, each with its label."""
+EFFORT = ["seconds", "nodes"]
 
 
 def distances():
@@ -52,8 +53,9 @@ def tabulate(folder):
     """Return the tables: counts with the effort of a folder, and the tasks that are open."""
     known = distances()
     table, groups = count(known)
-    log = pd.DataFrame(shipped.read_log(folder)).query("base == 'task' and other_arm == 'free'")
-    effort = log.groupby("task")[["seconds", "nodes"]].sum()
+    log = pd.DataFrame(shipped.read_log(folder), columns=["task", *EFFORT, "base", "other_arm"])
+    log = log.query("base == 'task' and other_arm == 'free'")
+    effort = log.groupby("task")[EFFORT].sum()
     for name, group in groups.items():
         seconds, nodes = effort.reindex(group.index).sum()
         table.loc[name, ["seconds", "per_second"]] = seconds, nodes / max(seconds, 1.0)
