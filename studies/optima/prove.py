@@ -20,11 +20,11 @@ from pathlib import Path
 import shipped
 from certificate import certify
 
-from coartic import PAPER, CoarticError, execute, load_task
+from coartic import PAPER, CoarticError, MethodError, execute, load_task
 from coartic.baselines.optimum import OptimumSearch, with_locks
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
-from coartic.method import MethodError, Session, run_method
+from coartic.method import Session, run_method
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import essence
 

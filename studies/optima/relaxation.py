@@ -35,7 +35,6 @@ from speed import spans_of
 
 from coartic import Hand
 from coartic.baselines.trajectory_problem import held_joints
-from coartic.robot import directions
 
 PartialSequence = tuple[Hand | None, ...]
 """A hand for each goal, None if it is undecided."""
@@ -44,6 +43,11 @@ HALF_SPACES = 9
 """Half-spaces of each link."""
 _BASE_DOF = 2
 _TOWARDS_POINT = 0.25  # of the way from an interval's middle to the relaxation's angle
+
+
+def directions_of(angles):
+    """Return unit vectors of links at absolute angles, rad, shape ``(..., 2)``."""
+    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
 class Relaxed(NamedTuple):
@@ -130,7 +134,7 @@ class Relaxation:
         pulls, forces = (-each.reshape(len(q), -1)[:, 1:] for each in (pulls, forces))
         pulls[self.held] += held
         angles = self._sums @ q.ravel()
-        wrong = np.hypot(*(u - directions(angles)).T) * self._lengths
+        wrong = np.hypot(*(u - directions_of(angles)).T) * self._lengths
         return Relaxed(q, angles, wrong, (pulls, forces, speeds))
 
     def lagrangian(self, multipliers, longest):
@@ -207,7 +211,7 @@ def half_spaces(box):
     middle, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
     # In the interval's own frame, where its middle is the angle zero, and from there.
     zero, one = np.zeros_like(half), np.ones_like(half)
-    cosine, sine = directions(np.minimum(0.5 * half, math.pi / 2)).T
+    cosine, sine = directions_of(np.minimum(0.5 * half, math.pi / 2)).T
     slope = np.sin(np.minimum(half, math.pi)) / np.maximum(half, 1e-12)
     rows = [
         (zero, zero, one), (zero, zero, -one), (-one, zero, zero),
@@ -216,7 +220,7 @@ def half_spaces(box):
     ]  # fmt: skip
     along, across, turn = np.array(rows).swapaxes(0, 1)
     most = offset_of(along, across, turn, half) + turn * middle
-    cosine, sine = directions(middle).T
+    cosine, sine = directions_of(middle).T
     return np.array([along * cosine - across * sine, along * sine + across * cosine, turn, most])
 
 
