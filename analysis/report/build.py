@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from shlex import quote
@@ -35,11 +36,16 @@ HERE = Path(__file__).parent
 
 
 def write_report(
-    study: Study, folder: Path, *, for_paper: bool = True
+    study: Study,
+    folder: Path,
+    *,
+    for_paper: bool = True,
+    watch: Callable[[str], object] = str,
 ) -> tuple[list[str], dict[str, str]]:
     """Write a report into ``folder``, in the place of an earlier report.
 
-    ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF. Returns the paths of the
+    ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF. ``watch`` is called with
+    the title of each section before it is made. Returns the paths of the
     files, and the errors of parts that could not be made, by the name of the part. Raises
     CoarticError if the folder holds the results themselves, the report of other results, or other
     files.
@@ -59,7 +65,7 @@ def write_report(
         if head and f'-results" content="{home}"' not in html.unescape(head):
             raise CoarticError(f"{folder} holds the report of other results: choose another folder")
     failures: dict[str, str] = {}
-    files = {"report.html": page(study, home, failures).encode()}
+    files = {"report.html": page(study, home, failures, watch).encode()}
     names = {table.id: section.title for section in SECTIONS for table in section.tables}
     for name, table in TABLES.items():
         made = about.attempt(
@@ -67,6 +73,7 @@ def write_report(
         )
         files |= made or {}
     for section in about.visible_sections(study) if for_paper else ():
+        watch(f"{section.title}, for print")
         files |= about.attempt(failures, section.title, files_of_figures, study, section) or {}
     publish(folder, files)
     return list(files), failures
@@ -122,7 +129,7 @@ def stamp(runs: pd.DataFrame) -> str:
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
-def page(study: Study, home: str, failures: dict[str, str]) -> str:
+def page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str], object]) -> str:
     """Return the page in HTML, which needs no other file and no network.
 
     ``home`` is the path from the page's folder to the results. ``failures`` gets the errors of
@@ -130,6 +137,7 @@ def page(study: Study, home: str, failures: dict[str, str]) -> str:
     """
     sections = []
     for section in about.visible_sections(study):
+        watch(section.title)
         parts = about.attempt(failures, section.title, parts_of, study, section)
         parts = parts or {"finding": [], "figures": [], "shown": []}
         failure = failures.get(section.title, "")

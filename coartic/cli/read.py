@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.terminal import complain, say, say_pairs, say_table
+from coartic.cli.terminal import complain, say, say_pairs, say_part, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
@@ -38,7 +38,8 @@ def report(
     started = time.monotonic()
     study = load(folder)
     with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
-        files, failures = write_report(study, out, for_paper=for_paper)
+        files, failures = write_report(study, out, for_paper=for_paper, watch=say_part)
+    say_part("")
     tables = sum(name.endswith(".csv") for name in files)
     figures = sum(name.endswith(".svg") for name in files)
     what = f"CSV and LaTeX) and {counted(figures, 'figure')} (SVG and PDF" if for_paper else "CSV"

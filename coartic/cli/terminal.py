@@ -70,6 +70,14 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
             say("  ".join([f"{first:{widths[0]}}", *cells]))
 
 
+def say_part(name: str) -> None:
+    """Show on a terminal what is being made, in one line that changes; an empty name ends it."""
+    if sys.stderr.isatty():
+        width = shutil.get_terminal_size().columns - 1
+        print("\r", end="", file=sys.stderr)
+        say(f"{plain(name, width):{width}}", stream=sys.stderr, end="" if name else "\r")
+
+
 class Display:
     """Progress on standard error: runs done, failures and time left. On a terminal one line
     changes; elsewhere a line appears every half minute."""
