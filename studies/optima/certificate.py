@@ -13,8 +13,8 @@ the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 - an interval of a link angle, in two;
 - a goal whose hand is undecided, into one subproblem for each hand. With five goals and more the
   search begins with all of them undecided, so that a bound for the hands of some goals serves every
-  sequence with these hands; a hand is decided where that matters more than the angles do. With
-  seven goals and more these are hands from the first goal on, else those that are most wrong;
+  sequence with these hands; a hand is decided where that matters more than the angles do, first
+  where it is most wrong (hands from the first goal on proved no more, see the study's page);
 - goals that may be hit without a movement, if only their ticks are still missing: into one
   subproblem for each, in which it is the first such goal. The subproblem without such goals is
   bounded already.
@@ -39,7 +39,6 @@ from speed import TOLERANCE, least_ticks
 from coartic import PAPER
 
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
-_MANY_GOALS = 7  # from which hands are decided from the first goal on
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
@@ -160,12 +159,11 @@ class ProofSearch:
             for g, decided in enumerate(problem.hands)
             if decided is None
         }
-        farthest = max(far, key=lambda g: far[g], default=None)
+        goal = max(far, key=lambda g: far[g], default=None)
         wrong = node.relaxed.wrong.max(initial=0.0)
-        if farthest is not None and (
-            bounded or wrong <= max(_HAND_FIRST * (far[farthest] - self._task.radius), 1e-3)
+        if goal is not None and (
+            bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3)
         ):
-            goal = min(far) if len(problem.hands) >= _MANY_GOALS else farthest
             # One subproblem for each hand, the new angles anywhere on a path of interest.
             for hand in self._hands:
                 hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
