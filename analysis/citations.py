@@ -51,7 +51,7 @@ def bibliography(
     note = f"Version {made_with.get('coartic') or __version__}"
     if commit := made_with.get("commit"):
         note += f", commit {commit['id']}{' with changes' * commit['dirty']}"
-    software = misc(
+    software = _misc(
         "coartic",  # as in CITATION.cff
         author="{The coartic developers}",
         title="coartic: a comparative benchmark of coarticulation in motor skill acquisition",
@@ -75,7 +75,7 @@ def bibliography(
     for name in others:
         if citation := " ".join(methods[name].citation.split()):
             title = latex(" ".join(methods[name].title.split()) or name)
-            declared = misc(f"method-{slug[name]}", title=title, note=latex(citation))
+            declared = _misc(f"method-{slug[name]}", title=title, note=latex(citation))
             entries.append(f"{comment(f'{name} cites: {citation}')}\n{declared}")
         else:
             words = f"{name}: it declares no citation; ask its authors what to cite"
@@ -83,7 +83,7 @@ def bibliography(
     return "\n\n".join(entries) + "\n"
 
 
-def misc(key: str, **fields: str) -> str:
+def _misc(key: str, **fields: str) -> str:
     """Return a ``@misc`` entry of BibTeX, a line for each field."""
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@misc{{{key},", *lines, "}"])

@@ -66,27 +66,27 @@ def with_control(
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
         if len(values) >= LEAST_SHARE * total:
-            control = control_of(study, task, label, hands)
+            control = _control_of(study, task, label, hands)
             of_control = study.signature_by_hands(signature, task, control) if control else {}
             pairs[hands] = values, of_control.get(hands, np.empty(0))
     return pairs
 
 
-def control_of(study: Study, task: str, label: str, hands: str) -> str:
+def _control_of(study: Study, task: str, label: str, hands: str) -> str:
     """Return the label of random search with these hands and as many trials as a method on a task;
     ``hands`` empty: with every hand sequence. Empty without such runs."""
     method = "random-search" if hands else "random-search/hands"
-    trials = most_trials(study, task, label)
+    trials = _most_trials(study, task, label)
     for other in study.methods.index[study.methods.base == method]:
         runs = solved(study.cells.get((task, other), study.runs[:0]))
-        if not len(runs) or most_trials(study, task, other) != trials:
+        if not len(runs) or _most_trials(study, task, other) != trials:
             continue
         if not hands or {*runs.hands} == {hands}:
             return str(other)
     return ""
 
 
-def most_trials(study: Study, task: str, label: str) -> float:
+def _most_trials(study: Study, task: str, label: str) -> float:
     """Return the most trials that a run of a method made on a task."""
     return float(study.cells[task, label].trials.fillna(0).max())
 
@@ -118,7 +118,7 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     both = contexts.first, contexts.second
     commonest = (mode(run.hands for run in runs.runs) for runs in both)
     labels = [
-        control_of(study, runs.task.name, contexts.method, hands)
+        _control_of(study, runs.task.name, contexts.method, hands)
         for runs, hands in zip(both, commonest, strict=True)
     ]
     if not all(labels):
@@ -152,9 +152,9 @@ def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> s
     for (task, label), of_method in study.cells.items():
         if not selects(study, label):
             continue
-        trials = int(most_trials(study, task, label))
+        trials = int(_most_trials(study, task, label))
         for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
-            if share >= LEAST_SHARE and not control_of(study, task, label, str(hands)):
+            if share >= LEAST_SHARE and not _control_of(study, task, label, str(hands)):
                 blocks[task, str(hands), trials] = None
     lines = ['title = "Random search with the hands of learners"', f"runs = {runs}"]
     lines += [

@@ -63,16 +63,16 @@ def checked(
     columns.index = columns.index.set_names([None] * columns.index.nlevels)
     not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
     for name in names:
-        refuse_rows(columns, name, columns[name].isna(), not_na)
+        _refuse_rows(columns, name, columns[name].isna(), not_na)
         is_list = ~columns[name].map(is_hashable).astype(bool)
-        refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
+        _refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
     for name in numbers:
         kind = infer_dtype(columns[name], skipna=True)
         if kind not in ("integer", "floating", "mixed-integer-float", "empty"):
             is_number = columns[name].map(lambda value: isinstance(value, (int, float)))
-            refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
+            _refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
         columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
-        refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
+        _refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
     return columns
 
 
@@ -81,7 +81,7 @@ def shown(name: object) -> str:
     return plain(str(name))
 
 
-def names_given(what: str, names: str | Sequence[str]) -> list[str]:
+def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
     """Return the columns that an argument names, also a single one by a text.
 
     Raises CoarticError for an argument that is no list of columns, or names one twice.
@@ -96,7 +96,7 @@ def names_given(what: str, names: str | Sequence[str]) -> list[str]:
     return listed
 
 
-def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
+def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
     """Raise CoarticError for the first wrong row, with its value and the value needed."""
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
@@ -105,7 +105,7 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
         )
 
 
-def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
+def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """Return checked columns with the ``gap`` and, of frames with :data:`ZERO`, the ``share`` of
     each row.
 
@@ -114,17 +114,17 @@ def with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """
     for name in ("reward", "best_known"):
         sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
-        refuse_rows(columns, name, columns[name] > 0, sign)
+        _refuse_rows(columns, name, columns[name] > 0, sign)
     share = "a gap is a share of the best known reward, which has to be below 0"
-    refuse_rows(columns, "best_known", columns.best_known == 0, share)
+    _refuse_rows(columns, "best_known", columns.best_known == 0, share)
     excess = columns.reward - columns.best_known
     highest = "it is above best_known, which is to be the highest reward of the task"
-    refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
+    _refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
     columns = columns.assign(gap=gap_share(columns.reward, columns.best_known))
     if ZERO not in columns:
         return columns
     possible = columns.best_known - columns[ZERO]
-    refuse_rows(columns, ZERO, possible < 0, highest)
+    _refuse_rows(columns, ZERO, possible < 0, highest)
     return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
 
 
@@ -134,17 +134,17 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is a
     number. ``more``: other columns of numbers. Raises CoarticError as :func:`checked` and
-    :func:`with_gaps` do, and for a task with several best known rewards.
+    :func:`_with_gaps` do, and for a task with several best known rewards.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
     setting = ["setting"] * ("setting" in there)
-    columns = with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=setting))
+    columns = _with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=setting))
     number, tasks = pd.factorize(columns.task)
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     for name in {"best_known", ZERO} & {*columns}:
         several = columns[name].groupby(task).transform("nunique") > 1
-        refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
+        _refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
     names = columns.method.to_numpy(object)
     if setting:
         settings = columns.setting.astype(object).where(columns.setting.notna(), "").astype(str)
@@ -181,7 +181,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     >>> gaps(frame).round(3).tolist()
     [0.038, 0.0]
     """
-    return with_gaps(checked(frame, numbers=SCORES)).gap.set_axis(frame.index)
+    return _with_gaps(checked(frame, numbers=SCORES)).gap.set_axis(frame.index)
 
 
 def shares(frame: pd.DataFrame) -> pd.Series:
@@ -213,7 +213,7 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     >>> shares(frame).round(2).tolist()
     [0.0, 0.7]
     """
-    return with_gaps(checked(frame, numbers=(*SCORES, ZERO))).share.set_axis(frame.index)
+    return _with_gaps(checked(frame, numbers=(*SCORES, ZERO))).share.set_axis(frame.index)
 
 
 def means(
@@ -250,7 +250,7 @@ def means(
     0  0     3  0.3      0.2      0.37
     1  1     3  0.1      0.1      0.10
     """
-    by, columns = names_given("by", by), names_given("columns", columns)
+    by, columns = _names_given("by", by), _names_given("columns", columns)
     if not by:
         raise CoarticError("by is empty: needed are names of columns")
     if both := [name for name in columns if name in by]:
@@ -407,7 +407,7 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     """
     run = checked(frame, names=("run",)).run
     frame = scored(frame, "trials").assign(run=run)
-    refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
+    _refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
     reach = np.empty(0)
     with suppress(TypeError, ValueError):  # no numbers
         reach = real_array("targets", targets)

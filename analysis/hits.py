@@ -57,14 +57,14 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
         The file is no such table. A sentence says where and what is needed.
     """
     refuse_foreign(path, "recorded hits are a CSV file, see docs/howto/people.md")
-    headings, rows, lines = read_lines(path)
+    headings, rows, lines = _read_lines(path)
     frame = pd.DataFrame(rows, columns=headings, dtype=object)
     if "ticks" not in frame and "duration" in frame:
         frame["ticks"] = (pd.to_numeric(frame.duration, errors="coerce") * ticks_per_unit).round(6)
     return checked_hits(frame, task, str(path), [f"line {line}" for line in lines])
 
 
-def read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]]:
+def _read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]]:
     """Return headings, rows of as many fields, and their numbers of lines. Raises CoarticError for
     what is no table of text separated by commas."""
     try:
@@ -167,11 +167,11 @@ def checked_hits(
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
     frame, names = frame.iloc[order].reset_index(drop=True), [names[n] for n in order]
     if not hint(frame, task, source):
-        unwrap(frame, task, source, names)
+        _unwrap(frame, task, source, names)
     return frame
 
 
-def unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
+def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
     """Unwrap the angles of sorted hits from hit to hit, each trial from the start of the task on.
 
     Warns if angles change. Raises CoarticError if the joint of a subject is wrapped and turns by

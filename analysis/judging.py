@@ -73,12 +73,12 @@ class Finding:
         return "not supported" if certain or opposite_p < LEVEL else "undecided"
 
 
-def largest_p(tests: Iterable[Estimate]) -> float:
+def _largest_p(tests: Iterable[Estimate]) -> float:
     """Return the largest p-value of tests that must all hold; NaN without a p-value."""
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
-def tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
+def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
     """Test that a mean over tasks exceeds a bound, with all values and without the largest."""
     every = np.asarray(values, dtype=np.float64)
     return (
@@ -127,8 +127,8 @@ def mean_beyond(
     if len(there) < FEWEST:
         return Finding(None, f"fewer than {FEWEST} random tasks can be judged")
     sign = 1.0 if side == "greater" else -1.0
-    test, without = tests_over_tasks(sign * there, sign * bound)
-    opposite = max(tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
+    test, without = _tests_over_tasks(sign * there, sign * bound)
+    opposite = max(_tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
     evidence = f"{sentence.format(estimate(mean(there), 2))} ({counted(len(there), 'task')})"
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
@@ -200,9 +200,9 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     {'saves': 'supported'}
     """
     findings = [finding for _, _, finding in claims.values()]
-    p = holm([largest_p(finding.tests) for finding in findings], len(findings))
+    p = holm([_largest_p(finding.tests) for finding in findings], len(findings))
     without = holm(
-        [largest_p(finding.tests + finding.without) for finding in findings], len(findings)
+        [_largest_p(finding.tests + finding.without) for finding in findings], len(findings)
     )
     opposite = holm([finding.opposite_p for finding in findings], len(findings))
     rows = {}

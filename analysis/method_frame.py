@@ -67,7 +67,7 @@ def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.Dat
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,
-            "information": group_of(of_method),
+            "information": _group_of(of_method),
             "built_in": info.is_ours,
             "stochastic": info.stochastic,
             "headline": not under and (facts is None or facts.headline),
@@ -75,18 +75,18 @@ def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.Dat
             "look": tuple(facts.look) if facts and not setting else (),
         }
     tasks = {label: {*of_method.task} for label, of_method in by_label.items()}
-    for label, (one, two) in joined_learners(tasks):
+    for label, (one, two) in _joined_learners(tasks):
         conditions = label.partition(" ")[2].replace("-informed", "")
         title = f"{rows[two]['algorithm']} {conditions}"
         rows[label] = rows[two] | {"parts": (one, two), "title": title}
-    for label, look in looks_of(rows):
+    for label, look in _looks_of(rows):
         rows[label]["look"] = look
     place = {name: number for number, name in enumerate(KNOWN_METHODS)}
     ordered = sorted(rows, key=lambda label: place.get(rows[label]["base"], len(place)))
     return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
 
 
-def group_of(runs: pd.DataFrame) -> str:
+def _group_of(runs: pd.DataFrame) -> str:
     """Return the group of a method, one of :data:`GROUPS`, from its runs.
 
     A method that learns from the reward of its trials is in the first group, whatever else it uses.
@@ -98,7 +98,7 @@ def group_of(runs: pd.DataFrame) -> str:
     return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
 
 
-def joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
+def _joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield the label of the learner over one-armed and two-armed tasks together, with the methods
     that it joins: EC1, and on tasks for two arms a condition that draws hands at random.
 
@@ -114,16 +114,16 @@ def joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[
 
 def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
     """Return the runs of each method, and of the learner over tasks for one arm and for two
-    (:func:`joined_learners`)."""
+    (:func:`_joined_learners`)."""
     tasks = {method: {*runs.task} for method, runs in by_method.items()}
     joined = {
         label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
-        for label, (one, two) in joined_learners(tasks)
+        for label, (one, two) in _joined_learners(tasks)
     }
     return joined | by_method
 
 
-def looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
+def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield colour and dash of each method: its own, brown for methods from files, else the next
     that is unused.
     """

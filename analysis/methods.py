@@ -26,7 +26,7 @@ INITIAL = "corrective-alone/given"
 """Id of the corrective process alone with a task's initial hands: the initial solution."""
 
 
-class KnownMethod(NamedTuple):
+class _KnownMethod(NamedTuple):
     """A built-in method's row; ``methods.toml`` explains the fields."""
 
     name: str
@@ -39,7 +39,7 @@ class KnownMethod(NamedTuple):
 
 
 KNOWN_METHODS = {
-    name: KnownMethod(**row)
+    name: _KnownMethod(**row)
     for name, row in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()
 }
 """Rows of the built-in methods by id, in the order of lists and figures."""
@@ -68,10 +68,10 @@ def title_of(method: str, setting: str = "") -> str:
     its id.
     """
     name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else one_line(method)
-    return f"{name} ({setting_in_words(setting)})" if setting else name
+    return f"{name} ({_setting_in_words(setting)})" if setting else name
 
 
-def setting_in_words(setting: str) -> str:
+def _setting_in_words(setting: str) -> str:
     """Write a setting, ``noise_sd=0.1``, for people: ``σ 0.1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = [

@@ -38,7 +38,7 @@ class Column(NamedTuple):
     """Decimals; ``p`` for a p-value; empty: integers are whole, others have three figures."""
 
 
-def column_of(text: str) -> Column:
+def _column_of(text: str) -> Column:
     """Return a column from its text: ``gap[]: gap (%) .1``, ``task``, or ``least_p: -`` for a
     column without a heading, which only the CSV file has."""
     name, dot, digits = text.rpartition(" .")
@@ -60,8 +60,8 @@ class Table:
     rows: Callable[[Study], Rows]
 
     def __call__(self, study: Study) -> pd.DataFrame:
-        """Return the table of a study, with :func:`shown_names` as its ``attrs``."""
-        return rows_of(study, self)
+        """Return the table of a study, with :func:`_shown_names` as its ``attrs``."""
+        return _rows_of(study, self)
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: what the table has, and its columns with headings."""
@@ -82,18 +82,18 @@ def table(caption: str, columns: str) -> Callable[[Callable[[Study], Rows]], Tab
     """Return a decorator that turns a function of a study that yields rows into a table.
 
     The id of the table is the name of the function. ``columns`` has the texts of the columns
-    (:func:`column_of`), separated by semicolons.
+    (:func:`_column_of`), separated by semicolons.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
         every = *columns.split("; "), "run_ids: -"
-        return Table(id_of(rows), caption, tuple(map(column_of, every)), rows)
+        return Table(id_of(rows), caption, tuple(map(_column_of, every)), rows)
 
     return as_table
 
 
 @cached
-def rows_of(study: Study, table: Table) -> pd.DataFrame:
+def _rows_of(study: Study, table: Table) -> pd.DataFrame:
     """Return the rows of a table by their names."""
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
@@ -105,11 +105,11 @@ def rows_of(study: Study, table: Table) -> pd.DataFrame:
         else:
             names += [name + each for each in endings[ending]]
     frame = rows.reindex(columns=names).rename_axis("row")
-    frame.attrs = shown_names(study)
+    frame.attrs = _shown_names(study)
     return frame
 
 
-def shown_names(study: Study) -> dict[Hashable | None, Any]:
+def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table.
 
     ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting

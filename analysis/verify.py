@@ -79,7 +79,7 @@ S3, S5, S7, S9, S11, S13, S15, S17 = ((-1) ** n / math.factorial(2 * n + 1) for 
 C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in range(2, 9))
 
 
-def cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
+def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     """Cosine and sine of angles in rad: less k quarters of a turn (π/2), by the Taylor series."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
@@ -101,7 +101,7 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
     angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
-    waves = (np.cos(angles), np.sin(angles)) if on_path else cosine_and_sine(angles)
+    waves = (np.cos(angles), np.sin(angles)) if on_path else _cosine_and_sine(angles)
     for length, cosine, sine in zip(links, *waves, strict=True):
         x, y = x + length * cosine, y + length * sine
     return x, y
@@ -182,7 +182,7 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
     """Reward, hands, corrections made, and travel of the arms not chosen, from hit to hit, in rad.
     Raises ValueError where a movement breaks a rule or takes other ticks than are stored."""
-    check_rules(task, movements)
+    _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
         to_goal, before, hit = [each for each in movements if each.goal == goal], q, False
@@ -206,7 +206,7 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
     return reward, hands, corrections, travel
 
 
-def check_rules(task: Any, movements: list[MoveRow]) -> None:
+def _check_rules(task: Any, movements: list[MoveRow]) -> None:
     """Raises ValueError where movements break a rule, whatever comes of them."""
     goals = [movement.goal for movement in movements]
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
@@ -235,19 +235,19 @@ def check_runs(folder: Path) -> Report:
     """Check all runs of a folder, asked for last or not. sqlite3.Error: it cannot be read."""
     with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:
         db.row_factory = sqlite3.Row
-        return check_all(db)
+        return _check_all(db)
 
 
-def check_all(db: sqlite3.Connection) -> Report:
+def _check_all(db: sqlite3.Connection) -> Report:
     """Check the plan, the cells, and the runs one by one."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
-    if hash_of(schema(db))[:16] != SCHEMA:
+    if hash_of(_schema(db))[:16] != SCHEMA:
         foreign = "Tables or views are not as coartic makes them, so that they may say anything."
         return Report(0, 0, [foreign], ["The runs."])
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
     tasks = dict[int, Any]()
-    wrong += [*check_cells(db, tasks), *check_plan(db)]
+    wrong += [*_check_cells(db, tasks), *_check_plan(db)]
     runs = movements = unsolved = spent = 0
     query = """SELECT results.id AS number, * FROM results
         LEFT JOIN cells ON cells.id = cell LEFT JOIN learning ON result_id = results.id"""
@@ -257,9 +257,9 @@ def check_all(db: sqlite3.Connection) -> Report:
         try:
             task = tasks.get(row["cell"], "its cell is not there")
             need(not isinstance(task, str), task)
-            check_identity(row)
-            rewards, stored = check_rewards(row), read_movements(db, row["number"])
-            parts = {part: [*map(move_row, count(), stored[part])] for part in STATED}
+            _check_identity(row)
+            rewards, stored = _check_rewards(row), _read_movements(db, row["number"])
+            parts = {part: [*map(_move_row, count(), stored[part])] for part in STATED}
             need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
             spent += sum(move.ticks for moves in parts.values() for move in moves)
             spent += row["trials"] or 0
@@ -281,14 +281,14 @@ def check_all(db: sqlite3.Connection) -> Report:
     return Report(runs, movements, wrong, [*UNCHECKED, *empty, *others * (runs > asked)])
 
 
-def schema(db: sqlite3.Connection) -> list[str]:
+def _schema(db: sqlite3.Connection) -> list[str]:
     """Statements that make the tables and views of coartic, and all triggers."""
     query = f"""SELECT sql FROM sqlite_master
         WHERE type = 'trigger' OR name IN ({", ".join("?" for _ in OURS)}) ORDER BY type, name"""
     return [sql for (sql,) in db.execute(query, OURS) if sql]
 
 
-def check_identity(row: Any) -> None:
+def _check_identity(row: Any) -> None:
     """Raises ValueError where a run is not that of its cell: its id is a hash of the cell, the seed
     of the suite and the number of the run, and ends with the hash of the code."""
     suite_seed, run = row["suite_seed"], row["run"]
@@ -299,7 +299,7 @@ def check_identity(row: Any) -> None:
     need(row["seed"] == int(state) >> 1, f"its seed is not {row['seed']}")
 
 
-def check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
+def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
     """Yield a sentence for each row that names no row, shows other runs than it says or cannot be
     read. ``tasks`` gets the task of each cell by id, or the words of what is wrong with the cell:
     the digest of a cell is a hash of its task, method, parameters, constants and budget."""
@@ -333,7 +333,7 @@ def check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
     yield from (f"Two tasks are called {name}." for (name,) in db.execute(query))
 
 
-def check_plan(db: sqlite3.Connection) -> Iterator[str]:
+def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
     """Yield a sentence if the plan was changed, and one if its runs are missing."""
     hashes = [row[0] for row in db.execute("SELECT plan_hash FROM suite")]
     if hashes != [hash_of([[*row] for query in PLANNED for row in db.execute(query)])]:
@@ -356,7 +356,7 @@ def hash_of(content: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def check_rewards(row: Any) -> bytes:
+def _check_rewards(row: Any) -> bytes:
     """The rewards of a run as bytes: the best one, then by how much each trial is worse, plus 1, or
     0 without a reward; all lowest bytes come first, then the next. Raises ValueError for damage,
     and for another best trial."""
@@ -376,7 +376,7 @@ def check_rewards(row: Any) -> bytes:
     return content
 
 
-def read_movements(db: sqlite3.Connection, run: int) -> dict[str, list[Any]]:
+def _read_movements(db: sqlite3.Connection, run: int) -> dict[str, list[Any]]:
     """The movements of a run as they are stored, by the solution that they belong to."""
     parts: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
@@ -387,7 +387,7 @@ def read_movements(db: sqlite3.Connection, run: int) -> dict[str, list[Any]]:
     return parts
 
 
-def move_row(order: int, stored: list[Any]) -> MoveRow:
+def _move_row(order: int, stored: list[Any]) -> MoveRow:
     """A movement from its place in a solution and from what is stored of it."""
     _, goal, hand, kind, ticks, text = stored
     is_count = type(ticks) is int and 0 <= ticks <= MOST_TICKS

@@ -78,7 +78,7 @@ def number(value: float, digits: _Digits | None = None) -> str:
     return sign + text.replace(",", NARROW_SPACE)
 
 
-def spelled(count: int) -> str:
+def _spelled(count: int) -> str:
     """Write a small number in letters, a larger number in figures."""
     names = "no", "one", "two", "three", "four", "five", "six"
     return names[count] if count < len(names) else number(count)
@@ -101,7 +101,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-def percent(share: float) -> str:
+def _percent(share: float) -> str:
     """Write a share in per cent with one decimal."""
     return f"{number(100 * share, 1)} %"
 

@@ -58,14 +58,14 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
     """
     joints = rows.shape[1]
     weights = np.diag([2.0] + [2.0 * DAMPING**2] * joints)
-    first, count = solve_level(1, weights, np.zeros(1 + joints), rows, least)
+    first, count = _solve_level(1, weights, np.zeros(1 + joints), rows, least)
     short = max(0.0, float(first[0])) + SLACK
     weights = np.diag([2.0] * joints)
-    changes, further = solve_level(2, weights, -2.0 * preferred, rows, least - short)
+    changes, further = _solve_level(2, weights, -2.0 * preferred, rows, least - short)
     return Solution(changes, first[1:], count + further)
 
 
-def solve_level(
+def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
     """The variables of a level, the slack of level 1 before the changes, and the iterations."""

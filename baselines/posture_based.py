@@ -234,7 +234,7 @@ class PosturePlanner:
         """The cheapest postures ``(goals, dof)`` found around each seed by the deadline, after
         their cost and their hands."""
         centre = best = np.stack([seed.promising for seed in seeds])
-        costs = path_length(self.q, best)
+        costs = _path_length(self.q, best)
         for number, sd in enumerate(_FIRST_SD * np.geomspace(1.0, _LAST_SD, self.rounds)):
             noise = sd * np.stack([seed.noise[number] for seed in seeds])
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
@@ -249,7 +249,7 @@ class PosturePlanner:
                         posture = np.where(self.free[hand], postures[chosen, :, k], before[chosen])
                         accurate[chosen] &= self.correct(posture, goal, hand, _GENERATED)
                         postures[chosen, :, k] = before[chosen] = posture
-            lengths = np.where(accurate, path_length(self.q, postures), np.inf)
+            lengths = np.where(accurate, _path_length(self.q, postures), np.inf)
             order = np.argsort(lengths, axis=1, kind="stable")
             centre, best = centre.copy(), best.copy()
             for k, count in enumerate(accurate.sum(axis=1)):
@@ -273,7 +273,7 @@ class PosturePlanner:
         joints = np.empty((2, len(arm.links) + 1))
         x, y = self.goals[goal]
         for step in range(steps + 1):
-            left = linearise_far(flat, far, arm, x, y, self.tolerance, wanted, jacobian, *joints)
+            left = _linearise_far(flat, far, arm, x, y, self.tolerance, wanted, jacobian, *joints)
             self.session.spend(forward_kinematics=len(far))
             far = far[:left]
             if step == steps or not left:
@@ -289,7 +289,7 @@ class PosturePlanner:
 
 
 @entry
-def linearise_far(
+def _linearise_far(
     postures: Any,
     far: Any,
     arm: Any,
@@ -326,7 +326,7 @@ def linearise_far(
     return left
 
 
-def path_length(q: Array, postures: Array) -> Array:
+def _path_length(q: Array, postures: Array) -> Array:
     """Joint-space distance from ``q`` (dof,) through postures ``(..., k, dof)``."""
     start = np.broadcast_to(q, (*postures.shape[:-2], 1, postures.shape[-1]))
     legs = np.diff(np.concatenate([start, postures], axis=-2), axis=-2)

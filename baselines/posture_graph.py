@@ -32,7 +32,7 @@ _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first
 
 
-def sample_postures(
+def _sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
     """Configurations with ``hand`` in the disc of goal ``goal`` (0-based), ``(n, dof)``.
@@ -110,7 +110,7 @@ class PostureGraph:
                 if len(before):
                     half = slice(count // 2)
                     starts[half] = before[rng.integers(len(before), size=count // 2)]
-                layers[goal, hand] = sample_postures(task, goal, hand, starts, rng, spent)
+                layers[goal, hand] = _sample_postures(task, goal, hand, starts, rng, spent)
             before = np.concatenate([layers[goal, hand] for hand in task.hands])
         return cls(task, layers, spent)
 
@@ -153,8 +153,8 @@ class PostureGraph:
             if layer is None or not len(layer):
                 continue
             last = hands[-1] if hands else hand
-            base = squared_distances(nodes[last], layer, slice(0, BASE_DOF))
-            arm = squared_distances(nodes[hand], layer, self.task.robot.joints(hand))
+            base = _squared_distances(nodes[last], layer, slice(0, BASE_DOF))
+            arm = _squared_distances(nodes[hand], layer, self.task.robot.joints(hand))
             # A hand comes from its own node. If it is the last one, (i, j) leads to (k, j) by the
             # least over i, else to (k, i) by the least over j.
             came_from, step = (cost, np.sqrt(base + arm)) if hand == last else (cost.T, None)
@@ -219,7 +219,7 @@ def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     return configurations
 
 
-def squared_distances(before: Array, after: Array, joints: slice) -> Array:
+def _squared_distances(before: Array, after: Array, joints: slice) -> Array:
     """Squared distances of every pair, over some joints, shape ``(before, after)``."""
     difference = before[:, None, joints] - after[None, :, joints]
     return np.asarray((difference**2).sum(axis=-1))

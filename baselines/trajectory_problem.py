@@ -205,7 +205,7 @@ class TrajectoryProblem:
                 objective = JOINT_WEIGHT * objective
                 for each in hands:
                     chosen = right if each == "right" else 1 - right
-                    jerks = hand_jerks(robot, each, q0, steps, durations, rates)
+                    jerks = _hand_jerks(robot, each, q0, steps, durations, rates)
                     objective += casadi.dot(chosen, jerks)
         lower = [-np.inf] * len(limits)
         upper = [0.0] * len(limits)
@@ -340,7 +340,7 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     return quadratic / time**3 + mixed / time**2 + bending / time
 
 
-def hand_jerks(
+def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
     """Integrals of the squared jerk of a hand over each segment, a column of as many.

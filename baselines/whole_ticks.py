@@ -93,7 +93,7 @@ class Rounding:
         with further such goals, so sets are left out that cannot save what is ``worth`` it.
         """
         goals = len(self._instance.hands)
-        able = mergeable(task, self._instance.hands)
+        able = _mergeable(task, self._instance.hands)
         waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
         while waiting:
             merged, shortest = waiting.popleft()
@@ -145,7 +145,7 @@ class Rounding:
         return plan
 
 
-def mergeable(task: Task, hands: Sequence[Hand]) -> tuple[int, ...]:
+def _mergeable(task: Task, hands: Sequence[Hand]) -> tuple[int, ...]:
     """Goals (0-based) that can be hit without a movement.
 
     A goal can where its hand may be there already: at the start, or because another hand

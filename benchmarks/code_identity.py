@@ -51,11 +51,11 @@ def files_of(method: Path) -> set[Path]:
     while waiting:
         if (path := waiting.pop()) not in files:
             files.add(path)
-            waiting += imported_files(path, places)
+            waiting += _imported_files(path, places)
     return files
 
 
-def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[Path]:
+def _imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[Path]:
     """Yield the files that a module imports; a pair of ``places`` is a root of imports and the
     folder in which files count."""
     for level, module, names in syntax(path.read_bytes())[1]:

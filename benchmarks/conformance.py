@@ -71,7 +71,7 @@ def check_method(
     def applies(task: Task) -> bool:
         return info.why_not(task, parameters) is None
 
-    laws = laws_of_declaration(info)
+    laws = _laws_of_declaration(info)
     tasks = list(filter(applies, tasks or map(load_task, builtin_tasks())))
     if not tasks:
         problem = "it applies to none of the shipped tasks, so nothing can be checked"
@@ -84,16 +84,16 @@ def check_method(
         for task in tasks:
             cell = cell_of(task, info, parameters, trial_budget=budget)
             jobs[kind, task.name] = Job(cell, seed, (0,), CHECK_LIMIT_S)
-    for task in filter(applies, [hopeless_task(tasks[0])]):
+    for task in filter(applies, [_hopeless_task(tasks[0])]):
         jobs["hopeless", task.name] = Job(cell_of(task, info, parameters), 1, (0,), CHECK_LIMIT_S)
     runs = dict(zip(jobs, perform_in_order([*jobs.values()], verbose=verbose), strict=True))
     last = tasks[-1].name
     runs["elsewhere", last] = next(perform_in_order([jobs["first", last]]))
     values = ", ".join(f"{key}={value}" for key, value in parameters.items())
-    return [*laws, *laws_of_runs(info, runs, f" (checked with {values})" if values else "")]
+    return [*laws, *_laws_of_runs(info, runs, f" (checked with {values})" if values else "")]
 
 
-def laws_of_runs(
+def _laws_of_runs(
     info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
 ) -> Iterator[Law]:
     """Yield the laws that the runs of a method keep or break; ``runs`` holds the runs by kind and
@@ -187,7 +187,7 @@ def laws_of_runs(
     )
 
 
-def laws_of_declaration(info: MethodInfo) -> list[Law]:
+def _laws_of_declaration(info: MethodInfo) -> list[Law]:
     """Check the declaration of a method: title and citation are there; parameters survive JSON, are
     validated and cannot be changed."""
     empty = [name for name in ("title", "citation") if not getattr(info, name).strip()]
@@ -210,7 +210,7 @@ def laws_of_declaration(info: MethodInfo) -> list[Law]:
     ]
 
 
-def hopeless_task(like: Task) -> Task:
+def _hopeless_task(like: Task) -> Task:
     """Return a task out of reach, which validation would refuse, for the hands of another task."""
     return like.model_copy(
         update={

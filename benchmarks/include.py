@@ -71,7 +71,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
             origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
                 if not (begun and name == SHIPPED):  # it is a copy of them
-                    copy_runs(name, source, target, origin)
+                    _copy_runs(name, source, target, origin)
     return joined
 
 
@@ -96,7 +96,7 @@ def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         if not held.issuperset((digest, n) for n in job.numbers)
     ]
     parts = {**plans, "this command": missing}
-    check_together(
+    _check_together(
         {name: part[0] for name, part in plans.items()} | {"this command": plan[0]}, parts
     )
     methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
@@ -109,11 +109,11 @@ def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         if runs:
             cell = replace(job.cell, method=methods[job.cell.method.name])
             jobs.setdefault(digest, replace(plan[0], cell=cell, numbers=range(runs)))
-    warn_of_gaps(plan, plans, jobs)
+    _warn_of_gaps(plan, plans, jobs)
     return list(jobs.values())
 
 
-def warn_of_gaps(
+def _warn_of_gaps(
     plan: Sequence[Job], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of unfinished sources, and of sources that have fewer runs of a cell than the plan asks
@@ -147,7 +147,7 @@ def named(jobs: Sequence[Job]) -> str:
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
-def check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]) -> None:
+def _check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]) -> None:
     """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin,
     ``first`` one job of each part.
 
@@ -176,7 +176,7 @@ def check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]])
             agree(where, f"{key} of {cell_named}", value)
 
 
-def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
+def _copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
     """Copy the runs of a source's plan that the target lacks, each scored again. ``origin`` names
     the folder of each run of the target by run id.
 
@@ -196,12 +196,12 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
                 raise CoarticError(f"{which} differs in {where}: {changes[0]}")
         runs = [source.run(run_id) for run_id in results if run_id not in there]
         if runs and name != SHIPPED:  # their file has a hash
-            check_scores(name, runs, results)
+            _check_scores(name, runs, results)
         target.write(runs)
         origin |= {run.id: name for run in runs}
 
 
-def check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) -> None:
+def _check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) -> None:
     """Score stored runs of one cell again, side by side; ``results`` holds the stored hashes of
     their results by run id.
 

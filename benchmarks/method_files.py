@@ -41,7 +41,7 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, str(path), shown
-        process = CONTEXT.Process(target=answer_questions, args=answers, daemon=True)
+        process = CONTEXT.Process(target=_answer_questions, args=answers, daemon=True)
         start_process(process)
     except (OSError, EOFError) as error:  # EOFError: its server was killed
         why = getattr(error, "strerror", None) or error_line(error)
@@ -76,7 +76,7 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     return ask
 
 
-def answer_questions(pipe: Any, path: str, shown: str) -> None:
+def _answer_questions(pipe: Any, path: str, shown: str) -> None:
     """Answer questions until the pipe is closed."""
     begin_worker()
     methods: dict[str, type[Method]] = {}
@@ -94,7 +94,7 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
                     why = f"{shown}: cannot be imported: {error_line(error)}"
                     raise CoarticError(why) from None
                 methods = {method.name: method for method in methods_in(module)}
-                infos = methods_of_module(module, methods.values(), shown, path)
+                infos = _methods_of_module(module, methods.values(), shown, path)
                 content = [asdict(info) for info in infos]
             else:
                 content = answer(methods[name], question, *arguments)
@@ -106,7 +106,7 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
         pipe.send_bytes(text.encode())
 
 
-def methods_of_module(
+def _methods_of_module(
     module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
 ) -> Iterator[MethodInfo]:
     """Yield the infos of a module's methods, with their code. Raises CoarticError if the module

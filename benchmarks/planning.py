@@ -37,14 +37,14 @@ from coartic.tasks.families import instance_of, named_by, own_families, read_fam
 from coartic.tasks.task import address_of, check_task
 
 
-def task_or_name(value: Any) -> Task | str:
+def _task_or_name(value: Any) -> Task | str:
     """Return a task, or its name or path as a text."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise sentence_error(f"{value!r} is no task; it should be a name, a path or a task")
 
 
-def runs_asked(value: Any) -> int | range | None:
+def _runs_asked(value: Any) -> int | range | None:
     """Return a number of runs, a range of runs, or None."""
     try:
         example = "range(50, 100), or 50..99 in a command"
@@ -54,8 +54,8 @@ def runs_asked(value: Any) -> int | range | None:
 
 
 JobOf = Callable[..., Job]
-"""Function :func:`job_of` for a suite and a request."""
-_Tasks = tuple[Annotated[Any, PlainValidator(task_or_name)], ...]
+"""Function :func:`_job_of` for a suite and a request."""
+_Tasks = tuple[Annotated[Any, PlainValidator(_task_or_name)], ...]
 _Files = tuple[Path, ...]
 _plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.number) else value)
 
@@ -75,7 +75,7 @@ class Request(FileData):
     all methods of the file run, together with the others."""
     family_files: _Files = ()
     """Files with your own families."""
-    runs: Annotated[Any, PlainValidator(runs_asked)] = None
+    runs: Annotated[Any, PlainValidator(_runs_asked)] = None
     """Number of runs of each cell; by default the number of the suite. A range such as
     ``range(50, 100)`` is a part of the runs, for a job of an array."""
     trials: Annotated[TrialCount, _plain] | None = None
@@ -131,10 +131,10 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     without effect.
     """
     asked = {name: methods_named(name, registered) for name in request.methods}
-    asked |= {name: [name] for name in unnamed_methods(suite, [*asked.values()], registered)}
-    names, own, task_named = asked_tasks(suite, request)
-    job = partial(job_of, suite, request)
-    of_suite = suite_jobs(suite, registered, own, task_named, job)
+    asked |= {name: [name] for name in _unnamed_methods(suite, [*asked.values()], registered)}
+    names, own, task_named = _asked_tasks(suite, request)
+    job = partial(_job_of, suite, request)
+    of_suite = _suite_jobs(suite, registered, own, task_named, job)
     jobs = list(itertools.islice(of_suite, MOST_CELLS + 1))
     if len(jobs) > MOST_CELLS:
         raise CoarticError(
@@ -145,7 +145,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     if not request.methods:
         ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
     methods = [registered[name] for name in ids]
-    jobs += extra_jobs(jobs, own, methods, job)
+    jobs += _extra_jobs(jobs, own, methods, job)
     there = {each.cell.task.name: each.cell.task for each in jobs} | own
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
@@ -155,17 +155,17 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     chosen = [each for each in jobs if each.cell.method.name in ids]
     busy = {each.cell.task.name for each in chosen}
     if idle := [there[name] for name in names if name not in busy]:
-        raise CoarticError(why_nothing_runs(suite, idle, methods, jobs))
+        raise CoarticError(_why_nothing_runs(suite, idle, methods, jobs))
     running = {each.cell.method.name for each in chosen}
     for wanted in asked.values() or [[*ids]]:
         if running.isdisjoint(wanted):
             idle_methods = [registered[name] for name in wanted]
-            raise CoarticError(why_nothing_runs(suite, [], idle_methods, jobs))
-    check_effects(request, chosen)
-    return distinct_jobs([each for each in chosen if each.numbers])
+            raise CoarticError(_why_nothing_runs(suite, [], idle_methods, jobs))
+    _check_effects(request, chosen)
+    return _distinct_jobs([each for each in chosen if each.numbers])
 
 
-def unnamed_methods(
+def _unnamed_methods(
     suite: Suite, asked: Iterable[Sequence[str]], registered: Registry
 ) -> list[str]:
     """Return the ids of methods from files of which no method is named, by the suite or by a
@@ -184,7 +184,7 @@ def unnamed_methods(
     ]
 
 
-def check_effects(request: Request, jobs: Sequence[Job]) -> None:
+def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
     """Raise CoarticError for an option of a request that has no effect on its jobs."""
     methods = {job.cell.method.name: job.cell.method for job in jobs}
     if request.trials and not any("trials" in each.defaults for each in methods.values()):
@@ -202,7 +202,7 @@ def check_effects(request: Request, jobs: Sequence[Job]) -> None:
             )
 
 
-def asked_tasks(
+def _asked_tasks(
     suite: Suite, request: Request
 ) -> tuple[dict[str, None], dict[str, Task], TaskNamed]:
     """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
@@ -242,7 +242,7 @@ def asked_tasks(
     return names, own, task_named
 
 
-def suite_jobs(
+def _suite_jobs(
     suite: Suite, registered: Registry, own: Collection[str], task_named: TaskNamed, job: JobOf
 ) -> Iterator[Job]:
     """Yield the jobs of a suite; ``own`` names the tasks that the request brings.
@@ -267,7 +267,7 @@ def suite_jobs(
                         )
 
 
-def extra_jobs(
+def _extra_jobs(
     jobs: Sequence[Job], own: Mapping[str, Task], methods: Sequence[MethodInfo], job: JobOf
 ) -> Iterator[Job]:
     """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
@@ -286,7 +286,7 @@ def extra_jobs(
             yield job(task, method)
 
 
-def job_of(
+def _job_of(
     suite: Suite,
     request: Request,
     task: Task,
@@ -308,7 +308,7 @@ def job_of(
     return Job(cell, request.seed, numbers, limit_s, suite.name)
 
 
-def why_nothing_runs(
+def _why_nothing_runs(
     suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], jobs: Sequence[Job]
 ) -> str:
     """Return a sentence that says why methods have nothing to run: on the first task of ``idle``,
@@ -321,7 +321,7 @@ def why_nothing_runs(
     return f"no method to run on {what}: {why}."
 
 
-def distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
+def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
     """Return the jobs, one for each cell.
 
     Raises CoarticError for two tasks of one name, for two numbers of runs of a cell, and for too

@@ -198,7 +198,7 @@ class Worker:
         self._folder = Path(tempfile.mkdtemp(dir=folder))
         theirs, self._ours = multiprocessing.Pipe(duplex=False)
         arguments = self._folder, theirs, local.workers, local.verbose
-        self.process = CONTEXT.Process(target=perform_jobs, args=arguments)
+        self.process = CONTEXT.Process(target=_perform_jobs, args=arguments)
         self._theirs = theirs
 
     def give(self, jobs: Sequence[Job]) -> None:
@@ -277,7 +277,7 @@ class Worker:
             self.process.join(_END_S)
 
 
-def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
+def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
     """Perform the jobs that come through a pipe, in this worker process, and write answers into
     ``folder``."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
@@ -290,7 +290,7 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
         descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
         for stream in (1, 2):
             os.dup2(descriptor, stream)
-    bound_resources(workers)
+    _bound_resources(workers)
     process, number = os.getpid(), 0
     while pipe.poll(_IDLE_S):
         try:
@@ -307,7 +307,7 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
             os.chdir(place)
         (folder / _BEGUN).touch()
         for job in jobs:
-            text = answer_to(job, folder)
+            text = _answer_to(job, folder)
             if os.getpid() != process:  # a child that a method has forked
                 os._exit(1)
             try:
@@ -318,13 +318,13 @@ def perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
     end_group(process)  # no job came in time
 
 
-def answer_to(job: Job, folder: Path) -> bytes:
+def _answer_to(job: Job, folder: Path) -> bytes:
     """Perform a job within its limit of CPU time, and return its answer."""
     with contextlib.suppress(OSError):  # the file is missing
         os.truncate(folder / _SAID, 0)
-    limit_cpu_time(job.time_limit_s or _LONGEST_S)
+    _limit_cpu_time(job.time_limit_s or _LONGEST_S)
     outcomes = perform_job(job)
-    limit_cpu_time(0)
+    _limit_cpu_time(0)
     try:
         return answer_of(outcomes)
     except Exception as error:
@@ -332,7 +332,7 @@ def answer_to(job: Job, folder: Path) -> bytes:
         return answer_of(fail(job, "crashed", reason))
 
 
-def limit_cpu_time(limit_s: float) -> None:
+def _limit_cpu_time(limit_s: float) -> None:
     """Let the system end this process after ``limit_s`` more seconds of CPU time, by SIGPROF, or by
     SIGXCPU if a method has turned SIGPROF off. A limit of 0 lifts the limit."""
     if not hasattr(signal, "setitimer"):
@@ -348,7 +348,7 @@ def limit_cpu_time(limit_s: float) -> None:
     signal.setitimer(signal.ITIMER_PROF, limit_s)
 
 
-def bound_resources(workers: int) -> None:
+def _bound_resources(workers: int) -> None:
     """Limit memory and file size of this process, so that a method gets an error before the machine
     swaps."""
     try:

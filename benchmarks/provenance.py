@@ -46,7 +46,7 @@ def current_environment() -> dict[str, Any]:
     return {
         "coartic": coartic.__version__,
         "model_code": FINGERPRINT,
-        "commit": commit_of_checkout(),
+        "commit": _commit_of_checkout(),
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
         "platform": plain(platform.platform(), LONGEST_LINE),
@@ -79,7 +79,7 @@ def process_peak_mb() -> float | None:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
-def commit_of_checkout() -> dict[str, Any] | None:
+def _commit_of_checkout() -> dict[str, Any] | None:
     """Return the commit of the checkout that the code runs from, with True if files were changed
     since; None for an installed package."""
     # A GIT_DIR of the caller, such as a hook, must not replace this checkout.

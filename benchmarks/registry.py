@@ -43,7 +43,7 @@ def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> di
     """
     infos = dict(built_in(with_code=with_code))
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
-        add_methods(infos, methods_of_file(path))
+        add_methods(infos, _methods_of_file(path))
     return infos
 
 
@@ -73,7 +73,7 @@ def current_code(where: str, name: str) -> str:
     with _parsing:
         if where.endswith(".py"):
             if where not in READERS:  # a reader imports the file again for every question
-                list(methods_of_file(Path(where)))
+                list(_methods_of_file(Path(where)))
             infos = READERS[where]("", "methods")
             return next((info["code"] for info in infos if info["name"] == name), "none")
         return code_of(Path(inspect.getfile(importlib.import_module(where))))
@@ -110,7 +110,7 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     return named
 
 
-def methods_of_file(path: Path) -> Iterator[MethodInfo]:
+def _methods_of_file(path: Path) -> Iterator[MethodInfo]:
     """Yield the methods of a file, which is imported in a separate process. Raises CoarticError for
     a file that cannot be used."""
     shown = plain(str(path), LONGEST_LINE)

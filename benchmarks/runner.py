@@ -208,7 +208,7 @@ def perform(
         store.replace_plan(plan, current_environment(), command(), now())
         progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
         progress.others[plan[0].seed] -= progress.stale
-        missing = missing_jobs(plan, store, progress)
+        missing = _missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.cell.method.name] += len(job.numbers)
         progress.workers = executor.workers
@@ -222,7 +222,7 @@ def perform(
                     if len(runs) > 1:  # a failure may come from other runs of the job
                         alone += [run.job for run in runs if run.outcome.status not in _SURE]
                         runs = [run for run in runs if run.outcome.status in _SURE]
-                    runs = [run for run in runs if not has_waited(run)]
+                    runs = [run for run in runs if not _has_waited(run)]
                     store.write(runs)
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
@@ -236,7 +236,7 @@ def perform(
         return progress
 
 
-def has_waited(run: Run) -> bool:
+def _has_waited(run: Run) -> bool:
     """Return whether a run was ended by its limit of wall time, which is no result. Warns of it."""
     times = run.outcome.times
     if run.outcome.status != "crashed" or times.wall_s is None or times.cpu_s is not None:
@@ -246,7 +246,7 @@ def has_waited(run: Run) -> bool:
     return True
 
 
-def missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
+def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
     """Return the missing runs of the plan, a job for each cell, and count the runs that are there.
 
     A run that crashed is performed again, and so is a run that timed out under a lower time limit,

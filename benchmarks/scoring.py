@@ -21,7 +21,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     runs = []
     for number, outcome in zip(job.numbers, outcomes, strict=True):
         parts = {part: next(executions) for part in outcome.parts}
-        status, reason = final_status(outcome, parts)
+        status, reason = _final_status(outcome, parts)
         is_ok = status == "ok"
         final = replace(
             outcome,
@@ -30,12 +30,12 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
             parts={},
             environment=outcome.environment or current_environment(),
         )
-        scores = {part: score_of(task, part, each) for part, each in parts.items() if is_ok}
+        scores = {part: _score_of(task, part, each) for part, each in parts.items() if is_ok}
         runs.append(Run(replace(job, numbers=(number,)), final, scores, now()))
     return runs
 
 
-def score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
+def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
     """Return the score of a part that completed the task."""
     assert isinstance(execution, Execution)
     result = Score(execution.reward, execution.hands, execution.movements)
@@ -45,7 +45,7 @@ def score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
     return result._replace(corrections=execution.corrections, other_arm_travel=travel)
 
 
-def final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
+def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
     """Return status and reason of a run: the outcome's, unless a part cannot be executed, misses a
     goal, or is missing."""
     for execution in parts.values():

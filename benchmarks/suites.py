@@ -33,7 +33,7 @@ TaskNamed = Callable[[str], Task]
 """A function that returns the task of a name or of a file."""
 
 
-def plain_value(value: Any) -> Value:
+def _plain_value(value: Any) -> Value:
     """Return the value of a parameter. Raises an error for any other value."""
     numbers = value if isinstance(value, list | tuple) else [value]
     if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
@@ -47,7 +47,7 @@ def plain_value(value: Any) -> Value:
 RunCount = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
 TrialCount = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
 Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
-_Value = Annotated[Value, PlainValidator(plain_value)]
+_Value = Annotated[Value, PlainValidator(_plain_value)]
 _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
@@ -60,7 +60,7 @@ class Move(FileData):
     """Displacements of the goal in x and y, length unit; each makes a task."""
 
 
-class Block(FileData):
+class _Block(FileData):
     """Methods on tasks, under all combinations of some parameters."""
 
     tasks: _Names
@@ -84,7 +84,7 @@ class Block(FileData):
     """Values of further parameters; every combination is run."""
 
     @model_validator(mode="after")
-    def says_everything_once(self) -> Block:
+    def says_everything_once(self) -> _Block:
         """Refuse a parameter that stands in both tables, and a value that stands twice in the
         grid."""
         for name, values in self.grid.items():
@@ -112,7 +112,7 @@ class Suite(FileData):
     """Trials of a run, for methods that have this parameter."""
     time_limit_s: Seconds | None = 600.0
     """CPU time of a job, s: of one run, or of runs that are performed side by side."""
-    blocks: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
+    blocks: Annotated[tuple[_Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
     """Blocks of tasks and methods: tables ``[[blocks]]``."""
 
 
@@ -153,7 +153,7 @@ def check_kind(name: str, *kinds: str) -> None:
 
 def suites() -> dict[str, Suite]:
     """Return the shipped suites by name."""
-    return {path.stem: read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
+    return {path.stem: _read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
 @checked_arguments
@@ -166,13 +166,13 @@ def load_suite(name: str) -> Suite:
     if name not in shipped:
         check_kind(name, "suite")
         if name.endswith(".toml"):
-            return read_suite(Path(name))
+            return _read_suite(Path(name))
         hint = " A suite of your own is a file that ends in .toml." if os.sep in name else ""
         raise CoarticError(f"{unknown('suite', name, shipped)}{hint}")
     return shipped[name]
 
 
-def read_suite(path: Path) -> Suite:
+def _read_suite(path: Path) -> Suite:
     """Read a suite file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
     if "cells" in content:
@@ -180,12 +180,12 @@ def read_suite(path: Path) -> Suite:
     try:
         return Suite.model_validate({"name": path.stem, **content})
     except ValidationError as error:
-        keys = [*Suite.model_fields, *Block.model_fields, *Move.model_fields]
+        keys = [*Suite.model_fields, *_Block.model_fields, *Move.model_fields]
         raise CoarticError(explain_file(str(path), error, keys)) from None
 
 
 def tasks_of(
-    suite: Suite, block: Block, own: Collection[str], task_named: TaskNamed
+    suite: Suite, block: _Block, own: Collection[str], task_named: TaskNamed
 ) -> Iterator[Task]:
     """Yield the tasks of a block, as the block changes them.
 
@@ -199,10 +199,10 @@ def tasks_of(
             continue
         task = task_named(name)
         if block.goals is None or len(task.goals) in block.goals:
-            yield from changed_tasks(task, suite, block)
+            yield from _changed_tasks(task, suite, block)
 
 
-def changed_tasks(task: Task, suite: Suite, block: Block) -> list[Task]:
+def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
     """Return the tasks that a block makes of a task: the task with a free base, or a task for each
     place of the moved goal."""
     source = f"suite {suite.name!r}"

@@ -18,21 +18,21 @@ def text_of(node: Any) -> str:
     if not isinstance(node, ast.AST):
         return ascii(node)  # the version decides which characters print
     text = type(node).__name__
-    for name, value in fields_of(node).items():
+    for name, value in _fields_of(node).items():
         text += f" {name}={text_of(value)}"
     return f"({text})"
 
 
 def statements_in(node: ast.AST) -> Iterator[ast.AST]:
     """Yield the statements below a node, which ``ast.walk`` yields with all expressions."""
-    for value in fields_of(node).values():
+    for value in _fields_of(node).values():
         for child in value if isinstance(value, list) else ():
             if isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):
                 yield child
                 yield from statements_in(child)
 
 
-def fields_of(node: ast.AST) -> dict[str, Any]:
+def _fields_of(node: ast.AST) -> dict[str, Any]:
     """Return the fields of a node that can change a result: no docstring, no ``__version__``, no
     code for type checkers, and no empty field, such as the type parameters since Python 3.12."""
     fields = {name: value for name, value in ast.iter_fields(node) if value not in (None, [])}
@@ -46,11 +46,11 @@ def fields_of(node: ast.AST) -> dict[str, Any]:
         case ast.Constant():
             fields.pop("kind", None)  # u"text" is "text"
         case ast.JoinedStr(values=values):
-            fields["values"] = joined(values)
+            fields["values"] = _joined(values)
     return fields
 
 
-def joined(parts: list[ast.expr]) -> list[ast.expr]:
+def _joined(parts: list[ast.expr]) -> list[ast.expr]:
     """Return the parts of an f-string with neighbouring texts as one text: Python divides them
     differently since version 3.12."""
     together: list[ast.expr] = []

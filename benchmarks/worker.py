@@ -95,18 +95,18 @@ _generators = list[str]()
 
 
 @contextmanager
-def seeing_generators(sees: bool) -> Iterator[None]:
+def _seeing_generators(sees: bool) -> Iterator[None]:
     """Note the generators of random numbers that are made in this block, if ``sees``."""
     _generators.clear()
     with ExitStack() as stack:
         for module, name in _MAKERS if sees else ():
             maker = getattr(module, name)
             stack.callback(setattr, module, name, maker)
-            setattr(module, name, noting(maker))
+            setattr(module, name, _noting(maker))
         yield
 
 
-def noting(maker: Any) -> Any:
+def _noting(maker: Any) -> Any:
     """Return a function or class that does what a maker of generators does, and notes its calls."""
 
     def note(*args: Any, **options: Any) -> Any:
@@ -148,7 +148,7 @@ def perform_job(job: Job) -> list[Outcome]:
     _seen.add(name)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
     try:
-        with seeing_generators(not (cell.method.is_ours or cell.method.stochastic)):
+        with _seeing_generators(not (cell.method.is_ours or cell.method.stochastic)):
             method = cell.method.configure(cell.parameters)
             results: Sequence[Any]
             if (reason_not := method.why_not(outline_of(cell.task))) is not None:
@@ -167,14 +167,14 @@ def perform_job(job: Job) -> list[Outcome]:
     runs = len(sessions)
     times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
     pairs = zip(results, sessions, strict=True)
-    return [outcome_of(cell.method, result, session, times) for result, session in pairs]
+    return [_outcome_of(cell.method, result, session, times) for result, session in pairs]
 
 
 _seen: set[str] = set()
 """Ids of the methods that this process has run."""
 
 
-def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
+def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
     """Return the outcome of a run from the result of its method, or from the error that the method
     raised."""
     spent: dict[str, Any] = {
@@ -188,7 +188,7 @@ def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) 
     }
     try:
         if isinstance(result, MethodError):
-            details = plain_details(result.details)
+            details = _plain_details(result.details)
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
             raise result
@@ -199,10 +199,10 @@ def outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) 
         return Outcome("infeasible", str(error), **spent)
     except BaseException as error:
         _log.debug("Traceback of the run:", exc_info=error)
-        return Outcome("crashed", place_of(error, method) + error_line(error), **spent)
+        return Outcome("crashed", _place_of(error, method) + error_line(error), **spent)
 
 
-def place_of(error: BaseException, method: MethodInfo) -> str:
+def _place_of(error: BaseException, method: MethodInfo) -> str:
     """Return the line of a method file in which a run crashed, as ``mine.py, line 12: ``; empty for
     an error elsewhere."""
     if method.is_ours:
@@ -226,13 +226,13 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
             if part == "solution" or getattr(result, part)
         }
         session.check_solution(parts["solution"])
-        details = plain_details(result.details)
+        details = _plain_details(result.details)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
     return {"parts": parts, "details": details}
 
 
-def plain_details(details: Any) -> dict[str, Any]:
+def _plain_details(details: Any) -> dict[str, Any]:
     """Return the details of a result as plain data."""
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
     return dict(json.loads(text.encode()))

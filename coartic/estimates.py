@@ -147,7 +147,7 @@ def mean_of_means(
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
     kept = sum(n) <= LARGE
-    batches: Iterable[list[Any]] = (drawn_once if kept else drawn)(n, resamples)
+    batches: Iterable[list[Any]] = (_drawn_once if kept else drawn)(n, resamples)
     resampled = np.concatenate([
         sum(weight * sample[places].mean(axis=1)
             for (sample, weight), places in zip(parts, batch, strict=True))
@@ -179,7 +179,7 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
 
 
 @lru_cache(maxsize=8)  # most samples have as many values as another
-def drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.int16]]]:
+def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.int16]]]:
     """Return the places of :func:`drawn`, which are kept for further samples of these sizes."""
     return [[each.astype(np.int16) for each in batch] for batch in drawn(sizes, resamples)]
 

@@ -99,7 +99,7 @@ def check_film(path: Path, *, replace: bool = False) -> None:
     check_output(path, replace=replace)
 
 
-def set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
+def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
     """Draw what moves in one picture.
 
     Returns a function that shows the state at a row of the movement, or at its last one: artists
@@ -158,6 +158,6 @@ def set_stage(
         for text in list(axes.texts):
             text.remove()
     return figure, [
-        set_scene(axes, movement, colour)
+        _set_scene(axes, movement, colour)
         for axes, (_, movement), colour in zip(figure.axes, movements, cycle(COLOURS), strict=False)
     ]

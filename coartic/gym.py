@@ -248,11 +248,11 @@ class TaskVectorEnv(Recorded, VectorEnv):
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin all trials, with a seed for each robot, or for the first, which others follow."""
-        check_no_options(options)
+        _check_no_options(options)
         if isinstance(seed, Iterable):
-            seeds = [*map(whole_seed, seed)]
+            seeds = [*map(_whole_seed, seed)]
         else:
-            first = whole_seed(seed)
+            first = _whole_seed(seed)
             seeds = [None if first is None else first + row for row in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             there = counted(self.num_envs, "environment")
@@ -316,8 +316,8 @@ class TaskEnv(Recorded, gymnasium.Env):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial."""
-        super().reset(seed=whole_seed(seed))
-        check_no_options(options)
+        super().reset(seed=_whole_seed(seed))
+        _check_no_options(options)
         self.robots.begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
         return self.robots.state.seen[0].copy(), self._info()
 
@@ -357,13 +357,13 @@ class TaskEnv(Recorded, gymnasium.Env):
         return {"task": self.robots.names[number], "is_success": is_success}
 
 
-def check_no_options(options: Mapping[str, Any] | None) -> None:
+def _check_no_options(options: Mapping[str, Any] | None) -> None:
     """Refuse options of a reset, which has none. Raises ValueError for any."""
     if options:
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 
 
-def whole_seed(seed: Any) -> int | None:
+def _whole_seed(seed: Any) -> int | None:
     """A seed as Gymnasium takes it. Raises ValueError for anything else."""
     if seed is None:
         return None
@@ -401,10 +401,10 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     except ImportError:
         raise CoarticError("coartic.gym.sb3 needs: pip install 'coartic[rl]'") from None
 
-    return RobotEnvs(TaskVectorEnv(num_envs, **known_env(env) | options))
+    return RobotEnvs(TaskVectorEnv(num_envs, **_known_env(env) | options))
 
 
-def known_env(env: str) -> dict[str, Any]:
+def _known_env(env: str) -> dict[str, Any]:
     """The options of an id of this package. Raises ValueError for another one."""
     if env not in IDS:
         raise ValueError(unknown("environment", str(env), IDS))
@@ -462,7 +462,7 @@ def score(
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
-    given = (known_env(env) if isinstance(env, str) else options_of(env)) | options
+    given = (_known_env(env) if isinstance(env, str) else _options_of(env)) | options
     if given.get("task") in [*shipped_families()]:  # a Task has no hash
         given = {"split": "test", **given}
     setting = TaskVectorEnv(1, **given)
@@ -472,11 +472,11 @@ def score(
     rewards = {}
     for name, each in policies.items():
         if isinstance(each, Method):
-            rewards[name] = column(reward_of(each, task, seed, model) for task in tasks)
+            rewards[name] = column(_reward_of(each, task, seed, model) for task in tasks)
         elif each is not None:
-            rewards[name] = rollout(acting(each), given, len(tasks))
+            rewards[name] = _rollout(_acting(each), given, len(tasks))
     rng = np.random.default_rng(seed)
-    rewards["random actions"] = rollout(
+    rewards["random actions"] = _rollout(
         lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), given, len(tasks), episodes
     )
     rewards["corrective process"] = column(initial_reward(task, model) for task in tasks)
@@ -489,27 +489,27 @@ def column(rewards: Iterable[float | None]) -> Array:
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
 
 
-def acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
+def _acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
     """Return a policy as a function of observations, which an agent that was trained in
     ``VecNormalize`` sees as there. Raises TypeError for anything that is no policy, and for an
     agent that was trained in another wrapper."""
     if hasattr(policy, "predict"):
         normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
         get_env = getattr(policy, "get_env", lambda: None)
-        env = without_wrappers(get_env(), "the agent's environment", normal)
+        env = _without_wrappers(get_env(), "the agent's environment", normal)
         for each in getattr(env, "envs", ()):
-            without_wrappers(each, "the agent's environment")
+            _without_wrappers(each, "the agent's environment")
         see = normal.normalize_obs if normal else np.asarray
         return lambda seen: policy.predict(see(seen), deterministic=True)[0]
     if callable(policy):
-        return lambda seen: without_state(policy(seen))
+        return lambda seen: _without_state(policy(seen))
     raise TypeError(
         f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
         "with predict, or a Method"
     )
 
 
-def without_state(actions: Any) -> ArrayLike:
+def _without_state(actions: Any) -> ArrayLike:
     """Return actions. Raises TypeError for the pair that an agent's ``predict`` returns."""
     if isinstance(actions, tuple):
         raise TypeError(
@@ -519,7 +519,7 @@ def without_state(actions: Any) -> ArrayLike:
     return actions  # type: ignore[no-any-return]
 
 
-def rollout(
+def _rollout(
     act: Callable[[NDArray[np.float32]], ArrayLike],
     options: Mapping[str, Any],
     tasks: int,
@@ -559,18 +559,18 @@ def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
     return table
 
 
-def options_of(env: Any) -> dict[str, Any]:
+def _options_of(env: Any) -> dict[str, Any]:
     """The options of an environment of this package. Raises TypeError for anything else."""
     if not isinstance(getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
-    env = without_wrappers(env, "env")
+    env = _without_wrappers(env, "env")
     options: dict[str, Any] = (env.robots if isinstance(env, TaskEnv) else env).options
     return options
 
 
-def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
+def _without_wrappers(env: Any, name: str, known: Any = None) -> Any:
     """The environment in wrappers of Gymnasium and of Stable-Baselines3. Raises TypeError for a
     wrapper that is neither ``known`` nor added by these libraries themselves."""
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
@@ -584,7 +584,7 @@ def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
     return env
 
 
-def reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
+def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
     """Reward of a method's solution of a task; None where it has none."""
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)

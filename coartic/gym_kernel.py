@@ -116,7 +116,7 @@ class VectorState(NamedTuple):
 
 
 @inner
-def squared_distance(run: Any) -> float:
+def _squared_distance(run: Any) -> float:
     """Squared joint distance to the solution of the corrective process; infinite without one."""
     square = 0.0 if run.converged else math.inf
     for j in range(len(run.q)):
@@ -134,7 +134,7 @@ def aim(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
     ``action[0] > 0.5`` takes the other hand; the rest, clipped to ±1, is scaled by
     ``state.reach``."""
     if len(state.sides) > 1:
-        is_nearer = squared_distance(other) < squared_distance(run)
+        is_nearer = _squared_distance(other) < _squared_distance(run)
         if is_nearer != (action[0] > 0.5):
             run.hand, run.converged = other.hand, other.converged
             fill_row(run.target, other.target)
@@ -148,7 +148,7 @@ def aim(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
 
 
 @inlined
-def step_lot(count: int, robot: Any, state: Any) -> None:
+def _step_lot(count: int, robot: Any, state: Any) -> None:
     """A step of as many robots as there is room for."""
     for h in range(len(state.sides)):
         for i in range(count):
@@ -209,6 +209,6 @@ def step_robots(*fields: Any) -> None:
                 state.indices[count] = n
                 count += 1
             if count == SLOTS or (n == last and count > 0):
-                step_lot(count, state.parameters[kind], state)
+                _step_lot(count, state.parameters[kind], state)
                 count = 0
     observe(*state)

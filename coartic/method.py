@@ -174,7 +174,7 @@ MOST_COUNT = 2**63 - 1
 """Largest count that can be stored."""
 
 
-def pack_rewards(rewards: Iterable[int | None]) -> array[int]:
+def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
     """Pack rewards of trials as a session keeps them, in 8 bytes each."""
     return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
 
@@ -403,7 +403,7 @@ class Session:
             if isinstance(execution, Exception):
                 raise execution
             self._count(
-                pack_rewards([execution.reward]),
+                _pack_rewards([execution.reward]),
                 execution.ticks,
                 execution.evaluations,
                 execution.iterations,
@@ -598,7 +598,7 @@ class Session:
         """Keep the rewards of the trials of a compiled method of this project, and its time for
         them; in a batch, an equal share of the batch's time."""
         self._needs_trust("record")
-        self._rewards.extend(pack_rewards(rewards))
+        self._rewards.extend(_pack_rewards(rewards))
         self._meter.solve_s += solve_s
 
     def _needs_trust(self, name: str) -> None:

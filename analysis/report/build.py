@@ -69,17 +69,17 @@ def write_report(
     names = {table.id: section.title for section in SECTIONS for table in section.tables}
     for name, table in TABLES.items():
         made = about.attempt(
-            failures, names.get(name, name), files_of_table, study, table, for_paper
+            failures, names.get(name, name), _files_of_table, study, table, for_paper
         )
         files |= made or {}
     for section in about.visible_sections(study) if for_paper else ():
         watch(f"{section.title}, for print")
-        files |= about.attempt(failures, section.title, files_of_figures, study, section) or {}
+        files |= about.attempt(failures, section.title, _files_of_figures, study, section) or {}
     publish(folder, files)
     return list(files), failures
 
 
-def files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
+def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
     """Return the files of a table by path: CSV, and LaTeX ``for_paper``; none without rows."""
     frame = table(study)
     if not len(frame):
@@ -91,10 +91,10 @@ def files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, byt
     return files
 
 
-def files_of_figures(study: Study, section: Section) -> dict[str, bytes]:
+def _files_of_figures(study: Study, section: Section) -> dict[str, bytes]:
     """Return the files of a section's figures by path: SVG and PDF."""
     files = {}
-    for plot in plots_of(study, section):
+    for plot in _plots_of(study, section):
         for ending in (".svg", ".pdf"):
             files[f"figures/{plot.id}{ending}"] = picture(plot.figure, ending)
             plot.figure.set_layout_engine("none")  # the next is laid out alike
@@ -102,12 +102,12 @@ def files_of_figures(study: Study, section: Section) -> dict[str, bytes]:
 
 
 @cached
-def plots_of(study: Study, section: Section) -> list[Plot]:
+def _plots_of(study: Study, section: Section) -> list[Plot]:
     """Return the figures of a section for which the folder has runs."""
     return [plot for draw in section.figures if (plot := draw(study)) is not None]
 
 
-def parts_of(study: Study, section: Section) -> dict[str, Any]:
+def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: finding, figures and tables."""
     tables = []
     for table in section.tables:
@@ -119,7 +119,7 @@ def parts_of(study: Study, section: Section) -> dict[str, Any]:
             })  # fmt: skip
     return {
         "finding": about.finding(study, section),
-        "figures": [(plot, for_page(plot)) for plot in plots_of(study, section)],
+        "figures": [(plot, for_page(plot)) for plot in _plots_of(study, section)],
         "shown": tables,
     }
 
@@ -138,7 +138,7 @@ def page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str
     sections = []
     for section in about.visible_sections(study):
         watch(section.title)
-        parts = about.attempt(failures, section.title, parts_of, study, section)
+        parts = about.attempt(failures, section.title, _parts_of, study, section)
         parts = parts or {"finding": [], "figures": [], "shown": []}
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:

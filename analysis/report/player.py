@@ -48,7 +48,7 @@ def player(study: Study) -> str:
     presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]
     if not presets:
         return ""
-    begin = first_shown(study, presets, first)
+    begin = _first_shown(study, presets, first)
     where = {name: presets.index(preset) for name, preset in alone.items()}
     return player_figure(
         presets,
@@ -64,7 +64,7 @@ def player(study: Study) -> str:
     )
 
 
-def first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> dict[str, Any]:
+def _first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> dict[str, Any]:
     """Return the preset and the method shown first: the method from a file with the smallest gap,
     or else the preferred method if the first preset has it."""
     ids = [[run["id"] for run in preset["runs"]] for preset in presets]
@@ -84,7 +84,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     """
     runs = []
     for label in study.methods.index:
-        films = [film_of(study, (name, label)) for name in tasks]
+        films = [_film_of(study, (name, label)) for name in tasks]
         if all(films):
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
@@ -93,7 +93,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     return runs
 
 
-def film_of(study: Study, key: CellKey) -> dict[str, Any]:
+def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
     """Return the run of a cell nearest the median reward, in the form of ``model.js``.
 
     Empty if the cell has no solution, or a solution that follows a path.

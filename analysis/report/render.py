@@ -45,10 +45,10 @@ FORMULA = ("=", "+", "-", "@")
 def table_csv(frame: pd.DataFrame) -> str:
     """Return a table as CSV, with an apostrophe before text that a spreadsheet would take for a
     formula."""
-    return frame.map(guarded).rename(index=guarded).to_csv(lineterminator="\n")
+    return frame.map(_guarded).rename(index=_guarded).to_csv(lineterminator="\n")
 
 
-def guarded(value: Any) -> Any:
+def _guarded(value: Any) -> Any:
     """Return a value; text that a spreadsheet would take for a formula behind an apostrophe."""
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
@@ -76,14 +76,14 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
     return headers
 
 
-def is_number(values: pd.Series) -> bool:
+def _is_number(values: pd.Series) -> bool:
     """Return whether a column has numbers, or no value at all."""
     return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
 
 
 def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
     """Return the values of a column as text, with their SDs and intervals."""
-    if not is_number(frame[name]):
+    if not _is_number(frame[name]):
         titles = frame.attrs.get("titles", {})
         shown = {each: titles.get(each) or one_line(str(each)) for each in frame[name].unique()}
         return [NONE if pd.isna(each) else shown[each] or NONE for each in frame[name]]
@@ -115,14 +115,14 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
             html.escape(text).replace(" †", "&nbsp;†") for text in texts_of(table, frame, column)
         ]
         head = f'<span data-column="{html.escape(column)}">{html.escape(header)}</span>'
-        if cells and len(texts) > 2 and len(set(texts)) == 1 and not is_number(frame[column]):
+        if cells and len(texts) > 2 and len(set(texts)) == 1 and not _is_number(frame[column]):
             caption += f" ({header}: {html.unescape(texts[0])})"
             continue
         if column == "method" and table.id == "methods":  # ids stand in one table
             ids = [html.escape(one_line(str(label))) for label in frame[column]]
             pairs = zip(texts, ids, strict=True)
             texts = [text + f"<small>{id_}</small>" * (text != id_) for text, id_ in pairs]
-        if not is_number(frame[column]):
+        if not _is_number(frame[column]):
             head = f'<span class="text">{head}</span>'
             texts = [f'<span class="text">{text}</span>' for text in texts]
         if not cells:
@@ -174,7 +174,7 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
     body = shown.style.hide(axis="index").to_latex(
         environment="longtable",
         hrules=True,
-        column_format="".join("r" if is_number(frame[column]) else "l" for column in chosen),
+        column_format="".join("r" if _is_number(frame[column]) else "l" for column in chosen),
         caption=latex(caption),
         label=f"tab:coartic-{table.id}",
     )

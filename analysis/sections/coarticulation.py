@@ -35,7 +35,7 @@ SAME = 1e-9
 """Largest posture difference that is rounding, length unit and rad mixed."""
 
 
-def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
+def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
     """Yield each first goal that two tasks share, for each hand that hit this goal in both."""
     for first, second, shared in context_pairs(study.tasks):
         keys = (first, label), (second, label)
@@ -59,7 +59,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
     subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]
     single = rows[rows.parts.map(len) == 1]
     order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(single), *rows.index]
-    every = (shared_goals(study, label) for label in dict.fromkeys(order))
+    every = (_shared_goals(study, label) for label in dict.fromkeys(order))
     return next(itertools.chain.from_iterable(every), None)
 
 
@@ -75,7 +75,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
 def list_contexts(study: Study) -> Rows:
     """List posture differences at shared goals; p is corrected over a method's goals (Holm)."""
     for label in study.methods.index:
-        every = list(shared_goals(study, label))
+        every = list(_shared_goals(study, label))
         spreads = [shared.standardised_posture_difference for shared in every]
         tested = zip(every, np.isnan(spreads).tolist(), strict=True)
         p = holm([math.nan if no_spread else shared.p for shared, no_spread in tested])
@@ -156,7 +156,7 @@ AGAINST_GAIN = {
 """Signatures of the figure against gain, with the labels of their axes."""
 
 
-def against_gain(study: Study) -> pd.DataFrame:
+def _against_gain(study: Study) -> pd.DataFrame:
     """Return gains and signatures, means over tasks of means over runs, a row for each method that
     ran on all tasks that the most methods share.
 
@@ -186,7 +186,7 @@ def against_gain(study: Study) -> pd.DataFrame:
 )
 def draw_coarticulation(study: Study) -> Parts | None:
     """Draw signatures against gain, a point for each method."""
-    data = against_gain(study)
+    data = _against_gain(study)
     if len(data) < 2:
         return None
     shown = [name for name in AGAINST_GAIN if data[name].notna().any()]
@@ -265,7 +265,7 @@ def draw_postures(study: Study) -> Parts | None:
         title = study.methods.title[each.method]
         if len(contexts) > 1:
             axes.set_title(f"{title}: difference {number(each.posture_difference, 2)}")
-        parts += draw_contexts(axes, each)
+        parts += _draw_contexts(axes, each)
         differences.append(f"{title} {each.posture_difference:.2f}")
     hands = [shared.tasks[0].robot.forward_kinematics(runs.mean(axis=0), shared.hand)
              for runs in shared.configurations]  # fmt: skip
@@ -278,7 +278,7 @@ def draw_postures(study: Study) -> Parts | None:
     return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
 
 
-def draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
+def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     """Draw the postures of runs at a shared goal, runs thin and their means thick; return their
     numbers for each task."""
     axes.set_axis_off()

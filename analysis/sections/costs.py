@@ -125,7 +125,7 @@ def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
     return of_methods
 
 
-def times_on_tasks(
+def _times_on_tasks(
     study: Study, runs: pd.DataFrame, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> list[Array]:
     """Return :func:`times_of` of some runs of a method, for each of their tasks."""
@@ -136,7 +136,7 @@ def times_on_tasks(
 def half_of_targets(study: Study, runs: pd.DataFrame) -> Estimate:
     """Return the trials within which some runs of a method reach half of the targets of their
     tasks; NaN without targets."""
-    times = times_on_tasks(study, runs[runs.task.isin(spans(study).keys())], "trials")
+    times = _times_on_tasks(study, runs[runs.task.isin(spans(study).keys())], "trials")
     return running_times.budget_for(times, 0.5) if times else Estimate(math.nan)
 
 
@@ -186,7 +186,7 @@ def runtimes(
     rows = []
     for name, runs in runs_with_targets(study).items():
         for spend in SPENDS:
-            times = times_on_tasks(study, runs, spend, tuple(shares.tolist()))
+            times = _times_on_tasks(study, runs, spend, tuple(shares.tolist()))
             if all(map(len, times)):
                 steps = zip(*running_times.share_by_budget(times), strict=True)
                 rows += [(name, spend, *step) for step in steps]
@@ -208,7 +208,7 @@ def list_runtimes(study: Study) -> Rows:
     this target.
     """
     for method, runs in runs_with_targets(study).items():
-        times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
+        times = {spend: _times_on_tasks(study, runs, spend) for spend in SPENDS}
         if not all(map(len, times["trials"])):
             continue
         reached = running_times.share_reached(times["trials"])
@@ -253,7 +253,7 @@ def draw_runtimes(study: Study) -> Parts | None:
         # No more than are seen.
         curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 150).round()).astype(int)]
         runs = runs_with_targets(study)[str(label)]
-        times = times_on_tasks(study, runs, str(spend))
+        times = _times_on_tasks(study, runs, str(spend))
         low, high = running_times.interval_by_budget(times, curve.budget.to_numpy())
         steps.append(curve.assign(share_low=low, share_high=high, runs=len(runs)))
     data = pd.concat(steps, ignore_index=True)

@@ -27,7 +27,7 @@ def on_instances(study: Study) -> pd.DataFrame:
     return every[place.notna()].assign(place=place).sort_values("place", kind="stable")
 
 
-def by_family(runs: pd.DataFrame) -> Scores:
+def _by_family(runs: pd.DataFrame) -> Scores:
     """Return the gaps of the runs on each instance, by family."""
     return {
         str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
@@ -52,9 +52,9 @@ def list_family_gaps(study: Study) -> Rows:
         of_two_arms = runs[runs.family.isin(two_armed)]
         counted = of_two_arms if len(of_two_arms) else runs  # the gap is a mean over these
         row: Row = {"method": method, "instances": counted.task.nunique(), "gap": math.nan}
-        scores = by_family(runs)
+        scores = _by_family(runs)
         if two_armed and two_armed <= scores.keys():
-            row |= other_tasks(by_family(of_two_arms)).columns("gap")
+            row |= other_tasks(_by_family(of_two_arms)).columns("gap")
         row |= {f"in {family}": math.nan for family in families}
         for family, part in scores.items():
             row |= other_tasks({family: part}).columns(f"in {family}")
@@ -78,7 +78,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         return None
     parts = []
     for (method, family), part in runs.groupby(["method", "family"], sort=False):
-        mean = other_tasks(by_family(part)).columns("mean")
+        mean = other_tasks(_by_family(part)).columns("mean")
         dots = part.groupby("task", sort=False).gap.mean().reset_index()
         dots = dots.assign(method=str(method), family=str(family), **mean, instances=len(dots))
         parts.append(dots)

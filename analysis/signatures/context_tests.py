@@ -22,7 +22,7 @@ IN_MEMORY = 500
 """Most permutations or resamples of runs in memory at once."""
 
 
-def refuse_other_shapes(*groups: Array) -> None:
+def _refuse_other_shapes(*groups: Array) -> None:
     """Raise ValueError for groups of runs that are not all of shape ``(runs, dof)``."""
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] for shape in shapes):
@@ -68,7 +68,7 @@ def posture_difference_below(
     :func:`standardised_posture_difference` is at least ``bound``; the observed sample counts, too.
     Noise adds to distances, so that p is rather too large. NaN if a context has a single run.
     """
-    refuse_other_shapes(first, second)
+    _refuse_other_shapes(first, second)
     if min(len(first), len(second)) < 2:
         return math.nan
     means, squares = [], np.zeros(resamples)
@@ -101,7 +101,7 @@ def permutation_p(
     null = []
     for rows in slices(resamples if every is None else len(every), IN_MEMORY):
         size = rows.stop - rows.start
-        chosen = drawn_rows(runs, len(first), size, rng) if every is None else every[rows]
+        chosen = _drawn_rows(runs, len(first), size, rng) if every is None else every[rows]
         # Weights that give the first group's mean less the second's.
         weights = np.full((size, runs), -1 / len(second))
         np.put_along_axis(weights, chosen, 1 / len(first), axis=1)
@@ -112,7 +112,7 @@ def permutation_p(
     return reached / len(every) if every is not None else (1 + reached) / (1 + resamples)
 
 
-def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
+def _drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """Draw ``chosen`` of ``runs`` without replacement, ``size`` times, shape ``(size, chosen)``."""
     return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
 
@@ -162,7 +162,7 @@ def beyond_p(
     """
     if len(method) != 2 or len(other) != 2:
         raise ValueError("needed are the runs of each method in two contexts")
-    refuse_other_shapes(*method, *other)
+    _refuse_other_shapes(*method, *other)
     if min(map(len, (*method, *other))) < 2:
         return math.nan
     pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]
@@ -176,7 +176,7 @@ def beyond_p(
         of_method, of_other = [], []
         for pool, runs in zip(pools, method, strict=True):
             ours = len(runs)
-            chosen = drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
+            chosen = _drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
             total = pool[chosen].sum(axis=1)
             of_method.append(total / ours)
             of_other.append((pool.sum(axis=0) - total) / (len(pool) - ours))

@@ -167,8 +167,8 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 
 def other_arm(runs: Solutions) -> Array:
-    """Return the mean of :func:`preshaping_of_the_other_arm` over goals, without NaN."""
-    values = preshaping_of_the_other_arm(runs)
+    """Return the mean of :func:`_preshaping_of_the_other_arm` over goals, without NaN."""
+    values = _preshaping_of_the_other_arm(runs)
     means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
     # The last goal counts as a missing value: the order of summation decides the last bit.
     padded = np.pad(values[some], ((0, 0), (0, 1)), constant_values=np.nan)
@@ -176,7 +176,7 @@ def other_arm(runs: Solutions) -> Array:
     return means
 
 
-def preshaping_of_the_other_arm(runs: Solutions) -> Array:
+def _preshaping_of_the_other_arm(runs: Solutions) -> Array:
     """Return :func:`preshaping` of each run at goals g < G, shape ``(n, G − 1)``.
 
     NaN on a task for one hand, without an initial solution, and at goals after which the idle hand

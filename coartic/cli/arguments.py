@@ -89,7 +89,7 @@ def names_in(text: str | None) -> list[str]:
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
-def id_named(name: str, names: Mapping[str, str]) -> str:
+def _id_named(name: str, names: Mapping[str, str]) -> str:
     """Return the id of a name, whatever its case; an unknown name is returned unchanged.
 
     ``names`` holds the names that people use by id. If a name is also an id, the id counts.
@@ -104,7 +104,7 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
     from coartic import builtin_tasks, load_task
 
     known = {name: load_task(name).label for name in builtin_tasks()}
-    return [id_named(name, known) for name in names]
+    return [_id_named(name, known) for name in names]
 
 
 def method_names(registered: Registry) -> Mapping[str, str]:
@@ -128,7 +128,7 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
     ids, meant = method_names(registered) if names else {}, list[str]()
     for name in names:
         try:
-            meant += methods_named(id_named(name, ids), registered)
+            meant += methods_named(_id_named(name, ids), registered)
         except CoarticError:
             check_kind(name)  # a thing of another kind has its own sentence
             if os.path.isfile(file := file_name(name)):

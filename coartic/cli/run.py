@@ -100,10 +100,10 @@ def run(
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     jobs_asked, is_part = plan(chosen, request, registered), isinstance(runs, range)
-    perform_and_say(jobs_asked, out, include or [], jobs, scheduler, is_part=is_part)
+    _perform_and_say(jobs_asked, out, include or [], jobs, scheduler, is_part=is_part)
 
 
-def perform_and_say(
+def _perform_and_say(
     plan: Sequence[Job],
     out: Path,
     include: Sequence[str],
@@ -159,7 +159,7 @@ def list_(
     from coartic.benchmarks.registry import registry
 
     registered, methods = registry(method_file or [], with_code=False), list[str]()
-    pairs = overview(registered) if name is None else describe(name, registered)
+    pairs = _overview(registered) if name is None else describe(name, registered)
     if name is not None:
         with suppress(CoarticError):  # no method
             methods = given.methods_meant([name], registered)
@@ -167,7 +167,7 @@ def list_(
     say_pairs(pairs)
 
 
-def overview(registered: Registry) -> Iterator[tuple[str, str]]:
+def _overview(registered: Registry) -> Iterator[tuple[str, str]]:
     """Yield the names of tasks, families, suites and methods, to fit one screen."""
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import suites
@@ -200,11 +200,11 @@ def describe(name: str, registered: Registry) -> Iterable[tuple[str, str]]:
         check_kind(name, "suite", "task")
     kind, families = kind_of(name), shipped_families()
     if kind == "suite":
-        return describe_suite(name, load_suite(name))
+        return _describe_suite(name, load_suite(name))
     if name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
-        return describe_task(name, load_task(name))
+        return _describe_task(name, load_task(name))
     if kind == "shipped family":
-        return describe_family(families.get(name) or families[f"{name}/v1"])
+        return _describe_family(families.get(name) or families[f"{name}/v1"])
     try:
         ids = given.methods_meant([name], registered)
     except CoarticError as error:
@@ -212,10 +212,10 @@ def describe(name: str, registered: Registry) -> Iterable[tuple[str, str]]:
             raise
         names = [*suites(), *builtin_tasks(), *families, *registered]
         raise CoarticError(unknown("task, suite, method or family", name, names)) from error
-    return itertools.chain(*(describe_method(registered[id_]) for id_ in ids))
+    return itertools.chain(*(_describe_method(registered[id_]) for id_ in ids))
 
 
-def describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
+def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
     """Yield title, size, tasks and methods of a suite; ``name`` is its name or its file."""
     from coartic import builtin_tasks
     from coartic.analysis.words import number
@@ -232,7 +232,7 @@ def describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
     yield "Run it", f"coartic run {name}"
 
 
-def describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
+def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
     """Yield goals, hands and base of a task; ``name`` is its name or its file."""
     yield "Task", f"{name} ({task.label}): {task.description}"
     yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
@@ -242,14 +242,14 @@ def describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
         yield "Goals are", "reconstructed" if task.reconstructed else "published in the paper"
 
 
-def describe_family(family: Family) -> Iterator[tuple[str, str]]:
+def _describe_family(family: Family) -> Iterator[tuple[str, str]]:
     """Yield description and instances of a family."""
     yield "Family", f"{family.name}: {family.description}"
     yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
     yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
 
 
-def describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
+def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield declaration, parameters and tasks of a method."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
@@ -333,18 +333,18 @@ def check(
         check_kind(subject, "task")
         if verbose:
             raise CoarticError("--verbose has no effect: it shows what a method prints")
-        broken = show_laws(subject, check_task_file(Path(subject), registered))
+        broken = _show_laws(subject, check_task_file(Path(subject), registered))
     else:
         names = given.methods_meant([subject], registered)
         given.check_used(method_file, registered, names)
         broken = sum(
-            show_laws(name, check_method(registered[name], verbose=verbose)) for name in names
+            _show_laws(name, check_method(registered[name], verbose=verbose)) for name in names
         )
     if broken:
         sys.exit(1)
 
 
-def show_laws(name: str, laws: Sequence[Law]) -> int:
+def _show_laws(name: str, laws: Sequence[Law]) -> int:
     """Print the findings and return the number of broken laws."""
     for law in laws:
         first, *more = law.finding.splitlines() or [""]

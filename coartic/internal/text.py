@@ -146,7 +146,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 
 
-def refuse_unprintable(text: str) -> str:
+def _refuse_unprintable(text: str) -> str:
     """The text itself; a validation error where it is not one printable line."""
     if wrong := next((c for c in text if not prints(c)), ""):
         words = f"should be one line of printable text, without {escape(wrong)}"
@@ -154,7 +154,7 @@ def refuse_unprintable(text: str) -> str:
     return text
 
 
-printable = AfterValidator(refuse_unprintable)
+printable = AfterValidator(_refuse_unprintable)
 """Refuses what is not one line of printable text."""
 Line = Annotated[str, Field(max_length=LONGEST_LINE), printable]
 """Line of printable text, such as a title or a citation."""

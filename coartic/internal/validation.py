@@ -92,7 +92,7 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
     ``keys`` are the keys that the file may have, wherever they belong.
     """
-    sentences, more = explain_first(error, list(keys))
+    sentences, more = _explain_first(error, list(keys))
     lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
     if more:
         lines.append(f"{plain(source)}: has {counted(more, 'more problem')}")
@@ -101,15 +101,15 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
     """The problems of a file, the first :data:`_SHOWN` of them, as part of a sentence."""
-    return "; ".join(explain_first(error, keys)[0])
+    return "; ".join(_explain_first(error, keys)[0])
 
 
-def explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[str], int]:
+def _explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[str], int]:
     """A sentence for each of the first :data:`_SHOWN` problems, and how many more there are."""
     details = error.errors(include_url=False)
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
-    sentences = (plain(explain_problem(detail, keys)) for detail in details[:_SHOWN])
+    sentences = (plain(_explain_problem(detail, keys)) for detail in details[:_SHOWN])
     return list(dict.fromkeys(sentences)), max(0, len(details) - _SHOWN)
 
 
@@ -118,7 +118,7 @@ def sentence_error(text: str) -> PydanticCustomError:
     return PydanticCustomError("sentence", "{text}", {"text": text})
 
 
-def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
+def _explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
     """Return one sentence about a problem; ``keys`` are the keys that an unknown key may have
     meant."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links

@@ -49,7 +49,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
 
-def one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+def _one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     """Return drifts that are valid. Raises a validation error of one sentence for others, in place
     of a sentence for each form that a drift may have."""
     try:
@@ -63,7 +63,7 @@ def one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
 
 Drifts = Annotated[
     Drift | Annotated[tuple[Drift, ...], Field(min_length=1, strict=False)],
-    WrapValidator(one_or_several),
+    WrapValidator(_one_or_several),
 ]
 
 

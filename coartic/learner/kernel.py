@@ -122,7 +122,7 @@ class Results(NamedTuple):
     """In the last trial made, likewise: in the end the replay of what was learned."""
 
 
-class Workspace(NamedTuple):
+class _Workspace(NamedTuple):
     """Work space of N runs, each now at the same goal of the same trial."""
 
     batch: Batch
@@ -188,9 +188,9 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     return tables
 
 
-def workspace_for(runs: int, task: Task) -> Workspace:
+def workspace_for(runs: int, task: Task) -> _Workspace:
     """Work space of runs, as many as there are slots at most."""
-    return Workspace(
+    return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
         returns=np.empty(len(task.goals)),
@@ -213,7 +213,7 @@ def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
 
 
 @inner
-def nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
+def _nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
     """Find the hand of run ``n`` whose corrective posture for the goal is nearest in joint space.
 
     A hand with which **A** fails is farthest; of equal ones the first.
@@ -236,7 +236,7 @@ def nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
 
 
 @inlined
-def best_hand(entries: Any, hands: Any) -> int:
+def _best_hand(entries: Any, hands: Any) -> int:
     """Return the hand of highest value, of equal ones the first."""
     best = hands[0]
     for hand in hands[1:]:
@@ -256,7 +256,7 @@ def choose_hand(
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:
-            return nearest_posture(n, robot, learner, workspace)
+            return _nearest_posture(n, robot, learner, workspace)
         nearest, draws = hands[0], learner.exploration == _RANDOM
         if not draws:
             least = distance_to_goal(run, nearest, robot, workspace)
@@ -266,11 +266,11 @@ def choose_hand(
                 if distance < least:
                     nearest, least = hand, distance
         return int(hands[int(rng.random() * len(hands))]) if draws else int(nearest)
-    return best_hand(entries, hands)
+    return _best_hand(entries, hands)
 
 
 @inlined
-def find_mean(run: Any, stored: Any, learner: Any) -> None:
+def _find_mean(run: Any, stored: Any, learner: Any) -> None:
     """Set the target of a run to the mean of exploration: the stored target q*(s, a); joints that
     are not to be modified keep their current values."""
     for j in range(len(run.q)):
@@ -278,7 +278,7 @@ def find_mean(run: Any, stored: Any, learner: Any) -> None:
 
 
 @inlined
-def draw_drift(run: Any, learner: Any, rng: Any) -> None:
+def _draw_drift(run: Any, learner: Any, rng: Any) -> None:
     """Set the drift κ of a run for a trial."""
     number = len(learner.drifts)
     run.drift = learner.drifts[int(rng.random() * number) if number > 1 else 0]
@@ -298,7 +298,7 @@ def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
     fill_row(run.preferred, run.q)
     if learner.direction == _NEXT_GOAL:
         if number + 1 < len(table):
-            hand = best_hand(table[number + 1, run.hand], learner.hands)
+            hand = _best_hand(table[number + 1, run.hand], learner.hands)
             following = table[number + 1, run.hand, hand]
             if following.value > -math.inf:
                 for j in range(len(run.q)):
@@ -356,7 +356,7 @@ def aim(
     prefer(run, number, table, learner)
     if stored.value > -math.inf:
         run.action, run.corrects = MOVE, learner.corrects
-        find_mean(run, stored, learner)
+        _find_mean(run, stored, learner)
         if explore:
             drift(run, robot, learner, workspace)
         for j in range(len(run.q)):
@@ -381,7 +381,7 @@ def make_trial(
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
         if explore and not first:
-            draw_drift(batch.runs[n], learner, generator_at(rngs, n))
+            _draw_drift(batch.runs[n], learner, generator_at(rngs, n))
         for k in range(counts.shape[1]):
             counts[n, k] = 0
     for number in range(len(learner.goals)):
@@ -412,7 +412,7 @@ def make_trial(
 
 
 @inlined
-def find_returns(trial: Any, learner: Any, returns: Any) -> None:
+def _find_returns(trial: Any, learner: Any, returns: Any) -> None:
     """Set the return of each goal of a completed trial."""
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
@@ -425,14 +425,14 @@ def find_returns(trial: Any, learner: Any, returns: Any) -> None:
 
 
 @inlined
-def copy_accounts(source: Any, destination: Any) -> None:
+def _copy_accounts(source: Any, destination: Any) -> None:
     """Copy the accounts of a trial."""
     for goal in range(len(source)):
         destination[goal] = source[goal]
 
 
 @inner
-def learn_from(number: int, learner: Any, tables: Any, results: Any, workspace: Any) -> None:
+def _learn_from(number: int, learner: Any, tables: Any, results: Any, workspace: Any) -> None:
     """Keep the rewards of a trial; where it was completed, update Q and q*: credit visited states
     and hands with the reward of the trial, or each with its return."""
     others = max(1, results.rewards.shape[1] - 1)
@@ -452,9 +452,9 @@ def learn_from(number: int, learner: Any, tables: Any, results: Any, workspace: 
         if not completed:
             continue
         if number == 0:
-            copy_accounts(trial, results.first[n])
+            _copy_accounts(trial, results.first[n])
         if learner.by_subtask:
-            find_returns(trial, learner, workspace.returns)
+            _find_returns(trial, learner, workspace.returns)
         for goal in range(len(trial)):
             credit = workspace.returns[goal] if learner.by_subtask else float(reward)
             before = trial[goal - 1].hand if goal > 0 else NO_HAND
@@ -465,7 +465,7 @@ def learn_from(number: int, learner: Any, tables: Any, results: Any, workspace: 
         best = results.best_trial[n]
         if best < 0 or reward > results.rewards[n, best]:
             results.best_trial[n] = number
-            copy_accounts(trial, results.best[n])
+            _copy_accounts(trial, results.best[n])
 
 
 @entry
@@ -481,4 +481,4 @@ def learn_kernel(
         first, explore, made = number == 0, number < trials, results.last
         make_trial(first, explore, robot[0], learner, tables, made, rngs, workspace)
         if number < trials:
-            learn_from(number, learner, tables, results, workspace)
+            _learn_from(number, learner, tables, results, workspace)

@@ -208,10 +208,10 @@ def learn_many(
     threads = threads_for(jobs)
     together = max(min(SLOTS, math.ceil(len(ordered) / threads)), 1)
     batches = [ordered[begin : begin + together] for begin in range(0, len(ordered), together)]
-    learn_together(task, condition, model, first, [0], 0)  # compiles, on no run's time
+    _learn_together(task, condition, model, first, [0], 0)  # compiles, on no run's time
 
     def perform(batch: Sequence[int]) -> list[LearningRun]:
-        return learn_together(task, condition, model, first, batch, trials)
+        return _learn_together(task, condition, model, first, batch, trials)
 
     if threads == 1:
         return [run for batch in batches for run in perform(batch)]
@@ -219,7 +219,7 @@ def learn_many(
         return [run for runs in pool.map(perform, batches) for run in runs]
 
 
-def learn_together(
+def _learn_together(
     task: Task,
     condition: ExplorationCondition,
     model: MotionModel,
@@ -299,7 +299,7 @@ def warm_up(task: Task, *parts: Part) -> None:
     wanted = parts or get_args(Part)
     if "learner" in wanted:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)
+        _learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)
     if "trials" in wanted:
         shape = 0, len(task.goals)
         targets = np.empty((*shape, 1, task.robot.dof))

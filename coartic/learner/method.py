@@ -54,11 +54,11 @@ class CustomParameters(DualProcessParameters):
     @model_validator(mode="after")
     def check_condition(self) -> Self:
         """Raise ValueError for fields that contradict each other."""
-        condition_of(CONDITIONS[self.base], self)
+        _condition_of(CONDITIONS[self.base], self)
         return self
 
 
-def condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
+def _condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
     """Return a condition with the fields that parameters set."""
     return replace(base, **parameters.model_dump(include={*_FIELDS}, exclude_none=True))
 
@@ -74,7 +74,7 @@ class DualProcess(Method):
 
     def rules(self) -> ExplorationCondition:
         """Return the exploration condition with the parameters."""
-        return condition_of(self.condition, self.parameters)
+        return _condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
         """Return why the condition does not apply to a task, None where it does."""
@@ -121,7 +121,7 @@ class DualProcess(Method):
         return results
 
 
-def method_for(condition: ExplorationCondition) -> type[DualProcess]:
+def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
     """The learner under a condition as a method, with fields of the condition as parameters."""
     names, citation = ["epsilon", "noise_sd"], DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
@@ -188,10 +188,10 @@ class CustomDualProcess(DualProcess):
     def rules(self) -> ExplorationCondition:
         """Return the base condition with the fields that the parameters change."""
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
-        return condition_of(base, self.parameters)
+        return _condition_of(base, self.parameters)
 
 
 METHODS: tuple[type[DualProcess], ...] = (
-    *map(method_for, EVERY_CONDITION.values()),
+    *map(_method_for, EVERY_CONDITION.values()),
     CustomDualProcess,
 )

@@ -33,7 +33,7 @@ GOING = 0.0
 """Status of a slot that has not ended."""
 
 
-def links_for(robot: Robot) -> int:
+def _links_for(robot: Robot) -> int:
     """Links for which kernels are compiled: four, eight, or those of an arm that has more, so that
     all robots of a family share their machine code."""
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
@@ -41,16 +41,16 @@ def links_for(robot: Robot) -> int:
 
 def width_of(robot: Robot) -> int:
     """Figures of a configuration in records: of the robot's, and then zeros, as many as with two
-    arms of :func:`links_for`, so that kernels are compiled once for a number of links."""
-    return BASE_DOF + 2 * links_for(robot)
+    arms of :func:`_links_for`, so that kernels are compiled once for a number of links."""
+    return BASE_DOF + 2 * _links_for(robot)
 
 
 # ---- Robot parameters ----
 
 
 @cache
-def parameters_type(links: int) -> np.dtype[np.void]:
-    """Type of the record for robots with so many links (:func:`links_for`)."""
+def _parameters_type(links: int) -> np.dtype[np.void]:
+    """Type of the record for robots with so many links (:func:`_links_for`)."""
     arm = {"first": np.int64, "count": np.int64, "links": (np.float64, links)}
     shoulder = dict.fromkeys(("shoulder_x", "shoulder_y"), np.float64)
     model = dict.fromkeys(MotionModel._fields, np.float64) | {"max_iterations": np.int64}
@@ -75,7 +75,7 @@ def robot_parameters(
     checks: bool = True,
 ) -> NDArray[np.void]:
     """Robot, constants and options for kernels, a record in an array of shape ``(1,)``."""
-    parameters = np.zeros(1, parameters_type(links_for(robot)))
+    parameters = np.zeros(1, _parameters_type(_links_for(robot)))
     for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
         first, links, *shoulder = robot.arm(hand)
         arm["first"], arm["count"], arm["links"][: len(links)] = first, len(links), links
@@ -132,7 +132,7 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "iterations": np.int64,  # of the corrective process
         "evaluations": np.int64,  # of forward kinematics, since the last account
     }
-    record, corrected, moved = layout(links_for(robot))
+    record, corrected, moved = layout(_links_for(robot))
     at = np.zeros(1, record)
     rows = at.view(np.float64).reshape(-1, SLOTS)
     return Batch(np.zeros(count, record_type(fields)), at, rows[corrected], rows[moved])
@@ -182,7 +182,7 @@ def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
 
 
 @inlined
-def copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
+def _copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
     """Copy the base and an arm's joints of a configuration into a slot."""
     row[0, slot] = q[0]
     row[1, slot] = q[1]
@@ -199,15 +199,15 @@ def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
     at.goal[0, slot], at.goal[1, slot] = run.goal[0], run.goal[1]
     for k in range(len(at.length)):
         at.length[k, slot] = arm.links[k] if k < len(arm.links) else 0.0
-    copy_arm(at.q, slot, run.q, arm)
+    _copy_arm(at.q, slot, run.q, arm)
 
 
 @inlined
 def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
     """Load the arm of a run into a slot to start its movement to the run's target."""
     load(at, slot, number, run, arm)
-    copy_arm(at.start, slot, run.q, arm)
-    copy_arm(at.target, slot, run.target, arm)
+    _copy_arm(at.start, slot, run.q, arm)
+    _copy_arm(at.target, slot, run.target, arm)
     square = 0.0
     for j in range(len(run.q)):
         delta = run.target[j] - run.q[j]
@@ -262,7 +262,7 @@ def are_near(at: Any, count: int) -> bool:
     return far == 0
 
 
-def chains_by(cos: Any, sin: Any) -> Any:
+def _chains_by(cos: Any, sin: Any) -> Any:
     """Forward kinematics of every slot, by these functions."""
 
     @inner
@@ -274,8 +274,8 @@ def chains_by(cos: Any, sin: Any) -> Any:
     return chains
 
 
-_near_chains = chains_by(near_cosine, near_sine)
-_far_chains = chains_by(cosine, sine)
+_near_chains = _chains_by(near_cosine, near_sine)
+_far_chains = _chains_by(cosine, sine)
 
 
 @inner

@@ -36,7 +36,7 @@ _IMPORTING = Lock()  # LLVM takes an option once
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def hash_of_sources() -> str:
+def _hash_of_sources() -> str:
     """Hash of the files of this package that results come from: the version of the model's code."""
     single = (PACKAGE / name for name in ("robot.py", "model.py", "method.py", "tasks/task.py"))
     folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner"))
@@ -45,12 +45,12 @@ def hash_of_sources() -> str:
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
 
-FINGERPRINT = hash_of_sources()
+FINGERPRINT = _hash_of_sources()
 """The version of the model's code when the package was imported."""
 
 
-class Kernel:
-    """A function that is compiled when it is first called (:func:`compile_kernel`)."""
+class _Kernel:
+    """A function that is compiled when it is first called (:func:`_compile_kernel`)."""
 
     def __init__(self, kind: str, function: Callable[..., Any]) -> None:
         self.kind, self.function = kind, function
@@ -59,7 +59,7 @@ class Kernel:
     @cached_property
     def dispatcher(self) -> Any:
         """The compiled function, as Numba calls it."""
-        return compile_kernel(self.function, self.kind)
+        return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function, and return its result."""
@@ -73,23 +73,23 @@ class Kernel:
         raise AttributeError(f"a kernel has no attribute {name!r}")
 
 
-def decorator(kind: str) -> Callable[[F], F]:
+def _decorator(kind: str) -> Callable[[F], F]:
     """The decorator that makes a kernel of this kind."""
-    return cast(Callable[[F], F], partial(Kernel, kind))
+    return cast(Callable[[F], F], partial(_Kernel, kind))
 
 
-entry = decorator("entry")
+entry = _decorator("entry")
 """A kernel that Python calls; its machine code is kept on disk."""
-inner = decorator("inner")
+inner = _decorator("inner")
 """A kernel that only other kernels call; a division by 0 gives infinity or NaN."""
-shared = decorator("shared")
+shared = _decorator("shared")
 """An inner kernel that several entries call: its machine code is kept on disk, too."""
-inlined = decorator("inlined")
+inlined = _decorator("inlined")
 """An inner kernel that becomes a part of its callers, with their error model: passing whole tables
 would cost, and loops over a shape are unrolled where it is known."""
-scalar = decorator("scalar")
+scalar = _decorator("scalar")
 """A kernel of numbers, which compiled functions of others may call, too."""
-intrinsic: Callable[[Any], Any] = decorator("intrinsic")
+intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 """A function that gives the type of a call in a kernel and builds its machine code."""
 
 
@@ -125,7 +125,7 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 
 @intrinsic
-def generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
+def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
     """The generator that draws by the functions at these addresses."""
     from numba.core import cgutils, types
 
@@ -145,7 +145,7 @@ def generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
 @inner
 def generator_at(addresses: Any, run: int) -> Any:
     """The generator in a row of :func:`addresses`."""
-    return generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
+    return _generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
 
 
 # ---- Numba ----
@@ -154,11 +154,11 @@ def generator_at(addresses: Any, run: int) -> Any:
 def import_numba() -> Any:
     """Numba, with the settings that kernels need."""
     with _IMPORTING:
-        return set_up_numba()
+        return _set_up_numba()
 
 
 @cache
-def set_up_numba() -> Any:
+def _set_up_numba() -> Any:
     """Import Numba, and set it up.
 
     LLVM gets its options before Numba first asks it for machine code. Only how fast the kernels are
@@ -203,7 +203,7 @@ def set_up_numba() -> Any:
     return numba
 
 
-def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
+def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
     """Compile a function as the decorator of this name says.
 
     Raises CoarticError where Numba is set to compile nothing.
@@ -218,7 +218,7 @@ def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
         options["no_cpython_wrapper"] = True  # which would take as long to compile
     match kind:
         case "entry":
-            return keep_on_disk(numba.njit(**options)(function), function)
+            return _keep_on_disk(numba.njit(**options)(function), function)
         case "inner" | "shared":
             compiled = numba.njit(**options, error_model="numpy")(function)
             # Not compiled again for literal integers such as count = 0.
@@ -226,7 +226,7 @@ def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
             compiled.get_call_template = lambda given, names: template(
                 tuple(map(unliteral, given)), names
             )
-            return keep_on_disk(compiled, function) if kind == "shared" else compiled
+            return _keep_on_disk(compiled, function) if kind == "shared" else compiled
         case "inlined":
             return numba.njit(**options, inline="always")(function)
         case "scalar":
@@ -237,19 +237,19 @@ def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
     return made
 
 
-def keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
+def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
     """The compiled function itself, whose machine code is kept where there is a folder for it."""
-    folder, config = cache_folder(), import_numba().config
+    folder, config = _cache_folder(), import_numba().config
     if folder is not None:
         before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
         try:
-            compiled._cache = MachineCode(function)
+            compiled._cache = _MachineCode(function)
         finally:
             config.CACHE_DIR = before
     return compiled
 
 
-def cache_folder() -> Path | None:
+def _cache_folder() -> Path | None:
     """Return a writable folder for compiled code, or None if no folder is writable."""
     roots, chosen = [PACKAGE / "__pycache__"], import_numba().config.CACHE_DIR
     if Path(chosen).is_absolute():  # or it would change with where one stands
@@ -265,12 +265,12 @@ def cache_folder() -> Path | None:
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):
-                remove_old(root, folder)
+                _remove_old(root, folder)
                 return folder
     return None
 
 
-def remove_old(root: Path, current: Path) -> None:
+def _remove_old(root: Path, current: Path) -> None:
     """Remove machine code of older sources that no process has loaded for a month."""
     with contextlib.suppress(OSError):
         os.utime(current)
@@ -281,12 +281,12 @@ def remove_old(root: Path, current: Path) -> None:
 
 
 @cache
-def log_compilation() -> None:
+def _log_compilation() -> None:
     """Log, once a process, that it compiles; a program that logs what coartic says shows this."""
     logging.getLogger("coartic").info("Compiling (once): this takes up to a minute.")
 
 
-class MachineCode:
+class _MachineCode:
     """Machine code of a function on disk, as Numba's dispatchers ask for it.
 
     Of processes that lack the same code one compiles it and the others wait for it. A file that
@@ -311,7 +311,7 @@ class MachineCode:
             if code is not None:
                 self.unlock()
         if code is None:
-            log_compilation()
+            _log_compilation()
         return code
 
     def load(self, *wanted: Any) -> Any:

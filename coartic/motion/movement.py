@@ -169,7 +169,7 @@ def set_off(at: Any, count: int, step: float) -> bool:
 
 
 @inner
-def place_between(at: Any, count: int, step: float) -> None:
+def _place_between(at: Any, count: int, step: float) -> None:
     """Set the configuration of each slot at its present step."""
     for i in range(padded_count(count)):
         fraction = at.step[i] * step / at.distance[i]
@@ -236,7 +236,7 @@ def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> Non
         fill_row(at.end[1], at.y[-1])
         evaluations += 1
     while count > 0:
-        place_between(at, count, step)
+        _place_between(at, count, step)
         place(at, count, near)
         evaluations += 1
         ended = check(at, count, stop_on_arrival, rims, squares)
@@ -263,7 +263,7 @@ def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> Non
 
 
 @entry
-def move_kernel(stop_on_arrival: bool, robot: Any, batch: Any) -> None:
+def _move_kernel(stop_on_arrival: bool, robot: Any, batch: Any) -> None:
     """Move the only run."""
     run = batch.runs[0]
     start(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
@@ -317,7 +317,7 @@ def move(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    check_arm(robot, hand)
+    _check_arm(robot, hand)
     if not isinstance(stop_on_arrival, bool | np.bool_):
         raise TypeError(f"stop_on_arrival is {brief_value(stop_on_arrival)}; it must be a bool")
     batch = batch_for(robot, 1)
@@ -326,14 +326,14 @@ def move(
     run["target"][figures] = configuration(robot, target)
     run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
     parameters = robot_parameters(robot, radius, model=check_model(model))
-    move_kernel(stop_on_arrival, parameters, batch)
+    _move_kernel(stop_on_arrival, parameters, batch)
     return MoveResult(
         run["q"][figures].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
     )
 
 
 @inner
-def find_statuses(at: Any, count: int, square: float) -> None:
+def _find_statuses(at: Any, count: int, square: float) -> None:
     """Set the status of slots whose hand is near enough to the goal, or at no finite place."""
     tip = len(at.length)
     for i in range(padded_count(count)):
@@ -395,7 +395,7 @@ def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
     near = are_near(at, count)
     while count > 0:
         place(at, count, near)
-        find_statuses(at, count, square)
+        _find_statuses(at, count, square)
         ended = count
         if iteration < robot.model.max_iterations:
             ended, near = descend(at, count, robot, batch.runs, pull)
@@ -443,7 +443,7 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 
 @inner
-def pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
+def _pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
     """Set what pulls each slot to the preferred posture p of its run: β N(q) (p − q)."""
     tip = len(at.length)
     for i in range(count):
@@ -467,7 +467,7 @@ def pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
 @shared
 def pull_slots(batch: Any, count: int, robot: Any) -> None:
     """**A** with the pull to the preferred posture in the first ``count`` slots."""
-    descend_to_goals(batch, count, robot, pull_to_preferred)
+    descend_to_goals(batch, count, robot, _pull_to_preferred)
 
 
 @shared
@@ -477,7 +477,7 @@ def correct_slots(batch: Any, count: int, robot: Any) -> None:
 
 
 @entry
-def correct_kernel(robot: Any, batch: Any) -> None:
+def _correct_kernel(robot: Any, batch: Any) -> None:
     """Correct the target of the only run."""
     run = batch.runs[0]
     load(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
@@ -530,13 +530,13 @@ def correct(
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
-    check_arm(robot, hand)
+    _check_arm(robot, hand)
     batch = batch_for(robot, 1)
     run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = run["target"][figures] = configuration(robot, q)
     run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal)
     locked = tuple(locked_base)
-    correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
+    _correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))
 
 
@@ -636,7 +636,7 @@ def configuration(robot: Robot, q: Any) -> Array:
     return array
 
 
-def check_arm(robot: Any, hand: Any) -> None:
+def _check_arm(robot: Any, hand: Any) -> None:
     """Raise TypeError for an object that is no robot, and ValueError for one that is no hand."""
     if not isinstance(robot, Robot):
         raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")

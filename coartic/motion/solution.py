@@ -232,8 +232,8 @@ def execute_many(
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
             executions.append(error)
         else:
-            executions.append(make_one_by_one(compiled, plan) if has_path(plan) else plan)
-    straight = iter(make_straight(compiled, [x for x in executions if isinstance(x, list)]))
+            executions.append(_make_one_by_one(compiled, plan) if _has_path(plan) else plan)
+    straight = iter(_make_straight(compiled, [x for x in executions if isinstance(x, list)]))
     return [next(straight) if isinstance(x, list) else x for x in executions]
 
 
@@ -241,12 +241,12 @@ Plan = list[list[Movement]]
 """The movements of a solution, goal by goal."""
 
 
-def has_path(plan: Plan) -> bool:
+def _has_path(plan: Plan) -> bool:
     """Return whether a movement of a plan follows a path."""
     return "path" in [movement.kind for movements in plan for movement in movements]
 
 
-def with_targets(movements: list[Movement]) -> list[Movement | None]:
+def _with_targets(movements: list[Movement]) -> list[Movement | None]:
     """Return straight movements to a goal as the kernel takes them, up to the first that **A**
     finds.
 
@@ -260,11 +260,11 @@ def with_targets(movements: list[Movement]) -> list[Movement | None]:
     return given
 
 
-def make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
+def _make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
     """Execute plans without paths side by side."""
     if not plans:
         return []
-    given = [[with_targets(movements) for movements in plan] for plan in plans]
+    given = [[_with_targets(movements) for movements in plan] for plan in plans]
     most = max([len(of_goal) for of_plan in given for of_goal in of_plan])
     rows = [m for each in given for some in each for m in some + [None] * (most - len(some))]
     hands = [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
@@ -276,7 +276,7 @@ def make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Executi
         np.array([m is None or m.kind != "corrective" for m in rows]).reshape(shape),
     ).goals
     made = movements_in(accounts, compiled.task.robot.dof, given)
-    return [execution_of(compiled, *each) for each in zip(plans, made, accounts, strict=True)]
+    return [_execution_of(compiled, *each) for each in zip(plans, made, accounts, strict=True)]
 
 
 def movements_in(
@@ -312,7 +312,7 @@ def movements_in(
     return trials
 
 
-def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
+def _make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
     """Execute a plan that has paths, one movement after the other."""
     count_trials(1)
     task, q = compiled.task, compiled.starts[0]
@@ -347,10 +347,10 @@ def make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
         account["iterations"], account["evaluations"] = iterations, evaluations
         if not hit:
             break
-    return execution_of(compiled, plan, made, goals)
+    return _execution_of(compiled, plan, made, goals)
 
 
-def execution_of(
+def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
     """Return the execution of a plan from the movements made and the accounts of its goals."""
@@ -408,7 +408,7 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
             plan.append([])
         of_goal = plan[-1]
         try:
-            of_goal.append(check_movement(task, movement))
+            of_goal.append(_check_movement(task, movement))
             if movement.hand != of_goal[0].hand:
                 raise SolutionError("two hands for one goal")
         except (SolutionError, ValueError) as error:
@@ -420,7 +420,7 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     return plan
 
 
-def check_movement(task: Task, movement: Movement) -> Movement:
+def _check_movement(task: Task, movement: Movement) -> Movement:
     """The movement, if it has what its kind needs and leads to configurations that the task allows;
     a path with its target. Raises SolutionError or ValueError."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
@@ -433,22 +433,22 @@ def check_movement(task: Task, movement: Movement) -> Movement:
     if kind == "path":
         if waypoints is None or not isinstance(waypoints, Iterable) or len([*waypoints]) == 0:
             raise SolutionError("a path needs waypoints, a list of configurations")
-        path = np.array([check_point(task, point) for point in waypoints], dtype=np.float64)
+        path = np.array([_check_point(task, point) for point in waypoints], dtype=np.float64)
         if target is not None and not np.array_equal(target, waypoints[-1]):
             raise SolutionError("a path's target is its last waypoint")
         return replace(movement, target=path[-1], waypoints=path)
     if waypoints is not None:
         raise SolutionError(f"a {kind} movement has no waypoints")
     if target is not None:
-        held = check_point(task, target)
+        held = _check_point(task, target)
         return movement if held is target else replace(movement, target=held)
     if kind != "corrective":
         raise SolutionError(f"a {kind} movement needs a target")
     return movement
 
 
-def check_point(task: Task, point: Any) -> Array:
-    """The point, with its base held (:func:`hold_base`). Raises ValueError for what is no
+def _check_point(task: Task, point: Any) -> Array:
+    """The point, with its base held (:func:`_hold_base`). Raises ValueError for what is no
     configuration of the robot, and where it moves a locked base coordinate."""
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
@@ -457,11 +457,11 @@ def check_point(task: Task, point: Any) -> Array:
     held: Array = point
     for k in map("xy".index, task.locked_base):
         if held[k] != task.q0[k]:
-            return hold_base(task, held.copy())
+            return _hold_base(task, held.copy())
     return held
 
 
-def hold_base(task: Task, points: Array) -> Array:
+def _hold_base(task: Task, points: Array) -> Array:
     """Return the points, ``(..., dof)``, of which locked base coordinates that move by no more than
     :data:`HELD` are put back. Raises ValueError where one moves by more."""
     for coordinate in task.locked_base:
@@ -485,7 +485,7 @@ def check_targets(task: Task, targets: Any) -> Configs:
         )
     if np.isinf(copy).any():
         raise ValueError("targets have infinite entries; needed are finite ones")
-    return hold_base(task, copy)
+    return _hold_base(task, copy)
 
 
 # ---- Solutions from hands and targets, and initial ones ----

@@ -127,7 +127,7 @@ def move(count: int, robot: Any, batch: Any) -> None:
             run, action = batch.runs[i], batch.runs[i].action
             # A movement to where an arm is tells whether it hits; it needs no other end.
             run.acting = action == MOVE if stops else action in (CHECK, REPEAT)
-        move_acting(count, stops, robot, batch)
+        _move_acting(count, stops, robot, batch)
     for i in range(count):
         if batch.runs[i].action < MOVE:
             batch.runs[i].ticks = 0
@@ -147,7 +147,7 @@ def make_corrections(count: int, robot: Any, batch: Any) -> None:
     """Move to what **A** has found."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
-    move_acting(count, False, robot, batch)
+    _move_acting(count, False, robot, batch)
 
 
 @inlined
@@ -178,7 +178,7 @@ def count_goal(goal: Any, counts: Any) -> None:
 
 
 @shared
-def move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
+def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
     """Move those of the first ``count`` runs that are acting to their targets, in place; with
     ``stops`` a movement ends on arrival, too."""
     at, slot = batch.at[0], 0
@@ -191,7 +191,7 @@ def move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
 
 
 @inlined
-def find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
+def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
     """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
     at, slot = batch.at[0], 0
     for i in range(count):
@@ -208,13 +208,13 @@ def find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
 @shared
 def find_corrections(count: int, robot: Any, batch: Any) -> None:
     """Have the paper's **A** look for where to finish missed goals."""
-    find_by(count, robot, batch, correct_slots)
+    _find_by(count, robot, batch, correct_slots)
 
 
 @shared
 def find_pulled_corrections(count: int, robot: Any, batch: Any) -> None:
     """Have **A** look with a pull to the preferred posture of each run."""
-    find_by(count, robot, batch, pull_slots)
+    _find_by(count, robot, batch, pull_slots)
 
 
 # ---- Trials with given targets ----
@@ -262,7 +262,7 @@ def row_of(rows: Any, n: int) -> Any:
 
 
 @inlined
-def are_within(targets: Any) -> bool:
+def _are_within(targets: Any) -> bool:
     """Return whether no target ``(G, M, dof)`` of a trial has an absolute value beyond
     :data:`LARGEST_ENTRY`; NaN, a joint that stays, has not."""
     far = 0
@@ -274,14 +274,14 @@ def are_within(targets: Any) -> bool:
 
 
 @inlined
-def reach_lot(
+def _reach_lot(
     first: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
 ) -> None:
     """Let some of the arms reach for their goals, as many as there is room for."""
     for i in range(count):
         n, run = first + i, batch.runs[i]
         set_off(run, row_of(arms.starts, n))
-        run.going = are_within(arms.targets[n])
+        run.going = _are_within(arms.targets[n])
         counts[n, FAILURES] = not run.going
     for g in range(arms.targets.shape[1]):
         for i in range(count):
@@ -325,7 +325,7 @@ def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any
     arms, batch = Requests(*others[:5]), Batch(*others[5:])
     count, room = len(arms.targets), len(batch.runs)
     for first in range(0, count, room):
-        reach_lot(first, min(room, count - first), arms, robot[0], goals, counts, batch)
+        _reach_lot(first, min(room, count - first), arms, robot[0], goals, counts, batch)
     for n in range(count):
         rewards[n] = -counts[n, TICKS] if counts[n, FAILURES] == 0 else NO_REWARD
 
@@ -708,11 +708,11 @@ def search_initial_hands(
     if not task.initial_is_policy:
         return task.initial_hands, {}
     ordered = tuple(hand for hand in HANDS if hand in allowed)
-    return search_by_policy(task.model_dump_json(), ordered, model)
+    return _search_by_policy(task.model_dump_json(), ordered, model)
 
 
 @lru_cache(maxsize=64)
-def search_by_policy(
+def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
     """Search for the initial hands of a task, given as JSON; the same search is made once."""

@@ -246,7 +246,7 @@ class Run:
         return run
 
 
-class RunColumn(NamedTuple):
+class _RunColumn(NamedTuple):
     """A column of view ``runs``, which has a row for each run of the plan."""
 
     name: str
@@ -260,7 +260,7 @@ class RunColumn(NamedTuple):
 
 
 COLUMNS = tuple(
-    RunColumn(*row)
+    _RunColumn(*row)
     for row in (
         ("run_id", "TEXT NOT NULL UNIQUE", "id",
          "hash of all that the result depends on: task, method, parameters, seed and code"),

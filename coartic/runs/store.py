@@ -165,10 +165,10 @@ class Store:
             ran = {"command": command, "date": date, "environment": self._environment(environment)}
             self._insert("suite", suite | ran)
             for position, job in enumerate(plan):
-                row = cell_row(job.cell)
+                row = _cell_row(job.cell)
                 cell = self._id_of("cells", row, "digest", "code")
                 # A cell of an earlier command may have had other defaults.
-                latest = (as_text(row["defaults"]), row["setting"], row["origin"], cell)
+                latest = (_as_text(row["defaults"]), row["setting"], row["origin"], cell)
                 query = "UPDATE cells SET defaults = ?, setting = ?, origin = ? WHERE id = ?"
                 self._db.execute(query, latest)
                 asked = {"position": position, "cell": cell, "runs": job.numbers[-1] + 1}
@@ -284,7 +284,7 @@ class Store:
                 WHERE result_id = ? ORDER BY "order\""""
             for part, *data in self._db.execute(query, (row["id"],)):
                 parts[part].append(movement_from(data))
-            rewards = unpack(blob[0], row["trials"]) if blob else np.empty(0)
+            rewards = _unpack(blob[0], row["trials"]) if blob else np.empty(0)
             return Run.from_row(
                 row,
                 cell,
@@ -327,7 +327,7 @@ class Store:
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
         with explain_errors(self.folder):
             for run_id, blob, trials in self._db.execute(query):
-                yield run_id, unpack(blob, trials)
+                yield run_id, _unpack(blob, trials)
 
     # Rows.
 
@@ -338,7 +338,7 @@ class Store:
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
         row = run.to_row()
-        row["cell"] = self._id_of("cells", cell_row(run.cell), "digest", "code")
+        row["cell"] = self._id_of("cells", _cell_row(run.cell), "digest", "code")
         row["environment"] = self._environment(run.outcome.environment or {})
         result = self._insert("results", row)
 
@@ -397,7 +397,7 @@ class Store:
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
-        return int(self._db.execute(text, [*map(as_text, row.values())]).lastrowid or 0)
+        return int(self._db.execute(text, [*map(_as_text, row.values())]).lastrowid or 0)
 
     def _one(self, query: str, *values: object) -> Any:
         """Return the first row of a query, or None."""
@@ -429,13 +429,13 @@ class Store:
                     raise
 
 
-def as_text(value: Any) -> Any:
+def _as_text(value: Any) -> Any:
     """Return a list or a table as JSON, and any other value as it is."""
     is_table = isinstance(value, dict | list | tuple)
     return json.dumps(value, ensure_ascii=False) if is_table else value
 
 
-def cell_row(cell: Cell) -> dict[str, Any]:
+def _cell_row(cell: Cell) -> dict[str, Any]:
     """Return the row of a cell in table ``cells``, without its id."""
     method = cell.method
     return {
@@ -475,13 +475,13 @@ def open_store(folder: Path) -> Iterator[Store]:
             what = f"{folder} is not a results folder: it has no {RUNS_FILE}"
             what = what if os.path.lexists(folder) else f"there is no folder {folder}"
             raise CoarticError(f"{what}{hint}") from None
-        check_files(folder)
+        _check_files(folder)
         opened = connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)
     with closing(opened) as connection:
         with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
             connection.execute("BEGIN")  # all reads of this block see one state
-            if not has_tables(connection):
+            if not _has_tables(connection):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
             with lock(folder, shared=True):  # refused while a process writes
                 pass
@@ -512,11 +512,11 @@ def writing(folder: Path) -> Iterator[Store]:
         make_folder(folder)
     with lock(folder):
         with explain_errors(folder):
-            check_files(folder)
+            _check_files(folder)
             opened = connect(str(folder / RUNS_FILE), WAIT_S)
         with closing(opened) as connection:
             with explain_errors(folder):
-                is_there = has_tables(connection)  # raises before anything is written
+                is_there = _has_tables(connection)  # raises before anything is written
                 # No write-ahead log, which is unsafe on network disks and adds a file.
                 connection.execute("PRAGMA journal_mode = DELETE")
                 if not is_there:
@@ -572,7 +572,7 @@ def connect(where: str, timeout_s: float) -> sqlite3.Connection:
     return connection
 
 
-def check_files(folder: Path) -> None:
+def _check_files(folder: Path) -> None:
     """Raise CoarticError if a file of a results folder is a link, which would make SQLite change
     another file, or no file."""
     for ending in ("", "-journal", "-wal", "-shm"):
@@ -587,7 +587,7 @@ def check_files(folder: Path) -> None:
             )
 
 
-def has_tables(connection: sqlite3.Connection) -> bool:
+def _has_tables(connection: sqlite3.Connection) -> bool:
     """Return True if the file has the tables of coartic, and False if the file is empty.
 
     What other programs add to the file (statistics, indexes, tables, views) is let be, except
@@ -669,7 +669,7 @@ def explain(path: Path, error: Exception) -> str:
         name = getattr(error, "sqlite_errorname", "")
         said = _SENTENCES.get(name, _SENTENCES.get("_".join(name.split("_")[:2]), said))
         if name.startswith("SQLITE_CANTOPEN"):
-            said = why_not_opened(path) or said
+            said = _why_not_opened(path) or said
         if "decode to UTF-8" in said:
             said = _DAMAGED
     else:
@@ -678,7 +678,7 @@ def explain(path: Path, error: Exception) -> str:
     return f"cannot use {plain(str(path))}: {said}"
 
 
-def why_not_opened(path: Path) -> str:
+def _why_not_opened(path: Path) -> str:
     """Return why SQLite cannot open a file, in words; empty if the system would open the file."""
     try:
         path.open("rb").close()
@@ -691,7 +691,7 @@ def why_not_opened(path: Path) -> str:
     return ""
 
 
-def unpack(blob: bytes, trials: int | None) -> Array:
+def _unpack(blob: bytes, trials: int | None) -> Array:
     """Return the rewards of the trials of a run from table ``learning``, shape ``(trials,)``; NaN
     stands for a trial that failed or whose reward is not kept.
 

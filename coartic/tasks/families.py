@@ -67,7 +67,7 @@ _STRUCTURE, _GEOMETRY = 0, 1  # what a block of the generator is for
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
-def in_thousandths(value: float) -> int:
+def _in_thousandths(value: float) -> int:
     """A number of up to three decimals as a whole number of thousandths."""
     if not math.isfinite(value):
         raise PydanticCustomError("finite", "should be a finite number")
@@ -76,18 +76,18 @@ def in_thousandths(value: float) -> int:
     return round(value * _PARTS)
 
 
-Thousandths = Annotated[int, BeforeValidator(in_thousandths)]
+Thousandths = Annotated[int, BeforeValidator(_in_thousandths)]
 """A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
 
 
-def in_order(span: tuple[int, int]) -> tuple[int, int]:
+def _in_order(span: tuple[int, int]) -> tuple[int, int]:
     """The lowest and the highest of some numbers, in this order."""
     if span[0] > span[1]:
         raise PydanticCustomError("order", "should have the lower number first")
     return span
 
 
-_ordered = AfterValidator(in_order)
+_ordered = AfterValidator(_in_order)
 Span = Annotated[tuple[Thousandths, Thousandths], _ordered]
 """From, to; every thousandth between as likely."""
 _Count = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
@@ -95,7 +95,7 @@ _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
 
 
-class Region(FileData):
+class _Region(FileData):
     """Region of the goals: a box, within which a box with a drawn share of its sides is placed."""
 
     x: Span
@@ -106,7 +106,7 @@ class Region(FileData):
     """Share of both sides that an instance's own box has, from, to."""
 
 
-class Alignment(FileData):
+class _Alignment(FileData):
     """Goals on a horizontal or vertical line, but for one that is neither first nor last."""
 
     steps: Span
@@ -164,9 +164,9 @@ class Family(FileData):
     """Bases, in addition to the instance's own, with which every instance can be completed."""
     radius: Thousandths = 100
     """Radius of every goal, length unit."""
-    region: Region
+    region: _Region
     """Region of the goals: table ``[region]``."""
-    line: Alignment | None = None
+    line: _Alignment | None = None
     """Goals on a line: table ``[line]``; scattered over the region where left out."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
     """Starting postures, of which one is drawn: tables ``[[start]]``."""
@@ -247,7 +247,7 @@ def broken_rule(family: Family, task: Task) -> str | None:
     arm is straight at the start, or nearly. ``start-hit``: a hand is in a goal at the start, or
     close by. ``corrective``: the corrective process cannot do the task, under some restriction.
     """
-    goals = [(in_thousandths(x), in_thousandths(y)) for x, y in task.goals]
+    goals = [(_in_thousandths(x), _in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
     if not all(left <= x <= right and low <= y <= high for x, y in goals):
         return "outside"
@@ -259,13 +259,13 @@ def broken_rule(family: Family, task: Task) -> str | None:
     for locked in (task.locked_base, *restricted):
         for hand, goal in itertools.product(family.hands, goals):
             arm = task.robot.arm(hand)
-            shoulder = [in_thousandths(arm.shoulder_x), in_thousandths(arm.shoulder_y)]
+            shoulder = [_in_thousandths(arm.shoulder_x), _in_thousandths(arm.shoulder_y)]
             square = sum((goal[axis] - shoulder[axis]) ** 2 for axis in map("xy".index, locked))
             if square * _PARTS**2 > farthest**2:
                 return "reach"
     for hand in family.hands:
         _, *bends = task.start.left if hand == "left" else task.start.right
-        if max(abs(in_thousandths(angle)) for angle in bends) < family.bent:
+        if max(abs(_in_thousandths(angle)) for angle in bends) < family.bent:
             return "straight"
     near = (family.radius + family.clear) / _PARTS
     for hand, centre in itertools.product(task.hands, task.goals):
@@ -404,7 +404,7 @@ def read_family(path: Path) -> Family:
     try:
         family = Family.model_validate(content | {"name": name})
     except ValidationError as error:
-        keys = [*Family.model_fields, *Region.model_fields, *Alignment.model_fields]
+        keys = [*Family.model_fields, *_Region.model_fields, *_Alignment.model_fields]
         raise TaskError(explain_file(str(path), error, keys)) from None
     if address_of(f"{name}/i000") is None:
         raise TaskError(f"{path}: the name of a family's file is NAME.v1.toml")

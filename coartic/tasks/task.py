@@ -250,7 +250,7 @@ class Task(FileData):
                 )
         for key in self.provenance:
             if key not in Task.model_fields:
-                meant = did_you_mean(key, all_keys())
+                meant = did_you_mean(key, _all_keys())
                 raise sentence_error(f"provenance.{key} is not a key of a task{meant}")
         text = self.initial_hands
         if not self.initial_is_policy:
@@ -269,7 +269,7 @@ class Task(FileData):
                     f"initial_hands {text!r} uses the {hand} hand, which is not among hands"
                 )
         # No model's corrective process ends farther from a goal than its rim (check_task).
-        if info.context != WITHOUT_REACH and (far := out_of_reach(self, self.radius)) is not None:
+        if info.context != WITHOUT_REACH and (far := _out_of_reach(self, self.radius)) is not None:
             raise sentence_error(far)
         return self
 
@@ -348,7 +348,7 @@ def check_hands(task: Task, hands: str) -> str:
     return hands
 
 
-def out_of_reach(task: Task, tolerance: float) -> str | None:
+def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Name the first goal that no hand, or not the initial one, can hit; None if all can be hit.
 
     ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
@@ -394,7 +394,7 @@ def check_task(task: Task, model: MotionModel = PAPER) -> Task:
     except ValueError as error:
         raise TaskError(f"task {task.name!r}: {error}") from None
     _, tolerance = model.tolerances(task.radius)
-    problem = out_of_reach(task, tolerance)
+    problem = _out_of_reach(task, tolerance)
     if problem is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
     return task
@@ -438,10 +438,10 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
-        raise TaskError(explain_file(source, error, all_keys())) from None
+        raise TaskError(explain_file(source, error, _all_keys())) from None
 
 
-def all_keys() -> list[str]:
+def _all_keys() -> list[str]:
     """All keys of a task file, whatever table they belong to."""
     robot = [field.name for field in fields(Robot)]
     others = (*Start.model_fields, *robot, *Provenance.model_fields)
@@ -454,21 +454,23 @@ def task_text(task: Task) -> str:
     tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
     if task.robot == Robot():
         del tables["robot"]
-    lines = [f"{key} = {toml_value(value)}" for key, value in content.items()]
+    lines = [f"{key} = {_toml_value(value)}" for key, value in content.items()]
     for key, table in tables.items():
         if table:
             lines += [
                 "",
                 f"[{key}]",
-                *(f"{k} = {toml_value(v)}" for k, v in table.items() if v is not None),
+                *(f"{k} = {_toml_value(v)}" for k, v in table.items() if v is not None),
             ]
     return "\n".join(lines) + "\n"
 
 
-def toml_value(value: Any) -> str:
+def _toml_value(value: Any) -> str:
     """A value as TOML writes it; strings as JSON does, of printable characters."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {toml_value(item)}" for key, item in value.items()) + " }"
+        return (
+            "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
+        )
     if isinstance(value, list):
-        return "[" + ", ".join(map(toml_value, value)) + "]"
+        return "[" + ", ".join(map(_toml_value, value)) + "]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
