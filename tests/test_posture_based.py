@@ -9,8 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from coartic import load_task
-from coartic.baselines.posture_based import OneGoal, TwoGoals
-from coartic.method import MethodError
+from coartic.baselines.posture_based import OneGoal, PosturePlanner, TwoGoals
+from coartic.method import MethodError, Session
 from tests.support.strategies import least_cost, solve, tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
@@ -97,6 +97,22 @@ def test_looking_ahead_takes_the_other_hand_where_that_pays():
     reached = right + (ticks(math.radians(40)) - 1) * STEP
     assert one.details["expected_ticks"] == [ticks(math.radians(40)), ticks(reached)]
     assert -sum(two.details["expected_ticks"]) == execution.reward
+
+
+def test_the_most_promising_pair_is_the_cheapest_of_all():
+    """The arm that the second posture does not use stays where the first has it."""
+    task, rng = bent(goals=[[5.0, 1.0], [4.0, 2.5]]), np.random.default_rng(0)
+    session = Session(task, 0, TwoGoals.information, trusted=True)
+    planner = PosturePlanner(session, TwoGoals.Parameters(**QUICK), 2)
+    layers = [task.q0 + rng.normal(size=(12, 10)) for _ in range(2)]
+    every = [np.array([first, [*second[:6], *first[6:]]])
+             for first, second in itertools.product(*layers)]  # fmt: skip
+
+    def cost(pair):
+        return np.linalg.norm(np.diff(np.vstack([task.q0, pair]), axis=0), axis=1).sum()
+
+    found = planner.most_promising(("right", "left"), layers)
+    assert cost(found) == pytest.approx(min(map(cost, every)))
 
 
 @pytest.mark.parametrize("locked", [["x", "y"], ["y"], ["x"]])
