@@ -38,7 +38,7 @@ def test_searches_keep_the_other_arm_still():
 
 
 def test_the_base_is_locked_beside_the_task():
-    task = tiny_task(locked_base=["x"], goals=[[4.5, 0.1]], initial_hands="R")
+    task = tiny_task(locked_base=["x"], goals=[[4.5, 0.1]])
     assert with_locks(task, "task") == task
     assert with_locks(task, "y").locked_base == ("x", "y")
     with pytest.raises(MethodError, match="out of reach") as caught:

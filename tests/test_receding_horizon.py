@@ -2,13 +2,12 @@
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from coartic import PAPER, Robot, load_task
+from coartic import PAPER, load_task
 from coartic.baselines.optimum import OptimumSearch
 from coartic.baselines.receding_horizon import RecedingHorizon
 from tests.support.processes import apart
@@ -25,12 +24,6 @@ def solved(task, method=RecedingHorizon, **parameters):
     return solve(method, task, **{**FEW, **parameters})[:2]
 
 
-@cache
-def planned(name, **parameters):
-    """The same on a task by its name, once for all tests."""
-    return solved(load_task(name), nodes=100, **parameters)
-
-
 def in_threads():
     """Targets of plans that threads make at once; a crash of IPOPT would end the process."""
     tasks = list(map(load_task, ["ascending", "descending", "two-armed/v1/d006"])) * 2
@@ -44,7 +37,7 @@ def test_plans_are_those_of_one_thread_in_several():
     together, half = apart(in_threads), 3
     assert together[:half] == together[half:]
     for name, plan in zip(("ascending", "descending"), together, strict=False):
-        alone = solved(load_task(name), nodes=20)[0].solution
+        alone = solved(name, nodes=20)[0].solution
         assert plan == [movement.target.tobytes() for movement in alone]
 
 
@@ -65,9 +58,8 @@ def test_with_all_goals_in_view_it_is_the_search_for_the_optimum(name):
 
 def planar_task(**changes):
     """A short arm of two links on a fixed base, whose other arm has nothing to do."""
-    robot = Robot(right_links=(1.0, 0.8))
     content = {
-        "robot": {"right_links": list(robot.right_links)},
+        "robot": {"right_links": [1.0, 0.8]},
         "start": {"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.4, 0.9]},
         "goals": [[1.4, 1.3], [-0.6, 1.0]],
         "hands": ["right"],
@@ -102,7 +94,7 @@ def test_without_look_ahead_each_goal_is_reached_the_shortest_way(goals):
 def test_each_movement_is_the_first_of_a_plan_with_the_next_goal():
     """One goal ahead, four goals: from where it stands, by brute force over pairs of postures."""
     goals = [[1.4, 1.3], [-0.6, 1.0], [0.9, 1.1], [1.6, 0.6]]
-    task = planar_task(goals=goals, initial_hands="RRRR")
+    task = planar_task(goals=goals)
     result, execution = solved(task, horizon=1)
     assert result.details["windows"] == 3  # the last reaches the last goal
     reached = [task.q0[-2:], *execution.configurations[:, -2:]]
@@ -115,10 +107,11 @@ def test_each_movement_is_the_first_of_a_plan_with_the_next_goal():
 
 
 def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view():
+    """The shortest starts are polished: of one graph's chains one has the best hands already."""
     rewards = {horizon: [] for horizon in (0, 1, 9)}
     for name in INSTANCES:
         for horizon, of_horizon in rewards.items():
-            result, execution = planned(name, horizon=horizon)
+            result, execution = solved(name, nodes=100, horizon=horizon)
             of_horizon.append(execution.reward)
             assert execution.corrections == 0
             rounded = execution.ticks - result.details["path_length"] / PAPER.step
@@ -127,8 +120,5 @@ def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view()
     assert gaps[0] > gaps[1] > 0
     # By luck of rounding it may be a tick better.
     assert all(np.array(rewards[9]) >= np.array(rewards[0]) - 1)
-
-
-def test_the_shortest_starts_are_polished():
-    """Of one graph's chains one has the best hands already."""
-    assert planned("two-armed-2", horizon=3, starts=1)[1].hands == "RLRR"
+    task = load_task("two-armed-2")
+    assert solved(task, nodes=100, horizon=3, starts=1)[1].hands == "RLRR"

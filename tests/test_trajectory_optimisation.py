@@ -34,38 +34,28 @@ def small_task(**change):
         "robot": SMALL,
         "start": {"base": (0.0, 0.0), "left": (1.5,), "right": (0.4, 0.3)},
         "goals": ((2.6, 1.0), (3.2, -0.4)),
-        "initial_hands": "RR",
     }
-    return Task(**{**content, **change})
-
-
-def changes(task, configurations):
-    return np.diff(np.vstack([task.q0, configurations]), axis=0)
+    content.update(change)
+    content.setdefault("initial_hands", "R" * len(content["goals"]))
+    return Task(**content)
 
 
 def polynomial(order, start, end, time):
-    """Coefficients of the one polynomial with these derivatives at both ends."""
-    size = 2 * order
-    rows = []
-    for at in (0.0, time):
-        for d in range(order):
-            rows.append([math.perm(k, d) * (at ** (k - d) if k >= d else 0.0) for k in range(size)])
-    return np.linalg.solve(rows, [*start, *end])
+    """The one polynomial with these derivatives at both ends."""
+    powers = [np.polynomial.Polynomial.basis(k) for k in range(2 * order)]
+    rows = [[power.deriv(d)(at) for power in powers] for at in (0.0, time) for d in range(order)]
+    return np.polynomial.Polynomial(np.linalg.solve(rows, [*start, *end]))
 
 
 @pytest.mark.parametrize("cost", ["acceleration", "jerk"])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_segment_costs_are_the_integrals(cost, seed):
     rng = np.random.default_rng(seed)
     order, time = ORDERS[cost], rng.uniform(0.3, 3.0)
     start, end = rng.normal(size=order), rng.normal(size=order)
-    k = polynomial(order, start, end, time)
-    derivative = np.polynomial.Polynomial(k).deriv(order)
-    expected = (derivative**2).integ()(time)
-    step, rates = (
-        casadi.DM(end[0] - start[0]),
-        [(casadi.DM(a), casadi.DM(b)) for a, b in zip(start[1:], end[1:], strict=True)],
-    )
+    expected = (polynomial(order, start, end, time).deriv(order) ** 2).integ()(time)
+    step = casadi.DM(end[0] - start[0])
+    rates = [(casadi.DM(a), casadi.DM(b)) for a, b in zip(start[1:], end[1:], strict=True)]
     assert float(segment_cost(cost, step, time, rates)) == pytest.approx(expected, rel=1e-9)
 
 
@@ -86,10 +76,10 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     plan = problem.solve(instance, chain)
     assert plan.converged, plan.reason
     free, square = ~instance.held, cost == "squared-displacement"
-    start = changes(task, chain)[free]
+    start = np.diff(np.vstack([task.q0, chain]), axis=0)[free]
     start += 0.1 * np.random.default_rng(1).standard_normal(start.shape)
     least = least_cost(task, hands, free, [start], radius=task.radius, square=square)
-    moved = changes(task, plan.configurations)
+    moved = np.diff(np.vstack([task.q0, plan.configurations]), axis=0)
     squares = (moved**2).sum(axis=1)
     assert plan.cost <= least + 1e-5
     assert plan.cost == pytest.approx((squares if square else np.sqrt(squares)).sum(), abs=1e-5)
@@ -109,21 +99,16 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost):
     assert plan.converged
     assert plan.durations.sum() == pytest.approx(4.0)
     assert not np.allclose(plan.durations, 1.0)
-    pieces = spline(plan, 400)
-    for goal, (piece, hand) in enumerate(zip(pieces, hands, strict=True)):
-        assert piece[-1] == pytest.approx(plan.configurations[goal], abs=1e-9)
-        miss = task.robot.forward_kinematics(piece[-1], hand) - task.goals[goal]
-        assert np.hypot(*miss) <= 0.09
-    path = [task.q0[None], *pieces]
-    assert np.abs(path[1][0] - task.q0).max() < 1e-3
     # Integrated by differences, the cost is the plan's.
-    order, total = ORDERS[cost], 0.0
-    for goal, (piece, hand) in enumerate(zip(pieces, hands, strict=True)):
-        points = np.vstack([path[goal][-1], piece])
-        of_hand = task.robot.forward_kinematics(points, hand)
+    order, total, end = ORDERS[cost], 0.0, task.q0
+    for goal, (piece, hand) in enumerate(zip(spline(plan, 400), hands, strict=True)):
+        points, end = np.vstack([end, piece]), piece[-1]
+        places = task.robot.forward_kinematics(points, hand)
+        assert end == pytest.approx(plan.configurations[goal], abs=1e-9)
+        assert np.hypot(*(places[-1] - task.goals[goal])) <= 0.09
         parts = [(1.0, points)]
         if cost == "hand-jerk":
-            parts = [(1.0, of_hand), (JOINT_WEIGHT, points)]
+            parts = [(1.0, places), (JOINT_WEIGHT, points)]
         h = plan.durations[goal] / 400
         for weight, each in parts:
             total += weight * ((np.diff(each, n=order, axis=0) / h**order) ** 2).sum() * h
@@ -161,12 +146,12 @@ def test_a_full_stop_at_each_goal_costs_as_independent_reaches_do(cost):
     lengths, times = plan.lengths(), plan.durations
     assert plan.cost == pytest.approx((factor * lengths**2 / times**power).sum(), rel=1e-9)
     assert plan.cost > 2 * planned(cost, task).cost
-    corners = np.vstack([task.q0, plan.configurations])
-    for piece, begin, end, length in zip(
-        spline(plan, 50), corners[:-1], corners[1:], lengths, strict=True
-    ):
-        along = (piece - begin) @ (end - begin) / length**2
-        np.testing.assert_allclose(piece, begin + along[:, None] * (end - begin), atol=1e-9)
+    begin = task.q0
+    for piece, length in zip(spline(plan, 50), lengths, strict=True):
+        way = piece[-1] - begin
+        along = (piece - begin) @ way / length**2
+        np.testing.assert_allclose(piece, begin + along[:, None] * way, atol=1e-9)
+        begin = piece[-1]
     longer = times > 0.06  # than the least time, which binds where one posture hits two goals
     savings = power * (lengths**2 / times ** (power + 1))[longer]
     np.testing.assert_allclose(savings, savings.mean(), rtol=1e-3)
@@ -216,7 +201,7 @@ def test_whole_ticks_are_what_is_executed():
 
 
 def test_goals_that_one_posture_hits_are_merged_in_every_way():
-    task = small_task(goals=((2.6, 1.0), (2.65, 1.05), (2.6, 1.1)), initial_hands="RRR")
+    task = small_task(goals=((2.6, 1.0), (2.65, 1.05), (2.6, 1.1)))
     instance = Instance.of(task, ("right",) * 3, still=True, radius=task.radius)
     problem = trajectory_problem(task.robot, task.hands, 3, "path-length")
     plan = problem.solve(instance, corrective_trial(task, "RRR").configurations)
@@ -243,7 +228,6 @@ def test_joints_and_rates_that_are_held():
         (free, True, [False] * 5),
     ):
         plan = problem.solve(instance, start, stops=stops)
-        assert (plan.converged, plan.rates.shape) == (True, (1, 3, 5))
         assert (plan.rates[0] != 0.0).tolist() == [[False] * 5, passing, [False] * 5]
     alone = Instance.of(load_task("ascending"), ("right",) * 3, still=False, radius=0.1)
     assert alone.held[0].tolist() == [False, False, *[True] * 4, *[False] * 4]
@@ -269,7 +253,7 @@ def test_the_rest_of_a_piece_lies_ahead():
 
 def test_of_too_many_hand_sequences_a_beam_is_planned():
     """As many as are asked for, as if all were; all where there are no more."""
-    task = small_task(goals=((2.6, 1.0), (3.2, -0.4), (1.2, 1.4)), initial_hands="RRR")
+    task = small_task(goals=((2.6, 1.0), (3.2, -0.4), (1.2, 1.4)))
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}
     for most in (3, 8, 64):

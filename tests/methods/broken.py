@@ -2,7 +2,6 @@
 
 import random
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 from pydantic import ConfigDict
@@ -170,18 +169,6 @@ class Outsider(Good):
             own = Session(task, 0, Information)
             own.trial(by_correction(session, ["right"] * 3))
             own.trials("RRR", np.zeros((3, 3, own.dof)))
-        elif self.parameters.means == "hands":
-            coartic.corrective_trial(task, "RRR")
-        elif self.parameters.means == "path":
-            alone = coartic.corrective_trial(task, "RRR")
-            path = [replace(m, kind="path", waypoints=[m.target]) for m in alone.movements]
-            coartic.trajectory(task, path)
-        elif self.parameters.means == "environment":
-            from coartic.gym import TaskEnv
-
-            env = TaskEnv(task)
-            env.reset()
-            env.step(env.action_space.sample())
         elif self.parameters.means == "environments in a thread":
             from coartic.gym import TaskVectorEnv
 

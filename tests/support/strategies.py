@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 from coartic import PAPER, Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
 from coartic.method import Session
 from coartic.optimisers import OPTIMISER_INFORMATION
+from coartic.tasks.catalogue import as_task
 from coartic.tasks.optima import entries
 
 PAPER_CELLS = [
@@ -41,14 +42,15 @@ def posture(x=0.0, y=0.0, **joints):
 
 
 def tiny_task(**changes):
-    """A two-goal task for the paper's robot; keyword arguments replace its keys."""
+    """A two-goal task for the paper's robot, whose initial hands are right ones; keyword arguments
+    replace its keys."""
     content = {
         "name": "tiny",
         "goals": [[5.0, 1.0], [5.0, 2.0]],
-        "initial_hands": "RR",
         "start": {"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.0] * 4},
     }
     content.update(changes)
+    content.setdefault("initial_hands", "R" * len(content["goals"]))
     return parse_task({key: value for key, value in content.items() if value is not None}, "tiny")
 
 
@@ -73,7 +75,7 @@ def metres_task(radius=0.01, **changes):
             "robot": {**robot, "right_shoulder": place},
             "start": {"base": place, "left": [0.0], "right": [1.047, 1.047]},
             "hands": ["right"], "radius": radius, "locked_base": ["x", "y"],
-            "goals": [[0.13, 0.42], [0.2, 0.35], [0.05, 0.45]], "initial_hands": "RRR",
+            "goals": [[0.13, 0.42], [0.2, 0.35], [0.05, 0.45]],
             **changes,
         }
     )  # fmt: skip
@@ -106,9 +108,10 @@ def sample(task, count, noise=0.3, seed=0):
 
 
 def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):
-    """What a method of this project finds, the execution of it, and the session."""
+    """What a method of this project finds on a task or its name, the execution of it, and the
+    session."""
     options = {"trial_budget": budget, "model": model, "trusted": True}
-    session = Session(task, seed, method.information, **options)
+    session = Session(as_task(task), seed, method.information, **options)
     result = method(method.Parameters(**parameters)).solve(session)
     return result, execute(task, result.solution), session
 
