@@ -215,8 +215,8 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
-    """Return a method's result as plain data. Raises SolutionError for a result that cannot be
-    stored."""
+    """Check a method's result, and return its movements and details as keywords of
+    :class:`Outcome`. Raises SolutionError for a result that cannot be stored."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     try:

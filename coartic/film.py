@@ -100,11 +100,8 @@ def check_film(path: Path, *, replace: bool = False) -> None:
 
 
 def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
-    """Draw what moves in one picture.
-
-    Returns a function that shows the state at a row of the movement, or at its last one: artists
-    are updated, never drawn again.
-    """
+    """Draw goals, robot, traces and the counter of ticks, and return a function that shows them at
+    a row of the movement, past its end at the last: artists are updated, never drawn again."""
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
     traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}

@@ -247,7 +247,11 @@ class TaskVectorEnv(Recorded, VectorEnv):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin all trials, with a seed for each robot, or for the first, which others follow."""
+        """Begin all trials, and return observations and infos.
+
+        ``seed``: a seed for each robot, or one, from which robot i has ``seed + i``; None keeps the
+        generators. There are no options.
+        """
         _check_no_options(options)
         if isinstance(seed, Iterable):
             seeds = [*map(_whole_seed, seed)]

@@ -395,7 +395,8 @@ class Objective:
         return costs
 
     def _evaluate(self, points: Array, codes: Hands | None, costs: Array) -> None:
-        """Fill in the costs of points, and note the best one."""
+        """Make a trial for each point, write its cost into ``costs``, count it, and note each new
+        best."""
         codes, targets = self._trials_of(points, codes)
         made = self._session.make_trials(codes, targets)
         np.minimum(-made.rewards, FAILED, out=costs)

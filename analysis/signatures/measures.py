@@ -150,7 +150,8 @@ class Signature:
 
 
 def hand(runs: Solutions) -> Array:
-    """Return 1 − mean over g < G of a(i, g), for a(i, g) of :func:`as_in_isolation`."""
+    """Return, for each run, the share of goals before the last whose hand is not the fastest for
+    that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`."""
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 

@@ -114,7 +114,7 @@ class TwoContexts:
 
     @property
     def in_both(self) -> bool:
-        """True if both contexts have runs that hit the goal with the hand."""
+        """True if each context has a run that hits ``goal`` with ``hand``."""
         return all(map(len, self.configurations))
 
     @property

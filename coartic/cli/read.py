@@ -58,14 +58,16 @@ def report(
 
 
 def say_ranking(study: Study, *more: tuple[str, str]) -> None:
-    """Print the first ten rows of the ranking, coarticulation and cost in a line each, the failed
-    runs, and further pairs of word and text."""
-    from coartic.analysis.report.about import finding, limits
+    """Print ten rows of the ranking, the nearest methods with the learner and random search,
+    coarticulation and cost in a line each, the failed runs, and further pairs of word and text."""
+    from coartic.analysis.report.about import finding, leading, limits
     from coartic.analysis.sections import SECTIONS, TABLES
     from coartic.analysis.words import interval, number
 
     rows = TABLES["ranking"](study).dropna(subset="gap")
-    rows = rows[~rows.method.isin(study.methods.index[study.methods.under != ""])].head(10)
+    rows = rows[~rows.method.isin(study.methods.index[study.methods.under != ""])]
+    named = [row["method"] for row in leading(rows)]
+    rows = rows[rows.method.isin([*rows.method[: 12 - len(named)], *named])]
     say_table(
         ("method", "gap (%)", "share of the gain (%)", "runs"),
         [
@@ -135,7 +137,7 @@ def cite(
         bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
     ] = False,
 ) -> None:
-    """Print what to cite, as BibTeX."""
+    """Print BibTeX for coartic, the paper and the methods of a folder."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
     from coartic.runs.store import open_store

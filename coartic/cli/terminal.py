@@ -100,7 +100,8 @@ class Display:
         print(end=self._end, file=sys.stderr, flush=True)
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress, and the task and method of the last run."""
+        """Show the progress and the last run; before the first run (``cell`` None) what the folder
+        holds already."""
         from coartic.analysis.methods import title_of
 
         self.done, total = progress.done, progress.total

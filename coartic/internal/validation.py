@@ -49,8 +49,7 @@ _LISTS = {
 
 
 def in_sentences(kind: type[T]) -> type[T]:
-    """The class itself, which raises ValueError in sentences where it is called with what it does
-    not take."""
+    """Decorate a pydantic class: wrong arguments raise ValueError with a sentence."""
     init: Any = kind.__init__
 
     @wraps(init)

@@ -134,7 +134,7 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """The values of ``drift``."""
+        """``drift`` as a tuple, also where it is one number."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property

@@ -263,7 +263,8 @@ def are_near(at: Any, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Forward kinematics of every slot, by these functions."""
+    """Return a function that sets x and y of the first slots by forward kinematics, with this
+    cosine and sine."""
 
     @inner
     def chains(at: Any, count: int) -> None:

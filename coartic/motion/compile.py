@@ -250,7 +250,8 @@ def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
 
 
 def _cache_folder() -> Path | None:
-    """Return a writable folder for compiled code, or None if no folder is writable."""
+    """Create the folder for compiled code of these sources, remove folders of other sources, and
+    return it; None if no folder is writable."""
     roots, chosen = [PACKAGE / "__pycache__"], import_numba().config.CACHE_DIR
     if Path(chosen).is_absolute():  # or it would change with where one stands
         roots.insert(0, Path(chosen) / "coartic")

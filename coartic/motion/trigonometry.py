@@ -52,7 +52,7 @@ def _reduced(angle: float) -> tuple[float, float, int]:
 
 @scalar
 def near_cosine(angle: float) -> float:
-    """cos(angle) for |angle| < LARGEST, without a branch."""
+    """Return cos(angle), the same bits on every system, for |angle| < :data:`LARGEST` (1e5 rad)."""
     sin, cos, quarter = _reduced(angle)
     value: float = sin if quarter & 1 else cos
     return -value if (quarter + 1) & 2 else value

@@ -68,7 +68,8 @@ _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
 def _in_thousandths(value: float) -> int:
-    """A number of up to three decimals as a whole number of thousandths."""
+    """Convert a number to thousandths. Raises a validation error unless it is finite, with at most
+    three decimals."""
     if not math.isfinite(value):
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:

@@ -349,7 +349,7 @@ def check_hands(task: Task, hands: str) -> str:
 
 
 def _out_of_reach(task: Task, tolerance: float) -> str | None:
-    """Name the first goal that no hand, or not the initial one, can hit; None if all can be hit.
+    """Return a sentence on the first goal that no hand, or not its initial hand, can hit, or None.
 
     ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
     length unit.
