@@ -72,7 +72,7 @@ def title_of(method: str, setting: str = "") -> str:
 
 
 def _setting_in_words(setting: str) -> str:
-    """Write the parameters of a setting, ``noise_sd=0.1, stop=1``, for people: ``σ 0.1, stop 1``."""
+    """Write the parameters of a setting, ``noise_sd=0.1``, for people: ``σ 0.1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = [
         _WORDS[key] + value if key in _WORDS else key + is_ + value for key, is_, value in pairs

@@ -189,12 +189,12 @@ def draw_ranking(study: Study) -> Parts | None:
     axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
     axes.axvline(0, **style.OPTIMUM)
     style.name_rows(axes, [name_in_figure(study, line) for line in lines])
-    beside: Any = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
-    beside |= {"va": "center_baseline"}
+    places: Any = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
+    places |= {"va": "center_baseline"}
 
     def write_right(y: int, gap: str, n: str, color: str) -> None:
-        axes.annotate(gap, (1, y), (8, 0), color=color, **beside)
-        axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **beside)
+        axes.annotate(gap, (1, y), (8, 0), color=color, **places)
+        axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **places)
 
     if not style.is_narrow():
         write_right(1, f"gap (%) [{style.COVERAGE}]", "n", style.GREY)

@@ -16,14 +16,14 @@ LISTING = ".coartic-files"
 
 def write_atomically(path: Path, data: bytes) -> None:
     """Write a file so that it is there whole or not at all. Raises OSError."""
-    beside = path.with_name(f".coartic-{os.getpid()}-{path.name}")
+    part = path.with_name(f".coartic-{os.getpid()}-{path.name}")
     try:
-        beside.unlink(missing_ok=True)
-        with beside.open("xb") as file:  # which follows no link
+        part.unlink(missing_ok=True)
+        with part.open("xb") as file:  # which follows no link
             file.write(data)
-        os.replace(beside, path)
+        os.replace(part, path)
     finally:
-        beside.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
