@@ -367,8 +367,8 @@ class Session:
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
-        """Run the corrective process (**A**) from ``q`` with a hand for goal ``goal`` (from 1); count
-        its iterations, Jacobians and forward-kinematics evaluations."""
+        """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1); count its
+        iterations, Jacobians and forward-kinematics evaluations."""
         self._use(Information.CORRECTIVE_PROCESS)
         if not 1 <= goal <= self.goals_count:
             raise ValueError(f"goal {goal}: goals are numbered 1 to {self.goals_count}")

@@ -78,30 +78,22 @@ def declared(title, citation, origin="built in"):
 def test_each_work_once_with_the_methods_that_rest_on_it():
     text = bibliography({m.name: declared(m.title, m.citation) for m in BUILT_IN})
     keys = keys_in(text)
-    assert len(keys) == len(set(keys))
-    assert set(keys) == {"coartic", *BIB} - set(STATISTICS)
     assert keys[:2] == ["coartic", THE_PAPER]
+    assert sorted(keys) == sorted({"coartic", *BIB} - {*STATISTICS})
     both = "% cma-es/bandit, cma-es/goal-by-goal"
     assert f"{both}\n{references()['hansen2016']}\n" in text
     assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", THE_PAPER, *STATISTICS}
 
 
 def test_methods_of_others_cite_themselves():
-    text = bibliography(
-        {
-            "cma-es/bold": declared(
-                "Bold & fast", "A. B. C_d (2020), me@here, 5 %\n of {x}.", "mine.py"
-            ),
-            "lab/silent": declared("Silent", "", "mine.py"),
-            "dual-process/EC9": declared("Of another version", "Ours (2030)."),
-        }
-    )
+    text = bibliography({
+        "cma-es/bold": declared("Bold & fast", "A. B. C_d, me@here, 5 %\n of {x}.", "mine.py"),
+        "lab/silent": declared("Silent", "", "mine.py"),
+        "dual-process/EC9": declared("Of another version", "Ours (2030)."),
+    })  # fmt: skip
     assert keys_in(text) == ["coartic", THE_PAPER, "method-cma-es-bold", "method-dual-process-ec9"]
-    assert (
-        r"  note = {A. B. C\_d (2020), me@here, 5 \% of "
-        r"\textbraceleft{}x\textbraceright{}.}," in text
-    )
-    assert r"  title = {Bold \& fast}," in text
+    note = r"A. B. C\_d, me@here, 5 \% of \textbraceleft{}x\textbraceright{}."
+    assert f"  note = {{{note}}}," in text
     assert "% dual-process/EC9 cites: Ours (2030).\n" in text
     assert "% lab/silent: it declares no citation; ask its authors what to cite\n" in text
     comments = re.findall("^%.*", text, re.MULTILINE)
@@ -110,16 +102,12 @@ def test_methods_of_others_cite_themselves():
 
 def test_command(tmp_path, coartic):
     methods = registry([BROKEN])
-    cells = [
-        cell_on(load_task("ascending"), methods[name])
-        for name in ("corrective-alone/given", "test/good")
-    ]
+    names = "corrective-alone/given", "test/good"
+    cells = [cell_on(load_task("ascending"), methods[name]) for name in names]
     run_and_write(tmp_path / "results", cells, runs=1)
     commit = '{"id": "0123456789abcdef", "dirty": true}'
     change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
     edit_plan(tmp_path / "results", change, commit)
-    code, text, _ = coartic("cite", tmp_path / "results")
-    assert code == 0
+    text = coartic("cite", tmp_path / "results")[1]
     assert ", commit 0123456789abcdef with changes}," in text
     assert keys_in(text) == ["coartic", THE_PAPER, "whitney1969", "method-test-good"]
-    assert "% the paper, corrective-alone/given\n" in text

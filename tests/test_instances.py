@@ -9,23 +9,6 @@ from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics.instances import other_tasks, task_mean
 
 
-def simulated(rng, instances, runs, *, between=0.1, within=0.05, mean=0.3):
-    """Scores of one method: instances vary about the mean, runs about their instance."""
-    centres = rng.normal(mean, between, instances)
-    return [rng.normal(centre, within, runs) for centre in centres]
-
-
-def test_the_interval_speaks_about_other_tasks():
-    """It covers the mean of the distribution that instances are drawn from, at its level."""
-    rng = np.random.default_rng(1)
-    covered = 0
-    for _ in range(150):
-        interval = other_tasks({f: simulated(rng, 8, 10) for f in "ab"})
-        covered += interval.low <= 0.3 <= interval.high
-    # A percentile interval of 2 x 8 instances; 0.95 ± 3 standard errors, and short by a little.
-    assert 0.895 <= covered / 150 <= 0.985
-
-
 def test_width_of_the_interval():
     """The root of the variance of instances over their number, twice 1.96 times."""
     centres = np.linspace(-1, 1, 40)

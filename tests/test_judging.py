@@ -2,19 +2,17 @@
 
 import pytest
 
-from coartic.analysis.judging import Finding, judge
-from coartic.estimates import Estimate
+from coartic.analysis.judging import all_of, judge
+from tests.support.made_up import found
 
 NAN = float("nan")
 
 
-def found(holds, *p, against=None, n=20):
-    """A finding with tests of these p-values."""
-    tests, contrary = (
-        None if each is None else tuple(Estimate(1.0, p=p, n=(n,), resamples=9_999) for p in each)
-        for each in (p, against)
-    )
-    return Finding(holds, "planted", tests, contrary)
+def test_opposites_of_joined_findings_are_those_of_all_or_none():
+    """An exact test has its opposite with it, other tests have it in their other tail."""
+    own, tail = found(False, 0.7, against=[0.01]), found(False, 0.99)
+    assert all_of(own, own).against == own.against * 2
+    assert all_of(own, tail).against is None
 
 
 def judged(*findings):
@@ -25,16 +23,12 @@ def judged(*findings):
 @pytest.mark.parametrize(
     ("finding", "verdict"),
     [
-        (found(True, 0.001), "supported"),
         (found(True), "supported"),
         (found(True, NAN), "supported"),  # no spread, no doubt
         (found(True, NAN, n=1), "undecided"),  # one value decides nothing
-        (found(True, 0.2), "undecided"),
         (found(True, 0.001, 0.2), "undecided"),
-        (found(False, 0.7), "undecided"),
         (found(False, 0.97), "not supported"),
         (found(False, 0.94), "undecided"),
-        (found(False, 0.001, 0.99), "not supported"),
         (found(False, 0.5, 0.97), "undecided"),  # the contrary of one of two
         (found(False, 0.7, against=[0.01]), "not supported"),
         (found(False, 0.7, against=[0.06]), "undecided"),
@@ -56,9 +50,7 @@ def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
 
 
 def test_opposites_are_corrected_over_the_claims_too():
-    findings = [found(False, p) for p in (0.96, 0.975, 0.999)]
-    opposite = [finding.opposite_p for finding in findings]
-    assert opposite == pytest.approx([0.0401, 0.0251, 0.0011])
-    entries = judged(*findings)
+    """Of p of the opposites 0.0401, 0.0251 and 0.0011."""
+    entries = judged(*(found(False, p) for p in (0.96, 0.975, 0.999)))
     assert entries.verdict.tolist() == ["undecided", "undecided", "not supported"]
     assert entries.opposite_p_holm.tolist() == pytest.approx([0.0502, 0.0502, 0.0033])

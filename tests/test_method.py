@@ -17,7 +17,7 @@ BLIND = frozenset({Information.REWARD_BY_TRIAL})
 def test_a_budget_that_ends_within_a_batch():
     task = load_task("two-armed-2")
     hands, targets = sample(task, 10)
-    unlimited = Session(task, 0, OPTIMISER_INFORMATION).trials(hands, targets)
+    unlimited = make_trials(task, hands, targets)
     session = Session(task, 0, OPTIMISER_INFORMATION, trial_budget=7)
     assert len(session.trials(hands[:4], targets[:4]).ticks) == 4
     rest = session.trials(hands[4:], targets[4:])
@@ -32,16 +32,12 @@ def test_a_method_without_the_corrective_process_does_not_see_it():
     task = load_task("ascending")
     hands, targets = sample(task, 3)
     session = Session(task, 0, BLIND)
-    blind, information = (
-        session.trials(hands, targets),
-        Session(task, 0, OPTIMISER_INFORMATION).trials(hands, targets),
-    )
-    np.testing.assert_array_equal(blind.rewards, information.rewards)
-    assert information.corrections.sum() > 0
+    blind, seen = session.trials(hands, targets), make_trials(task, hands, targets)
+    np.testing.assert_array_equal(blind.rewards, seen.rewards)
+    assert seen.corrections.sum() > 0
     hidden = (blind.corrections, blind.iterations, blind.targets, blind.reached)
     assert [len(field) for field in hidden] == [0] * 4
-    solution = movements_of(hands[0], targets[0])
-    single = session.trial(solution)
+    single = session.trial(movements_of(hands[0], targets[0]))
     assert (single.reward, len(single.configurations)) == (blind.rewards[0], 0)
     assert [movement.ticks for movement in single.movements] == [None] * 3
     targets[1, 2] = np.nan
@@ -65,7 +61,6 @@ def test_what_was_given_is_left_alone():
     [
         ("ascending", "RRR", (3, 10), 0.0, "have shape"),
         ("ascending", ["RRR", ["R", "R", "R"]], (2, 3, 10), 0.0, "do not fit"),
-        ("ascending", ["RRR", "RR"], (2, 3, 10), 0.0, "do not fit"),
         ("ascending", ["RRR"], (2, 3, 10), 0.0, "hand"),
         ("ascending", np.zeros((2, 3), int), (2, 3, 10), 0.0, "hand"),
         ("ascending", "RRR", (1, 3, 9), 0.0, "have shape"),
@@ -79,20 +74,15 @@ def test_trials_that_cannot_be_made(name, hands, shape, value, message):
 
 
 def test_a_target_that_is_far_away_fails_its_trial_alone():
-    task, rng = load_task("two-armed-2"), np.random.default_rng(0)
+    task = load_task("two-armed-2")
     hands, targets = sample(task, 12)
     targets[:, 2, 3:6] = np.nan
-    session, others = (
-        Session(task, 0, OPTIMISER_INFORMATION),
-        Session(task, 0, OPTIMISER_INFORMATION),
-    )
+    session, others = (Session(task, 0, OPTIMISER_INFORMATION) for _ in range(2))
     far = np.isin(np.arange(12), [0, 5, 11])
     given = targets.copy()
-    given[far, rng.integers(4, size=3), rng.integers(6, 10, size=3)] = [1.1e5, -3e5, 1e300]
+    given[far, [0, 3, 1], [6, 9, 7]] = [1.1e5, -3e5, 1e300]
     trials = session.trials(hands, given)
-    due = others.trials(
-        [each for each, is_far in zip(hands, far, strict=True) if not is_far], targets[~far]
-    )
+    due = others.trials([*np.array(hands)[~far]], targets[~far])
     for rows, expected in zip(trials, due, strict=True):
         np.testing.assert_array_equal(rows[~far], expected)
     assert np.isneginf(trials.rewards[far]).all()
@@ -107,7 +97,7 @@ def test_no_number_of_threads_changes_a_trial(monkeypatch):
     hands, targets = [*hands] * 50, np.tile(targets, (50, 1, 1))
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     alone = make_trials(task, hands, targets)
-    for threads in ("2", "3,1", "7"):
+    for threads in ("2", "3,1"):
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
         for one, other in zip(make_trials(task, hands, targets), alone, strict=True):
             np.testing.assert_array_equal(one, other)
@@ -116,13 +106,10 @@ def test_no_number_of_threads_changes_a_trial(monkeypatch):
 def test_until_the_first_that_is_better():
     task = load_task("two-armed-2")
     hands, targets = sample(task, 12)
-    rewards = Session(task, 0, OPTIMISER_INFORMATION).trials(hands, targets).rewards
+    rewards = make_trials(task, hands, targets).rewards
     until = np.full(12, np.inf)
     until[[2, 5, 9]] = rewards[[2, 5, 9]] - [0.0, 1.0, 1.0]  # the first one is equalled
-    session, alone = (
-        Session(task, 0, OPTIMISER_INFORMATION),
-        Session(task, 0, OPTIMISER_INFORMATION),
-    )
+    session, alone = (Session(task, 0, OPTIMISER_INFORMATION) for _ in range(2))
     np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
     alone.trials(hands[:6], targets[:6])
     assert session.meter == alone.meter

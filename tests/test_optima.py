@@ -23,11 +23,11 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
         *(run(drawn, search, -300), run(drawn, "other", -290)),
         *(run("mine", search, -290), run("mine", "other", -288, setting="b=2")),
         run("yours", "other", -290),  # to be compared with itself
+        run("searched", search, -290),
         *(run("free", "one", -301), run("free", "one", -300, setting="b=2")),
     ]
-    radius = {"radius": 0.2}
-    changed = [load_task("ascending").model_copy(update={"name": name, **radius})
-           for name in ("mine", "yours", "free")]  # fmt: skip
+    changed = [load_task("ascending").model_copy(update={"name": name, "radius": 0.2})
+               for name in ("mine", "yours", "searched", "free")]  # fmt: skip
     study = study_of(rows, changed)
     tasks = [*study.tasks.values(), load_task("two-armed-2")]
     best = optima.best_known(study.stored, tasks)
@@ -37,6 +37,7 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
         **{name: (of.reward, of.bound, "shipped", "") for name, of in shipped.items()},
         drawn: (-290, None, "other", f"{drawn} -290"),
         "mine": (-288, None, "other b=2", "mine -288"),
+        "searched": (-290, None, search, "searched -290"),
         "free": (-300, None, "one b=2", "free -300"),
     }
     assert [name for name, each in best.items() if each.only_here] == ["free"]

@@ -40,9 +40,8 @@ def test_the_cost_of_a_point_is_what_its_trial_takes():
     for goal in range(4):  # joints without a parameter stay where they are
         targets[goal] = np.where(cost.joints[goal], targets[goal], q)
         q = execute(task, movements_of("LRLR", targets)).configurations[goal]
-    assert costs[3] == -execute(task, movements_of("LRLR", targets)).reward
+    assert costs[3] == -execute(task, movements_of("LRLR", targets)).reward == cost(points[3])
     np.testing.assert_array_equal(cost(points.T), costs)
-    assert cost(points[3]) == costs[3]
     assert cost.evaluations == 41
 
 
@@ -51,29 +50,14 @@ def test_the_best_point_is_kept_with_its_solution():
     cost = coartic.objective("ascending")
     assert execute(task, cost.solution).reward == -319  # the corrective process alone
     assert cost(cost.best_x) == cost.best_cost == 319 < cost(cost.x0)
-    state = "hands RRR, 18 parameters, 2 evaluations, best cost 319"
-    assert repr(cost) == f"Objective(ascending, {state}, best known 292 with hands RRR)"
-    rng, costs, points = np.random.default_rng(0), [], []
-    for _ in range(30):
-        points.append(cost.x0 + 0.05 * rng.standard_normal((50, cost.dim)))
-        costs.append(cost.many(points[-1]))
-    assert cost.best_cost == np.min(costs) < 319
-    best = np.vstack(points)[np.argmin(costs)]
-    for each in (*points, cost.x0, cost.best_x):  # which may be changed without harm
+    points = cost.x0 + 0.05 * np.random.default_rng(0).standard_normal((1500, cost.dim))
+    costs = cost.many(points)
+    assert cost.best_cost == costs.min() < 319
+    best = points[costs.argmin()].copy()
+    for each in (points, cost.x0, cost.best_x):  # which may be changed without harm
         each += 1.0
     np.testing.assert_array_equal(cost.best_x, best)
     assert -execute(task, cost.solution).reward == cost.best_cost == cost(cost.best_x)
-
-
-def test_a_goal_has_all_its_entries_or_none():
-    cost = coartic.objective("two-armed-2", "RLRR")
-    goals = np.argwhere(cost.joints)[:, 0]  # of each entry of a point
-    points = np.tile(cost.x0, (4, 1))
-    points[3, 0] = np.nan
-    with pytest.raises(ValueError, match="point 3: of goal 1 some entries are NaN"):
-        cost.many(points)
-    with pytest.raises(ValueError, match="infinite"):
-        cost(np.where(goals == 1, np.inf, cost.x0))
 
 
 def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
@@ -84,40 +68,57 @@ def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
     assert costs[costs < FAILED].max() < 5000
     with pytest.raises(MethodError, match="completes no hand sequence"):
         coartic.objective("ascending", model=MotionModel(max_iterations=2))
+    many = tiny_task(goals=[[5.0, 1.0]] * 13)
     with pytest.raises(MethodError, match="hand sequences; .* say which hands"):
-        coartic.objective(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
-    for wrong in (cost.x0[None, 1:], cost.x0):
-        with pytest.raises(ValueError, match="needed is"):
-            cost.many(wrong)
+        coartic.objective(many)
+    with pytest.raises(coartic.NotApplicableError, match="8192 hand sequences"):
+        _ = coartic.objective(many, "R" * 13).hand_sequences
 
 
-@pytest.mark.parametrize("method", ["L-BFGS-B", "SLSQP"])
-def test_unbounded_searches_that_step_far_away_go_on(method):
+COST = coartic.objective("ascending")
+GOALS = np.argwhere(COST.joints)[:, 0]  # of each entry of a point
+
+
+def with_width(half_width):
+    return coartic.objective("ascending", half_width=half_width)
+
+
+@pytest.mark.parametrize(
+    ("call", "wrong", "words"),
+    [
+        (COST, np.zeros(5), r"x has shape \(5,\); needed is \(18,\) or \(18, N\)"),
+        (COST, np.zeros((18, 18)), r"use many\(x\) for rows, many\(x.T\) for columns"),
+        *((call, wrong, "needed are real numbers") for call in (COST, COST.many)
+          for wrong in ("abc", ["1.0"] * 18, COST.x0 + 1j, np.zeros(18, bool))),
+        (COST.many, COST.x0, "needed is"),
+        (COST.many, [[1, 2], [3]], "in rows of one length"),
+        (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
+         "point 0: of goal 2 some entries are NaN"),
+        (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
+        (COST.movements, COST.x0[1:], "needed is"),
+        (COST.movements, np.full(18, np.inf), "infinite"),
+        *((COST.evaluations_to, wrong, r"targets (are|is) .*(a cost, the ticks|real numbers)")
+          for wrong in (-456, [500, -1.0], np.nan, "456")),
+        *((with_width, wrong, "half_width is .*; it must be a number from 1e-09 to 100")
+          for wrong in (0, np.nan, "1")),
+    ],
+)  # fmt: skip
+def test_what_is_no_point_no_target_and_no_width_is_refused(call, wrong, words):
+    with pytest.raises(ValueError, match=words):
+        call(wrong)
+    assert COST.evaluations == 0
+
+
+def test_unbounded_searches_that_step_far_away_go_on():
     cost, far = coartic.objective("ascending"), []
 
     def steep(x):
         far.append(np.abs(x).max() > 1e5)
         return cost(x) - 1e9 * x[0]  # downhill without end, but for trials that fail
 
-    optimize.minimize(steep, cost.x0, method=method, options={"maxiter": 20})
+    optimize.minimize(steep, cost.x0, method="L-BFGS-B", options={"maxiter": 20})
     assert any(far)
     assert cost.evaluations == len(far)
-
-
-def test_threads_share_a_budget():
-    cost = coartic.objective("two-armed-2", budget=300)
-    points = cost.x0 + 0.02 * np.random.default_rng(0).standard_normal((600, cost.dim))
-
-    def evaluate(n):
-        try:
-            return cost(points[n]) if n % 3 else cost.many(points[n : n + 1])[0]
-        except BudgetError:
-            return np.inf
-
-    with ThreadPoolExecutor(8) as pool:
-        costs = np.array([*pool.map(evaluate, range(600))])
-    assert np.isfinite(costs).sum() == cost.evaluations == 300 - 16
-    assert cost.best_cost == costs.min() == -execute(cost.task, cost.solution).reward
 
 
 SHARED = []
@@ -169,23 +170,6 @@ def test_points_become_movements():
     points = fails.x0 + np.random.default_rng(0).standard_normal((200, fails.dim))
     failed = points[fails.many(points) == FAILED]
     assert not execute("ascending", fails.movements(failed[0]), model=model).completed
-    for wrong, words in ((cost.x0[1:], "needed is"), (np.full(cost.dim, np.inf), "infinite")):
-        with pytest.raises(ValueError, match=words):
-            cost.movements(wrong)
-
-
-def test_a_square_array_is_refused_as_rows_and_columns_look_alike():
-    cost = coartic.objective("ascending")
-    points = cost.x0 + 0.1 * np.random.default_rng(1).standard_normal((cost.dim, cost.dim))
-    with pytest.raises(ValueError, match=r"use many\(x\) for rows, many\(x.T\) for columns"):
-        cost(points)
-    np.testing.assert_array_equal(cost(points.T[:, :5]), cost.many(points[:5]))
-
-
-@pytest.mark.parametrize("name", ["budget", "hands", "half_width"])
-def test_what_would_change_nothing_cannot_be_set(name):
-    with pytest.raises(AttributeError):
-        setattr(coartic.objective("ascending"), name, 5)
 
 
 @pytest.mark.parametrize(
@@ -224,27 +208,8 @@ def test_the_examples_are_methods(path, in_this_process):
     )
     solution = entry.configure({}).solve(session).solution
     assert session.meter.trials == len(session.rewards) == 300
-    reward = execute(load_task("ascending"), solution).reward
+    reward = execute("ascending", solution).reward
     assert reward == max(session.rewards)
-
-
-def test_hands_are_chosen_by_a_method():
-    """It comes nearer to the optimum than any point with the hands that are chosen by default."""
-    task, name = load_task("two-armed-2"), "halving"
-    entry = registry([EXAMPLES / f"{name}.py"])[name]
-    session = Session(task, 0, map(Information, entry.information))
-    reward = execute(task, entry.configure({}).solve(session).solution).reward
-    assert reward == max(filter(None, session.rewards)) > -340
-    assert session.meter.trials == 10_000
-
-
-def test_a_method_is_told_which_hands_there_are():
-    for name in ("ascending", "two-armed-2"):
-        cost = Objective(Session(load_task(name), 0, OPTIMISER_INFORMATION))
-        assert cost.hand_sequences == coartic.hand_sequences(name)
-    task = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
-    with pytest.raises(coartic.NotApplicableError, match="8192 hand sequences"):
-        _ = coartic.objective(task, "R" * 13).hand_sequences
 
 
 def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):
@@ -322,29 +287,9 @@ def test_the_package_for_optunahub():
     ticks = problem.evaluate(start | {"hand_2": "L", "left_1_2": 0.1, "right_4_4": -0.2})
     assert ticks == cost(targets[cost.joints]) != cost(cost.x0)
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    sampler = optuna.samplers.TPESampler(seed=0)
-    study = optuna.create_study(directions=problem.directions, sampler=sampler)
-    study.optimize(problem, n_trials=60)
-    assert study.best_value < min(trial.value for trial in study.trials[:15])
-
-
-@pytest.mark.parametrize("wrong", [0, -1.0, np.nan, np.inf, "1", None, True, [1.0], 101])
-def test_a_wrong_half_width_is_refused(wrong):
-    with pytest.raises(ValueError, match="half_width is .*; it must be a number from 1e-09 to 100"):
-        coartic.objective("ascending", half_width=wrong)
-
-
-def test_what_is_no_point_is_refused_with_its_own_shape():
-    cost = coartic.objective("ascending")
-    with pytest.raises(ValueError, match=r"x has shape \(5,\); needed is \(18,\) or \(18, N\)"):
-        cost(np.zeros(5))
-    for wrong in ("abc", ["1.0"] * 18, [None] * 18, {}, cost.x0 + 1j, np.zeros(18, bool)):
-        for call in (cost, cost.many):
-            with pytest.raises(ValueError, match="needed are real numbers"):
-                call(wrong)
-    with pytest.raises(ValueError, match="in rows of one length"):
-        cost.many([[1, 2], [3]])
-    assert cost.evaluations == 0
+    study = optuna.create_study(directions=problem.directions)
+    study.optimize(problem, n_trials=2)
+    assert study.best_value == min(trial.value for trial in study.trials)
 
 
 FOUR = load_task("two-armed-2")
@@ -407,12 +352,6 @@ def test_history_and_evaluations_to_are_what_the_returned_costs_say(threads, siz
     assert cost.evaluations_to([cost.best_cost - 1, alone]).tolist() == [np.inf, 0]
 
 
-@pytest.mark.parametrize("wrong", [-456, [500, -1.0], np.nan, np.inf, -np.inf, 2_000_000, "456"])
-def test_a_target_that_is_no_cost_is_refused(wrong):
-    with pytest.raises(ValueError, match=r"targets (are|is) .*(a cost, the ticks|real numbers)"):
-        coartic.objective("ascending").evaluations_to(wrong)
-
-
 def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     problem = coartic.objective(FOUR, budget=20)
     with pytest.raises(BudgetError):
@@ -421,13 +360,10 @@ def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     again = problem.fresh()
     assert (again.evaluations, again.dim) == (0, problem.dim)
     again(again.x0)
-    with pytest.raises(ValueError, match="budget is 0; it must be a whole number from 1"):
-        coartic.objective(FOUR, budget=0)
     few = "budget is 15; to choose among the hand sequences .* takes 16 trials: give more, or say"
-    with pytest.raises(ValueError, match=few):
-        coartic.objective(FOUR, budget=15)
-    with pytest.raises(ValueError, match="budget is 3; .* takes .* trials"):
-        coartic.problems("two-armed/v1", count=1, budget=3)
+    for budget, words in ((0, "budget is 0; it must be a whole number from 1"), (15, few)):
+        with pytest.raises(ValueError, match=words):
+            coartic.objective(FOUR, budget=budget)
     assert coartic.objective(FOUR, "RLRR", budget=5).trials_left == 4
     assert coartic.objective(FOUR, budget=16).trials_left == 0
 
@@ -457,17 +393,14 @@ def test_instances_of_a_family():
     assert [p.task.split for p in tuned] == ["development"] * 3
     with pytest.raises(ValueError, match="split is 'fresh'; it must be 'test' or 'development'"):
         coartic.problems("one-armed/v1", split="fresh")
-    with pytest.raises(CoarticError, match="one-armed"):
-        coartic.problems("one-armd/v1")
-    with pytest.raises(ValueError, match="count is 0"):
-        coartic.problems("one-armed/v1", count=0)
 
 
 def test_a_method_cannot_see_its_task():
-    information = Objective(Session(FOUR, 0, OPTIMISER_INFORMATION))
+    cost = Objective(Session(FOUR, 0, OPTIMISER_INFORMATION))
     for ask in ("task", "best_known", "proven"):
         with pytest.raises(UndeclaredError, match="cannot see its task"):
-            getattr(information, ask)
+            getattr(cost, ask)
     with pytest.raises(UndeclaredError):
-        information.fresh()
-    assert "best known" not in repr(information)
+        cost.fresh()
+    assert "best known" not in repr(cost)
+    assert cost.hand_sequences == coartic.hand_sequences(FOUR)

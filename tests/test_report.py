@@ -18,7 +18,7 @@ from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.player import methods_played, player
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.study import Study
-from tests.support import made_up
+from tests.support.made_up import runs_of, study_of
 from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write, suite_of
 
 
@@ -75,17 +75,14 @@ def test_the_commonest_reasons_are_said(traced):
     runs.loc[: len(reasons) - 1, "status"] = "crashed"
     runs.loc[: len(reasons) - 1, "reason"] = reasons
     reported = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
-    assert (reported["failed"], reported["reasons"]) == (
-        10,
-        ["4 × often", "3 × thrice", "2 × twice", "1 for other reasons"],
-    )
+    said = ["4 × often", "3 × thrice", "2 × twice", "1 for other reasons"]
+    assert (reported["failed"], reported["reasons"]) == (10, said)
 
 
 @pytest.mark.parametrize(("count", "few"), [(19, 19), (20, 0)])
 def test_fewer_runs_than_the_papers_twenty_are_few(count, few):
-    one = {"method": "dual-process/EC1", "reward": -300, "task": "ascending", "commit": "c0de"}
-    study = made_up.study_of([made_up.row(**one, run=run) for run in range(count)])
-    assert limits(study)["few"] == few
+    runs = runs_of("ascending", "dual-process/EC1", [-300] * count, commit="c0de")
+    assert limits(study_of(runs))["few"] == few
 
 
 def test_p_is_small_below_a_thousandth():
@@ -116,7 +113,6 @@ def test_what_pdflatex_cannot_print_is_for_xelatex(traced):
     text = render.latex_table(TABLES["ranking"], frame, "手 and κ")
     assert text.startswith("% needs XeLaTeX or LuaLaTeX")
     assert '\\symbol{"624B} and $\\kappa$' in text
-    assert text.isascii() or all(ord(c) < 0x300 for c in text)
 
 
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
@@ -150,12 +146,8 @@ def test_a_page_stands_alone(report):
     assert {a or b for a, b in references} <= set(ids)
     figures = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
     assert len(figures) > 3
-    for drawn in figures:
-        svg = ElementTree.fromstring(drawn)
-        assert svg.get("viewBox")
-        assert svg.get("aria-label")
-        assert "#000000" not in drawn
-    assert len(re.findall(r"<section\b", text)) <= 15
+    assert all(ElementTree.fromstring(drawn).get("aria-label") for drawn in figures)
+    assert not any("#000000" in drawn for drawn in figures)
     assert len(text) < 1_500_000
 
 
@@ -202,9 +194,6 @@ def test_few_runs_say_so(tmp_path):
     files = write_report(without, tmp_path / "report")
     assert {"report.html", "tables/ranking.tex"} <= set(files[0])
     assert any(name.endswith(".pdf") for name in files[0])
-    text = (tmp_path / "report" / "report.html").read_text("utf-8")
-    assert load_task("ascending").label in text
-    assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))
     with pytest.raises(CoarticError, match="report holds the report of other results"):
         write_report(few, tmp_path / "report", for_paper=False)
     write_report(without, tmp_path / "report", for_paper=False)
@@ -227,9 +216,12 @@ def test_tables_compile(tables_by_name, tmp_path):
 
 
 def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):
-    """Two tasks, each with goal 2 in two places: six pairs that share goal 1."""
+    """Two tasks, each with goal 2 in two places: six pairs that share goal 1; a task that is the
+    beginning of another one shares no context with it."""
     moved = 'tasks = ["ascending", "descending"]\nmethods = ["dual-process/EC1"]\n[blocks.move]\n'
     cells = suite_of(tmp_path, moved + "goal = 2\nby = [[0.0, 0.0], [0.0, 0.5]]")
+    alone = Task(name="alone", goals=cells[0].task.goals[:1], hands=["right"])
+    cells.append(cell_on(alone, cells[0].method))
     seen = run_and_write(tmp_path / "moved", cells=cells, runs=2, trials=30)
     contexts = TABLES["contexts"](seen)
     assert contexts.index.is_unique
@@ -261,26 +253,11 @@ def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
     assert {path.stem for path in report.glob("tables/*.csv")} >= {"ranking", "signatures", "tasks"}
 
 
-def test_a_goal_alone_and_followed_have_a_report(tmp_path):
-    """The usual control: one task is the beginning of the other, and they have no context each."""
-    for name, goals in (("alone", [(6, 2)]), ("followed", [(6, 2), (6, 4)])):
-        Task(name=name, goals=goals, hands=["right"]).save(tmp_path / f"{name}.toml")
-    names = [str(tmp_path / f"{name}.toml") for name in ("alone", "followed")]
-    cells = cells_of("paper", tasks=names, methods=["EC1"])
-    study = run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
-    assert TABLES["contexts"](study).empty
-    write_report(study, tmp_path / "report", for_paper=False)
-
-
 def test_methods_that_follow_paths_are_left_out(tmp_path):
-    tasks = [load_task(name) for name in ("ascending", "descending")]
-    cells = [
-        cell_on(task, KNOWN[method])
-        for task in tasks
-        for method in ("posture-qp/current-goal", "corrective-alone/given")
-    ]
+    methods = "posture-qp/current-goal", "corrective-alone/given"
+    cells = [cell_on(load_task("ascending"), KNOWN[method]) for method in methods]
     study = run_and_write(tmp_path / "both", cells, trials=20, runs=1)
-    played = methods_played(study, [task.name for task in tasks])
+    played = methods_played(study, ["ascending"])
     assert [run["id"] for run in played] == ["corrective-alone/given"]
-    alone = run_and_write(tmp_path / "alone", cells[::2], trials=20, runs=1)
+    alone = run_and_write(tmp_path / "alone", cells[:1], trials=20, runs=1)
     assert player(alone) == ""

@@ -28,25 +28,9 @@ def test_forward_kinematics_against_complex_exponentials(robot, hand):
 
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("hand", HANDS)
-def test_leading_axes_are_vectorised(robot, hand):
-    q = np.random.default_rng(2).uniform(-4, 4, (3, 5, robot.dof))
-    positions = robot.joint_positions(q, hand)
-    jacobians = robot.jacobian(q, hand)
-    links = robot.left_links if hand == "left" else robot.right_links
-    assert positions.shape == (3, 5, len(links) + 1, 2)
-    assert jacobians.shape == (3, 5, 2, robot.dof)
-    tips, again = robot.linearised(q, hand)
-    np.testing.assert_array_equal(tips, robot.forward_kinematics(q, hand))
-    np.testing.assert_array_equal(again, jacobians)
-    for index in np.ndindex(3, 5):
-        np.testing.assert_array_equal(positions[index], robot.joint_positions(q[index], hand))
-        np.testing.assert_array_equal(jacobians[index], robot.jacobian(q[index], hand))
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("hand", HANDS)
 def test_three_worlds_agree(robot, hand):
-    """NumPy, CasADi (its own automatic differentiation included) and the kernels."""
+    """NumPy, on all rows at once, CasADi (its own automatic differentiation included) and the
+    kernels."""
     symbol = casadi.SX.sym("q", robot.dof)
     position = robot.symbolic_hand(symbol, hand)
     symbolic = casadi.Function("f", [symbol], [position, casadi.jacobian(position, symbol)])
@@ -58,21 +42,19 @@ def test_three_worlds_agree(robot, hand):
         for k in range(tip):
             jacobian[0, arm.first + k], jacobian[1, arm.first + k] = joint_lever(xs, ys, k, tip)
 
-    arm = robot.arm(hand)
-    for q in np.random.default_rng(3).uniform(-20, 20, (200, robot.dof)):
-        expected, jacobian = robot.forward_kinematics(q, hand), robot.jacobian(q, hand)
-        f, automatic = (np.array(value) for value in symbolic(q))
-        np.testing.assert_allclose(f.ravel(), expected, atol=1e-12, rtol=0)
-        np.testing.assert_allclose(automatic, jacobian, atol=1e-12, rtol=0)
-        xs, ys, columns = (
-            np.empty(len(arm.links) + 1),
-            np.empty(len(arm.links) + 1),
-            np.zeros((2, robot.dof)),
-        )
-        columns[0, 0] = columns[1, 1] = 1
-        compiled(q, arm, xs, ys, columns)
-        np.testing.assert_allclose([xs[-1], ys[-1]], expected, atol=1e-12, rtol=0)
-        np.testing.assert_allclose(columns, jacobian, atol=1e-12, rtol=0)
+    arm, every = robot.arm(hand), np.random.default_rng(3).uniform(-20, 20, (4, 50, robot.dof))
+    joints, jacobians = robot.joint_positions(every, hand), robot.jacobian(every, hand)
+    tips, again = robot.linearised(every, hand)
+    np.testing.assert_array_equal(tips, robot.forward_kinematics(every, hand))
+    np.testing.assert_array_equal(again, jacobians)
+    for row in np.ndindex(every.shape[:2]):
+        f, automatic = (np.array(value) for value in symbolic(every[row]))
+        np.testing.assert_allclose(f.ravel(), tips[row], atol=1e-12, rtol=0)
+        np.testing.assert_allclose(automatic, jacobians[row], atol=1e-12, rtol=0)
+        places, columns = np.empty((2, len(arm.links) + 1)), np.eye(2, robot.dof)
+        compiled(every[row], arm, *places, columns)
+        np.testing.assert_allclose(places.T, joints[row], atol=1e-12, rtol=0)
+        np.testing.assert_allclose(columns, jacobians[row], atol=1e-12, rtol=0)
 
 
 def test_base_outline():

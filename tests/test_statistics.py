@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from coartic import estimates as statistics
-from coartic.analysis.signatures.context_tests import permutation_p
 from coartic.analysis.statistics import hypotheses
-from coartic.analysis.statistics.instances import other_tasks
 from coartic.estimates import LEVEL
 
 
@@ -54,12 +52,6 @@ def test_sign_flips_are_exact_for_few_pairs(differences):
     assert hypotheses.sign_flip_test(differences).p == pytest.approx(min(1.0, 2 * min(tails)))
 
 
-def test_sign_flips_of_many_pairs_are_drawn():
-    differences = np.random.default_rng(5).normal(0.4, 1, 40)
-    expected = stats.ttest_1samp(differences, 0).pvalue
-    assert hypotheses.sign_flip_test(differences).p == pytest.approx(expected, abs=0.01)
-
-
 def test_smallest_p():
     """No resample comes near: p is that of the sample seen; tests of few values cannot reject."""
     far = 1000 + np.arange(8.0)
@@ -75,7 +67,9 @@ def test_smallest_p():
         assert test.least_p == pytest.approx(least)
     flips = hypotheses.sign_flip_test(far[:4])
     assert flips.least_p == flips.p == 2 / 16
-    assert hypotheses.sign_flip_test(np.arange(40.0)).least_p == 2 / 10_000
+    many = np.random.default_rng(5).normal(0.4, 1, 40)
+    drawn, expected = hypotheses.sign_flip_test(many), stats.ttest_1samp(many, 0).pvalue
+    assert (drawn.least_p, drawn.p) == (2 / 10_000, pytest.approx(expected, abs=0.01))
 
 
 def test_bca_interval_against_all_resamples():
@@ -105,13 +99,10 @@ def test_intervals_of_many_normal_values_are_the_usual_ones(sizes):
 
 
 def test_degenerate_samples():
-    columns = statistics.Estimate(2.0, 1.0, 3.0).columns("gap")
-    assert columns == {"gap": 2.0, "gap_low": 1.0, "gap_high": 3.0}
     assert math.isnan(statistics.mean([4.0, 5.0]).low)
     assert statistics.mean([4.0, 5.0, 6.0]).low < 5
     interval = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
-    assert interval.low == interval.high == interval.value
-    assert interval.value == 1.0
+    assert interval.columns("gap") == {"gap": 1.0, "gap_low": 1.0, "gap_high": 1.0}
 
 
 def test_tests_that_cannot_be_made():
@@ -159,9 +150,7 @@ def test_holm_leaves_out_what_was_not_tested():
 
 def test_rounding_is_no_spread():
     """A mean of equal numbers can differ from them in the last bit."""
-    assert not statistics.varies(np.full(6, 0.1))
     assert not statistics.centred(np.full((3, 2), 0.1)).any()
-    assert statistics.varies(np.array([300.0, 300.001]))
     assert not statistics.varies(np.zeros(3))
     assert not statistics.varies(np.array([1e9, 1e9 - 1.0]))  # by the share that is rounding
     assert statistics.varies(np.array([1e9, 1e9 - 2.0]))
@@ -206,19 +195,6 @@ def right_of_rewards(rng, draw, mean):
     ]
 
 
-def right_of_others(rng):
-    """The same of a share of runs, of postures with two joints that vary together, and of random
-    tasks with five runs each and skewed gaps."""
-    counts = rng.multinomial(RUNS, [0.75, 0.15, 0.10])
-    first, second = rng.exponential(0.1, (2, RUNS, 2)) @ np.array([[1.0, 0.5], [0.0, 1.0]])
-    gaps = [centre + rng.exponential(0.02, 5) for centre in rng.exponential(0.1, RUNS)]
-    return [
-        hypotheses.share_test(int(counts[0]), RUNS, 0.75, "greater").p > LEVEL,
-        permutation_p(first, second, rng, resamples=RESAMPLES) > LEVEL,
-        holds(other_tasks({"a": gaps}), 0.12),
-    ]
-
-
 @pytest.mark.parametrize("population", POPULATIONS)
 def test_procedures_are_calibrated_on_rewards_with_a_known_truth(population):
     """About 95 of 100 samples are right; intervals of half their width would be in 67. No interval
@@ -229,9 +205,3 @@ def test_procedures_are_calibrated_on_rewards_with_a_known_truth(population):
     rates = np.mean([right_of_rewards(rng, draw, mean) for _ in range(100)], axis=0)
     assert (rates >= 0.8).all(), rates
     assert not right_of_rewards(rng, draw, 5.0)[0]
-
-
-def test_procedures_are_calibrated_on_counts_postures_and_random_tasks():
-    rng = np.random.default_rng(0)
-    rates = np.mean([right_of_others(rng) for _ in range(100)], axis=0)
-    assert (rates >= 0.8).all(), rates

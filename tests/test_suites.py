@@ -4,14 +4,12 @@ import json
 from fnmatch import fnmatch
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from coartic import CoarticError, load_task
 from coartic.benchmarks.runner import plan_suite
 from coartic.benchmarks.suites import load_suite, suites
 from coartic.learner.conditions import EVERY_CONDITION
-from coartic.runs.plan import size_of
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN, cells_of, paper_cells, run_and_write, suite_of
 
@@ -25,7 +23,11 @@ def test_every_method_runs_in_some_suite():
     assert run == set(KNOWN)
 
 
-def test_suite_ablations_frees_the_base():
+ASCENDING = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
+EVERY = 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\n'
+
+
+def test_suite_ablations_frees_the_base(tmp_path):
     cells = cells_of("ablations")
     tasks = {cell.task.name: cell.task for cell in cells}
     free, rail = tasks["two-armed-1.free-base"], tasks["two-armed-1"]
@@ -33,29 +35,13 @@ def test_suite_ablations_frees_the_base():
     assert free.provenance["locked_base"].status == "chosen"
     same = {"goals", "start", "hands", "radius", "initial_hands"}
     assert free.model_dump(include=same) == rail.model_dump(include=same)
-    blocks = {
-        "blocks": [{"tasks": ["ascending"], "methods": ["dual-process/EC1"], "free_base": True}]
-    }
-    suite = load_suite("paper").model_validate(load_suite("paper").model_dump() | blocks)
     with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
-        cells_of(suite)
+        suite_of(tmp_path, ASCENDING + "free_base = true")
 
 
 def test_grid_and_fixed_parameters(tmp_path):
-    path = tmp_path / "own.toml"
-    path.write_text(
-        """
-        title = "Noise"
-        description = "Noise against trials"
-        runs = 1
-        [[blocks]]
-        tasks = ["ascending"]
-        methods = ["dual-process/EC1"]
-        parameters = { trials = 40 }
-        grid = { noise_sd = [0.02, 0.1], epsilon = [0.0, 0.5] }
-        """
-    )
-    cells = cells_of(path)
+    grid = "parameters = { trials = 40 }\ngrid = { noise_sd = [0.02, 0.1], epsilon = [0.0, 0.5] }"
+    cells = suite_of(tmp_path, ASCENDING + grid)
     assert [cell.setting for cell in cells] == [
         "trials=40, epsilon=0.0, noise_sd=0.02",
         "trials=40, epsilon=0.5, noise_sd=0.02",
@@ -70,38 +56,29 @@ def test_grid_and_fixed_parameters(tmp_path):
 
 def test_cells_are_distinguished_by_their_parameters(tmp_path):
     """Different parameters are different cells, compared with the paper only as it had them."""
-    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
     asked = suite_of(
         tmp_path,
-        ec1,
-        ec1 + "parameters = { noise_sd = 0.5 }",
-        ec1 + "parameters = { noise_sd = 0.05 }",  # the default: the first cell again
-        ec1 + "parameters = { trials = 20 }",
-        'tasks = ["*"]\nmethods = ["dual-process/EC1"]',
+        ASCENDING,
+        ASCENDING + "parameters = { noise_sd = 0.5 }",
+        ASCENDING + "parameters = { noise_sd = 0.05 }",  # the default: the first cell again
+        ASCENDING + "parameters = { trials = 20 }",
+        EVERY,
     )
     labels = [(cell.task.name, cell.setting) for cell in asked]
-    assert labels[:3] == [
-        ("ascending", ""),
-        ("ascending", "noise_sd=0.5"),
-        ("ascending", "trials=20"),
-    ]
+    assert labels[:3] == [("ascending", each) for each in ("", "noise_sd=0.5", "trials=20")]
     assert len(labels) == len(set(labels)) == 6
     study = run_and_write(tmp_path / "out", asked, runs=3, trials=30)
-    assert study.runs.run_id.is_unique
     assert set(study.runs.groupby(["task", "setting"]).size()) == {3}
 
 
 def test_a_cell_has_one_number_of_runs(tmp_path):
-    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
     with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
-        suite_of(tmp_path, ec1, ec1 + "runs = 7")
+        suite_of(tmp_path, ASCENDING, ASCENDING + "runs = 7")
     (job,) = plan_suite(tmp_path / "own.toml", runs=2)
     assert job.numbers == range(2)
-    once = {"methods": ["corrective-alone/best-hands"], "tasks": ["two-armed-1"]}
-    assert size_of(plan_suite("paper", runs=1, **once)) == 1
     task = tmp_path / "mine.toml"
     task.write_text(GOOD, encoding="utf-8")
-    suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
+    suite_of(tmp_path, EVERY + "runs = 7")
     jobs = plan_suite(tmp_path / "own.toml", tasks=[task])
     assert {len(job.numbers) for job in jobs if job.cell.task.name == "mine"} == {7}
 
@@ -119,23 +96,18 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
     assert methods(path, methods=baseline) == baseline
     assert methods(path) == [f"dual-process/EC{k}" for k in (1, 2, 3, 4)]
     assert methods(other) == ["dual-process/EC1"]
-    both = paper_cells(tasks=["ascending", str(path)])
-    assert [cell.task.name for cell in both] == ["ascending"] + 4 * ["mine"]
     tasks = [*map(load_task, ("two-armed-1", path, "two-armed/v1/i003"))]
     again = paper_cells(tasks=tasks, methods=["EC4"])
     assert [cell.task for cell in again] == tasks
-    for name in ("ascending", "two-armed/v1/i003"):
+    for name, by in (("ascending", "a shipped"), ("two-armed/v1/i003", "a shipped"),
+                     ("arm", "another")):  # fmt: skip
         impostor = tasks[1].model_copy(update={"name": name})
-        with pytest.raises(CoarticError, match=f"{name}' is already taken by a shipped task: give"):
-            paper_cells(tasks=[impostor])
-    with pytest.raises(CoarticError, match="name 'arm' is already taken by another task: give"):
-        paper_cells(tasks=[tasks[1].model_copy(update={"name": "arm"}), str(other)])
+        with pytest.raises(CoarticError, match=f"{name}' is already taken by {by} task: give"):
+            paper_cells(tasks=[impostor, str(other)])
 
 
 def test_ablations_of_the_learner_are_methods_of_their_own():
-    """Known by their short names, with the information that they use."""
-    cells = paper_cells(methods=["EC1-subtask"], tasks=["ascending"])
-    assert [cell.label for cell in cells] == ["dual-process/EC1-subtask"]
+    """With the information that they use."""
     for name, entry in KNOWN.items():
         if name.startswith("dual-process/") and name != "dual-process/custom":
             condition = EVERY_CONDITION[name.partition("/")[2]]
@@ -148,31 +120,21 @@ def test_ablations_of_the_learner_are_methods_of_their_own():
 
 
 def test_a_suite_can_move_one_goal(tmp_path):
-    cells = suite_of(
-        tmp_path,
-        'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-        "move = { goal = 2, by = [[0, -0.5], [0.25, 0]] }",
-    )
+    cells = suite_of(tmp_path, ASCENDING + "move = { goal = 2, by = [[0, -0.5], [0.25, 0]] }")
     base = load_task("ascending")
-    assert [cell.task.name for cell in cells] == [
-        "ascending.goal2_0_-0.5",
-        "ascending.goal2_0.25_0",
-    ]
-    for cell, moved in zip(cells, ((6.0, 1.5), (6.25, 2.0)), strict=True):
+    for cell, name, moved in zip(
+        cells, ("goal2_0_-0.5", "goal2_0.25_0"), ((6.0, 1.5), (6.25, 2.0)), strict=True
+    ):
+        assert cell.task.name == f"ascending.{name}"
         assert cell.task.goals == (base.goals[0], moved, base.goals[2])
-        assert np.array_equal(cell.task.q0, base.q0)
+    far = 'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
     with pytest.raises(CoarticError, match="out of reach|too far"):
-        suite_of(
-            tmp_path,
-            'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
-            "move = { goal = 2, by = [[0, 9]] }",
-        )
+        suite_of(tmp_path, far + "move = { goal = 2, by = [[0, 9]] }")
 
 
 def test_a_goal_that_an_own_task_lacks_is_not_moved_in_it(tmp_path):
     (tmp_path / "mine.toml").write_text('hands = ["right"]\n' + GOOD, encoding="utf-8")
-    head = 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\n'
-    assert len(suite_of(tmp_path, head + "move = { goal = 3, by = [[0, 0.1]] }")) == 4
+    assert len(suite_of(tmp_path, EVERY + "move = { goal = 3, by = [[0, 0.1]] }")) == 4
     files = [str(tmp_path / "mine.toml")]
     cells = cells_of(tmp_path / "own.toml", tasks=files)
     assert [cell.task.name for cell in cells] == ["mine"]

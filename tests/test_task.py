@@ -4,6 +4,7 @@ import ast
 import math
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,9 +26,9 @@ from coartic import (
     load_task,
 )
 from coartic.tasks.families import shipped_families
-from coartic.tasks.task import check_task, parse_task
+from coartic.tasks.task import check_task
 from tests.support.bad_inputs import GOOD
-from tests.support.strategies import TIED, tiny_task
+from tests.support.strategies import TIED, changed, tiny_task
 
 
 def write(tmp_path, text):
@@ -47,18 +48,13 @@ def test_shipped_figures_have_a_source():
 
 
 def test_several_mistakes_each_get_a_line(tmp_path):
-    path = write(tmp_path, GOOD.replace('"RR"', "1").replace("[5.0, 2.0]", "[nan, inf]"))
-    with pytest.raises(TaskError) as caught:
-        load_task(path)
-    assert len(str(caught.value).splitlines()) == 3
-
-
-def test_a_penalty_is_what_version_1_reads(tmp_path):
-    path = write(tmp_path, f"{GOOD}[penalty]\njoints = 1.0\n")
-    with pytest.raises(TaskError) as caught:
-        load_task(path)
-    reads = "version 1.1.0 of coartic reads tasks with a penalty; here a reward is minus the ticks"
-    assert str(caught.value) == f"{path}: {reads}"
+    """Also a penalty, as version 1 reads it."""
+    wrong = GOOD.replace('"RR"', "1").replace("[5.0, 2.0]", "[nan, inf]")
+    for text, count in ((wrong, 3), (f"{GOOD}[penalty]\njoints = 1.0\n", 1)):
+        with pytest.raises(TaskError) as caught:
+            load_task(write(tmp_path, text))
+        assert len(str(caught.value).splitlines()) == count
+    assert "version 1.1.0 of coartic reads tasks with a penalty" in str(caught.value)
 
 
 def robot_with(links, **changes):
@@ -89,11 +85,8 @@ def test_a_saved_task_is_read_as_it_was(task, tmp_path):
     with pytest.raises(CoarticError, match="replace=True"):
         task.save(path)
     task.save(str(path), replace=True)
-
-
-def test_a_task_is_saved_as_toml(tmp_path):
     with pytest.raises(CoarticError, match=r"the name of a task's file ends in \.toml"):
-        tiny_task().save(tmp_path / "saved.json")
+        task.save(tmp_path / "saved.json")
 
 
 @pytest.mark.parametrize(
@@ -120,13 +113,20 @@ def test_a_wrong_task_is_refused_in_a_sentence(wrong, words):
     assert "pydantic" not in str(caught.value)
 
 
-def test_what_else_is_made_of_wrong_arguments_says_so_in_a_sentence():
-    with pytest.raises(ValueError, match=r"Robot: links is an unknown key; did you mean 'left_l"):
-        Robot(links=(1, 1))
-    with pytest.raises(ValueError, match=r"ExplorationCondition: hand_exploration is 'all'; it sh"):
-        ExplorationCondition("x", ("right",), True, True, "all")
-    with pytest.raises(ValueError, match=r"Parameters: trials is 0; it should be greater than 0"):
-        Optimiser.Parameters(trials=0)
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (partial(Robot, links=(1, 1)), r"Robot: links is an unknown key; did you mean 'left_l"),
+        (partial(ExplorationCondition, "x", ("right",), True, True, "all"),
+         r"ExplorationCondition: hand_exploration is 'all'; it sh"),
+        (partial(replace, CONDITIONS["EC4"], epsilon=math.nan), "is nan; it should be a finite"),
+        (partial(Optimiser.Parameters, trials=0), "Parameters: trials is 0; it should be greater"),
+        (partial(Optimiser.Parameters, half_width=math.nan), "is nan; it should be a finite"),
+    ],
+)  # fmt: skip
+def test_what_else_is_made_of_wrong_arguments_says_so_in_a_sentence(make, words):
+    with pytest.raises(ValueError, match=words):
+        make()
 
 
 LISTS = {
@@ -137,26 +137,13 @@ LISTS = {
 
 
 @pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in LISTS for key in LISTS[kind]])
-@pytest.mark.parametrize("text", ["x", "right", "xy", "1, 2"])
+@pytest.mark.parametrize("text", ["right", "1, 2"])
 def test_advice_on_a_list_can_be_followed(kind, key, text):
     given = {Task: {"goals": [(3, 2)]}, Start: {"left": [0] * 4, "right": [0] * 4}}.get(kind, {})
     with pytest.raises(ValueError, match=f"{key} is '{text}'; it should be a list") as caught:
         kind(**given | {key: text})
     for advice in re.findall(r"such as (\[.*\])", str(caught.value)):
         kind(**given | {key: ast.literal_eval(advice)})
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: replace(CONDITIONS["EC4"], epsilon=math.nan),
-        lambda: replace(CONDITIONS["EC4"], discount=math.nan),
-        lambda: Optimiser.Parameters(half_width=math.nan),
-    ],
-)
-def test_nan_is_at_no_side_of_a_limit(make):
-    with pytest.raises(ValueError, match=r" is nan; it should be a finite number"):
-        make()
 
 
 def test_a_file_that_is_not_text(tmp_path):
@@ -179,36 +166,29 @@ def test_reach_of_the_corrective_process():
         check_task(task)
     check_task(tiny_task(locked_base=["x", "y"], goals=[[4.0, 0.1], [4.505, 0.1]]))
     with pytest.raises(TaskError, match="the right hand that initial_hands 'R' gives it: 0.6 too"):
-        tiny_task(locked_base=["x", "y"], goals=[[-4.2, 0.1]], initial_hands="R")
+        tiny_task(locked_base=["x", "y"], goals=[[-4.2, 0.1]])
 
 
 def test_inner_reach():
     """An arm of links 3 and 1 cannot reach within 2 of its shoulder."""
-    robot = {"right_links": [3.0, 1.0]}
-    start = {"left": [0.0] * 4, "right": [0.0, 1.0]}
+    content = {"robot": {"right_links": [3.0, 1.0]}, "hands": ["right"], "goals": [[1.0, 0.1]],
+               "start": {"left": [0.0] * 4, "right": [0.0, 1.0]}}  # fmt: skip
     with pytest.raises(TaskError, match="goals\\[0\\] \\(1, 0.1\\) is out of reach"):
-        tiny_task(
-            robot=robot, start=start, hands=["right"], locked_base=["x", "y"],
-            goals=[[1.0, 0.1]], initial_hands="R",
-        )  # fmt: skip
-    tiny_task(
-        robot=robot, start=start, hands=["right"], locked_base=["x"],
-        goals=[[1.0, 0.1]], initial_hands="R",
-    )  # fmt: skip
+        tiny_task(locked_base=["x", "y"], **content)
+    tiny_task(locked_base=["x"], **content)
 
 
 def test_initial_hand_policies():
     """The published policies give the published hands: both tasks start with RRRR."""
-    for name, policy in (("two-armed-1", "best-single-hand"), ("two-armed-2", "best-of-all")):
-        content = {**load_task(name).model_dump(mode="json"), "initial_hands": policy}
-        task = parse_task(content, name)
-        assert initial_hands(task) == load_task(name).initial_hands == "RRRR"
-    content = {**load_task("two-armed-1").model_dump(mode="json"), "initial_hands": "best-of-all"}
-    task = parse_task(content, "x")
-    assert initial_hands(task) == "LRLR"
-    assert initial_hands(task, ("right",)) == "RRRR"
+    for name, policy, hands in (
+        ("two-armed-1", "best-single-hand", "RRRR"),
+        ("two-armed-2", "best-of-all", "RRRR"),
+        ("two-armed-1", "best-of-all", "LRLR"),
+    ):
+        assert initial_hands(changed(name, initial_hands=policy)) == hands
+    best = changed("two-armed-1", initial_hands="best-of-all")
+    assert initial_hands(best, ("right",)) == "RRRR"
     assert initial_hands(TIED) == "RRL"
-    assert corrective_trial(task, "LRLR").reward == -532
 
 
 def test_policies_with_many_goals():
@@ -238,7 +218,7 @@ def test_a_task_of_ones_own_needs_goals_alone(tmp_path):
     assert load_task(path) == Task(name="shelf", goals=goals, q0=np.zeros(10))
 
 
-@pytest.mark.parametrize("name", ["arm.urdf", "run.MOT", "marks.trc", "marks.c3d", "hits.xlsx"])
+@pytest.mark.parametrize("name", ["arm.urdf", "run.MOT", "hits.xlsx"])
 @pytest.mark.parametrize("kind", [str, Path])
 def test_files_of_other_programs_are_refused_by_their_kind(name, kind):
     words = f"{name}: coartic reads no {Path(name).suffix.lower()} file; a task is a TOML file"
@@ -246,11 +226,8 @@ def test_files_of_other_programs_are_refused_by_their_kind(name, kind):
         load_task(kind(name))
 
 
-@pytest.mark.parametrize("count", [100, 256, 257])
-def test_a_task_has_at_most_256_goals(count):
-    goals = [(4 + math.sin(k), 1 + math.cos(k)) for k in range(count)]
-    if count > 256:
-        with pytest.raises(ValueError, match="at most 256"):
-            Task(goals=goals)
-    else:
-        assert corrective_trial(Task(goals=goals, hands=["right"]), "R" * count).completed
+def test_a_task_has_at_most_256_goals():
+    goals = [(4 + math.sin(k), 1 + math.cos(k)) for k in range(257)]
+    assert corrective_trial(Task(goals=goals[:256], hands=["right"]), "R" * 256).completed
+    with pytest.raises(ValueError, match="at most 256"):
+        Task(goals=goals)

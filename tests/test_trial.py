@@ -302,17 +302,16 @@ def test_a_trial_does_not_notice_its_neighbours(name):
         some = make_trials(task, [*hands[chosen]], targets[chosen], model=model)
         for field, same in zip(together, some, strict=True):
             np.testing.assert_array_equal(field[chosen], same)
-    kinds = [case.solution for case in rich_cases("two-armed-1", 0)]
-    broken = [kinds[0][:-1], [*kinds[0], "nonsense"], 5, kinds[0][::-1]]
-    many = execute_many(compiled_task(TASKS["two-armed-1"], OTHERS[0]), [*broken, *kinds])
-    for solution, execution in zip([*broken, *kinds], many, strict=True):
-        if isinstance(execution, Exception):  # one movement less may still be a solution
-            with pytest.raises(type(execution), match=re.escape(str(execution))):
-                execute(TASKS["two-armed-1"], solution, model=OTHERS[0])
-        else:
-            alone = execute(TASKS["two-armed-1"], solution, model=OTHERS[0])
-            np.testing.assert_array_equal(alone.configurations, execution.configurations)
-            assert alone.evaluations == execution.evaluations
+    solutions = [case.solution for case in rich_cases(name, 0)]
+    solutions += [[*solutions[0], "nonsense"], 5]
+    many = execute_many(compiled_task(task, OTHERS[0]), solutions)
+    for solution, execution in zip(solutions[:-2], many[:-2], strict=True):
+        alone = execute(task, solution, model=OTHERS[0])
+        np.testing.assert_array_equal(alone.configurations, execution.configurations)
+        assert alone.evaluations == execution.evaluations
+    for solution, error in zip(solutions[-2:], many[-2:], strict=True):
+        with pytest.raises(type(error), match=re.escape(str(error))):
+            execute(task, solution, model=OTHERS[0])
 
 
 def test_a_batch_counts_as_so_many_trials():

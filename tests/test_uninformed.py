@@ -5,15 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
-from coartic.baselines import random_search
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.hill_climbing import HillClimbing
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import BudgetError, Meter, MethodError, Session
+from coartic.method import Meter, MethodError, Session
 from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import solve, tiny_task
 
@@ -23,19 +21,6 @@ ONE_GOAL = tiny_task(
     goals=[[-3.0, 0.0]],
     start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.0, 0.3, 0.4, -0.2]},
 )
-
-
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-@pytest.mark.parametrize("name", ["ascending", "two-armed-1"])
-def test_trials_counted_kept_and_made_again(method, name):
-    task = load_task(name)
-    result, _, session = solve(method, task, trials=301)
-    assert session.meter.trials == len(session.rewards) == 301
-    completed = [reward for reward in session.rewards if reward is not None]
-    again = execute(task, result.solution)
-    assert again.reward == max(completed)
-    assert session.rewards.index(again.reward) == result.details["best_trial"]
-    assert -sum(completed) == session.meter.movement_ticks  # none failed
 
 
 def test_hands_chosen_goal_by_goal():
@@ -51,33 +36,13 @@ def test_hands_chosen_goal_by_goal():
     assert result.details["sequences"] > 4  # of 16,384, which are too many to try
 
 
-def test_random_search_is_the_learner_without_its_memory():
-    """Trial 0 of the corrective process, then noise of one SD around its postures, whatever the
-    rewards: on a task of one goal the offsets of targets are Gaussian."""
+def test_random_search_begins_with_the_corrective_process_and_keeps_its_best_trial():
+    """Trial 0 of the corrective process; a short run is pinned in test_short_runs."""
     task = load_task("ascending")
     result, _, session = solve(RandomSearch, task, trials=2000)
     alone = corrective_trial(task, "RRR").reward
     assert (session.rewards[0], session.meter.trials) == (alone, 2000)
     assert execute(task, result.solution).reward == max(filter(None, session.rewards)) > alone
-    drawn = []
-
-    class Recorder:
-        x0, dim, left = np.full(6, 2.0), 6, 2000
-
-        def __init__(self, *_, **__):
-            pass
-
-        def many(self, points):
-            drawn.append(points)
-            self.left -= len(points)
-            if self.left <= 0:
-                raise BudgetError("no trial is left")
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(random_search, "Objective", Recorder)
-        random_search.draw_trials(SimpleNamespace(rng=np.random.default_rng(0)), "RRR", 0.3, 2000)
-    offsets = (np.concatenate(drawn) - 2.0).ravel() / 0.3
-    assert stats.kstest(offsets, "norm").pvalue > 0.01
 
 
 def test_random_search_with_every_hand_sequence():
@@ -92,7 +57,7 @@ def test_random_search_with_every_hand_sequence():
     assert solve(RandomSearchHands, task, trials=301, budget=20)[2].meter.trials == 20
 
 
-def test_the_bandit_exploits_explores_and_goes_where_rewards_are():
+def test_the_bandit_exploits_and_explores():
     """Each sequence begins with its corrective trial; LRLR has -532 at first, the next -574."""
     task = load_task("two-armed-1")
     alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
@@ -101,8 +66,6 @@ def test_the_bandit_exploits_explores_and_goes_where_rewards_are():
     assert result.details["trials"]["LRLR"] == 300 - 15
     even, *_ = solve(CMAES, task, trials=480, exploration=100.0)
     assert min(even.details["trials"].values()) > 18
-    balanced, *_ = solve(CMAES, task, trials=800)
-    assert balanced.details["trials"]["LRLR"] > 400
 
 
 SECOND_FOR_THE_RIGHT = tiny_task(
@@ -154,11 +117,13 @@ def test_trials_made_together_are_those_made_one_by_one(task):
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_sequences_that_cannot_be_completed_are_left(method):
-    task = SECOND_FOR_THE_RIGHT
-    result, _, session = solve(method, task, trials=150)
+    """The solution is that of the best trial."""
+    result, execution, session = solve(method, SECOND_FOR_THE_RIGHT, trials=150)
     assert session.meter.trials == 150
     assert session.rewards.count(None) == session.meter.failed_trials == 2
-    assert execute(task, result.solution).hands[1] == "R"
+    assert session.rewards.index(execution.reward) == result.details["best_trial"]
+    assert execution.reward == max(filter(None, session.rewards))
+    assert execution.hands[1] == "R"
 
 
 class HalfOfAPlain:

@@ -8,9 +8,11 @@ import numpy as np
 import pandas as pd
 
 from coartic import load_task
+from coartic.analysis.judging import Finding
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
+from coartic.estimates import Estimate
 from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.runs.plan import Cell, Job
 
@@ -35,6 +37,15 @@ class MadeUp(Study):
 def made(values):
     """A method that returns values by its arguments, of replays by ``True`` as well."""
     return lambda *key, replay=False: values[(*key, replay) if replay else key]
+
+
+def found(holds, *p, against=None, n=20):
+    """A finding of a claim, with tests of these p-values, and of its opposite with others."""
+    tests, contrary = (
+        None if each is None else tuple(Estimate(1.0, p=p, n=(n,), resamples=9_999) for p in each)
+        for each in (p, against)
+    )
+    return Finding(holds, "planted", tests, contrary)
 
 
 def made_up_optima(*tasks):
