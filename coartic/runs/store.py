@@ -609,7 +609,7 @@ def _has_tables(connection: sqlite3.Connection) -> bool:
     if version < FORMAT:
         raise CoarticError(
             "it was written by coartic 3.0.0 or earlier: version 3.0.0 reads it, or says which "
-            "version does. Run the suite again with another --out"
+            "version does; or run the suite again with another --out"
         )
     if any(kind == "trigger" for kind, _ in there) or {*_SCHEMA} - {sql for _, sql in there}:
         raise CoarticError(
