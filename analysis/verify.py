@@ -257,15 +257,9 @@ def _check_all(db: sqlite3.Connection) -> Report:
         try:
             task = tasks.get(row["cell"], "its cell is not there")
             need(not isinstance(task, str), task)
-<<<<<<< HEAD
             _check_identity(row)
-            rewards, stored = _check_rewards(row), _read_movements(db, row["number"])
+            stored = _read_movements(db, row["number"])
             parts = {part: [*map(_move_row, count(), stored[part])] for part in STATED}
-=======
-            check_identity(row)
-            stored = read_movements(db, row["number"])
-            parts = {part: [*map(move_row, count(), stored[part])] for part in STATED}
->>>>>>> w95s
             need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
             spent += sum(move.ticks for moves in parts.values() for move in moves)
             spent += row["trials"] or 0
@@ -277,7 +271,7 @@ def _check_all(db: sqlite3.Connection) -> Report:
                     close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
                     need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
             content = json.dumps([row["status"], *chain(*stored.values())])
-            result = hashlib.sha256(content.encode() + check_rewards(row)).hexdigest()[:16]
+            result = hashlib.sha256(content.encode() + _check_rewards(row)).hexdigest()[:16]
             need(row["result"] == result, "a joint or a trial was changed")
         except Exception as problem:  # whatever keeps a run from being executed
             wrong.append(f"{where}: {problem}.")
