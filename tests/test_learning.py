@@ -319,7 +319,7 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
         ("ascending", "EC1", {"start": movements_of("R", [ZERO])}, "movements for goals"),
         ("ascending", "EC1", {"start": movements_of("LLL", [ZERO] * 3)}, "no left hand"),
         ("two-armed-1", "EC1", {"start": movements_of("LLLL", [ZERO] * 4)}, "the first .* left"),
-        ("ascending", "EC1", {"seeds": range(10**9)}, "seeds has more than 1_000_000 entries"),
+        ("ascending", "EC1", {"seeds": range(10**9)}, "seeds has more than 1,000,000 entries"),
         ("ascending", "EC1", {"seeds": itertools.count(), "trials": 10_000}, "more than 20,000"),
     ],
 )
