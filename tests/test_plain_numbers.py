@@ -8,7 +8,8 @@ import pytest
 
 from tests import plain_numbers
 
-STORED = Path(__file__).parents[1] / "docs" / "stored" / "comparison"
+ROOT = Path(__file__).parents[1]
+STORED = ROOT / "docs" / "stored" / "comparison"
 
 
 def test_stored_tables_have_the_numbers_of_the_plain_computation():
@@ -16,7 +17,7 @@ def test_stored_tables_have_the_numbers_of_the_plain_computation():
     imported = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import)
                 for name in node.names}  # fmt: skip
     assert not any(name.startswith("coartic") for name in imported)
-    signs, scores, methods = (
+    signs, ranking, methods = (
         pd.read_csv(STORED / f"{name}.csv", index_col=0)
         for name in ("signatures", "ranking", "methods")
     )
@@ -29,14 +30,12 @@ def test_stored_tables_have_the_numbers_of_the_plain_computation():
     }
     rows = {"learner": "dual-process (EC1, EC4)", "cma": "cma-es/bandit",
             "hill climbing": "hill-climbing", "random search": "random-search"}  # fmt: skip
-    stored |= {f"{score} {name}": scores[score][row]
+    stored |= {f"{score} {name}": ranking[score][row]
                for score in ("gap", "share") for name, row in rows.items()}  # fmt: skip
     stored["RLRR random search"] = methods.reward["two-armed-2 random-search hands=RLRR"]
     stored["EC4 two-armed-2"] = methods.reward["two-armed-2 dual-process/EC4"]
+    rewards = pd.read_csv(ROOT / "studies" / "replication" / "rewards.csv", index_col=0)
     for name, row in (("EC2 RRLR", "two-armed-1 EC2"), ("EC3 RLRR", "two-armed-2 EC3")):
-        rewards = pd.read_csv(
-            Path(__file__).parents[1] / "studies" / "replication" / "rewards.csv", index_col=0
-        )
         stored[name] = rewards.runs[f"{row} {name.split()[1]}"]
     assert len(plain) == 20
     assert plain == pytest.approx(stored, rel=1e-5)
