@@ -3,43 +3,47 @@
 ``coartic.analysis.load(folder)`` reads a results folder as a :class:`Study`.
 """
 
-from importlib import import_module
 from typing import Any
 
+from coartic.internal.lazy import find, names_of
+
 _MODULES = {
-    "SIGNATURES": "analysis.signatures.measures",
-    "Study": "analysis.study",
-    "TwoContexts": "analysis.signatures.two_contexts",
-    "all_of": "analysis.judging",
-    "beyond_p": "analysis.signatures.context_tests",
-    "by_task": "analysis.frames",
-    "contexts_of_control": "analysis.control",
-    "control_suite": "analysis.control",
-    "ecdf": "analysis.frames",
-    "fill_page": "analysis.pages",
-    "gaps": "analysis.frames",
-    "interval": "analysis.words",
-    "judge": "analysis.judging",
-    "load": "analysis.study",
-    "mean": "estimates",
-    "mean_beyond": "analysis.judging",
-    "mean_excess": "analysis.control",
-    "means": "analysis.frames",
-    "number": "analysis.words",
-    "other_tasks": "analysis.statistics.instances",
-    "ranking": "analysis.frames",
-    "read_hits": "analysis.hits",
-    "shares": "analysis.frames",
-    "solutions_of": "analysis.frames",
-    "runtimes": "analysis.sections.costs",
-    "with_control": "analysis.control",
-    "write_study": "analysis.pages",
+    "SIGNATURES": "coartic.analysis.signatures.measures",
+    "Study": "coartic.analysis.study",
+    "TwoContexts": "coartic.analysis.signatures.two_contexts",
+    "all_of": "coartic.analysis.judging",
+    "beyond_p": "coartic.analysis.signatures.context_tests",
+    "by_task": "coartic.analysis.frames",
+    "contexts_of_control": "coartic.analysis.control",
+    "control_suite": "coartic.analysis.control",
+    "ecdf": "coartic.analysis.frames",
+    "fill_page": "coartic.analysis.pages",
+    "gaps": "coartic.analysis.frames",
+    "interval": "coartic.analysis.words",
+    "judge": "coartic.analysis.judging",
+    "load": "coartic.analysis.study",
+    "mean": "coartic.estimates",
+    "mean_beyond": "coartic.analysis.judging",
+    "mean_excess": "coartic.analysis.control",
+    "means": "coartic.analysis.frames",
+    "number": "coartic.analysis.words",
+    "other_tasks": "coartic.analysis.statistics.instances",
+    "ranking": "coartic.analysis.frames",
+    "read_hits": "coartic.analysis.hits",
+    "shares": "coartic.analysis.frames",
+    "solutions_of": "coartic.analysis.frames",
+    "runtimes": "coartic.analysis.sections.costs",
+    "with_control": "coartic.analysis.control",
+    "write_study": "coartic.analysis.pages",
 }
 __all__ = [*_MODULES]
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name when it is asked for: not every command needs all of them."""
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"coartic.{_MODULES[name]}"), name)
+    """Import a name of the API on first use: not every command needs all of them."""
+    return find(__name__, name, _MODULES)
+
+
+def __dir__() -> list[str]:
+    """The names of the API."""
+    return names_of(__name__, _MODULES)

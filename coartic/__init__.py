@@ -5,8 +5,9 @@ Coarticulation in Motor Skill Acquisition*, and everything its alternatives shar
 with it: robot, tasks, movement, corrective process, execution and scoring.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from coartic.internal.lazy import find, names_of
 
 if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
@@ -101,13 +102,10 @@ HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name i
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for, when it is: the compiler takes a while, and few need it."""
-    if name not in HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(HOME[name]), name)
-    return value
+    """Import a name of the API on first use."""
+    return find(__name__, name, HOME)
 
 
 def __dir__() -> list[str]:
-    """The names of the API, and those that Python gives every module."""
-    return sorted({*__all__, *(name for name in globals() if name.endswith("__"))})
+    """The names of the API."""
+    return names_of(__name__, HOME)
