@@ -270,6 +270,7 @@ def _check_all(db: sqlite3.Connection) -> Report:
                 for name, now in zip(STATED[part], outcome, strict=False):
                     close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
                     need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
+            where = f"Run {run}"
             content = json.dumps([row["status"], *chain(*stored.values())])
             result = hashlib.sha256(content.encode() + _check_rewards(row)).hexdigest()[:16]
             need(row["result"] == result, "a joint or a trial was changed")
