@@ -54,9 +54,11 @@ def checked(
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
     wanted = [*dict.fromkeys((*names, *others, *numbers))]
     if missing := [name for name in wanted if name not in frame.columns]:
-        raise CoarticError(f"the frame has no column {', '.join(map(shown, missing))}")
+        raise CoarticError(f"the frame has no column {', '.join(map(inline, missing))}")
     if several := [name for name in wanted if [*frame.columns].count(name) > 1]:
-        raise CoarticError(f"the frame has column {shown(several[0])} twice: leave one of them out")
+        raise CoarticError(
+            f"the frame has column {inline(several[0])} twice: leave one of them out"
+        )
     if not len(frame):
         raise CoarticError("the frame has no rows")
     columns = frame[wanted].copy()
@@ -76,8 +78,8 @@ def checked(
     return columns
 
 
-def shown(name: object) -> str:
-    """Return the name of a column as one printable line."""
+def inline(name: object) -> str:
+    """Return the name of a column as one inline line."""
     return plain(str(name))
 
 
@@ -101,7 +103,7 @@ def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
         raise CoarticError(
-            f"column {shown(column)} has {brief_value(value)} in row {brief_value(row)}: {needed}"
+            f"column {inline(column)} has {brief_value(value)} in row {brief_value(row)}: {needed}"
         )
 
 
@@ -254,7 +256,7 @@ def means(
     if not by:
         raise CoarticError("by is empty: needed are names of columns")
     if both := [name for name in columns if name in by]:
-        raise CoarticError(f"column {shown(both[0])} is in by and in columns: needed is one")
+        raise CoarticError(f"column {inline(both[0])} is in by and in columns: needed is one")
     values, rows = checked(frame, numbers=columns, others=by), []
     for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}

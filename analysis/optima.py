@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -13,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from coartic import Task
 from coartic.analysis.methods import SEARCHES
-from coartic.analysis.solutions import initial_solution
 from coartic.internal.arguments import checked_arguments
 from coartic.robot import Array
 from coartic.runs.plan import label_of
@@ -89,9 +87,3 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
     """Return (optimum − reward) / |optimum|: 0 at the optimum, 0.01 for 1 % more ticks."""
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))
-
-
-def initial_reward(task: Task) -> float:
-    """Return the reward of the initial solution of a task; NaN without an initial solution."""
-    solution = initial_solution(task)
-    return math.nan if solution is None else float(-solution.ticks)

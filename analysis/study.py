@@ -24,7 +24,6 @@ from coartic.analysis.optima import (
     BestKnown,
     best_known,
     gap_share,
-    initial_reward,
     restrictions,
 )
 from coartic.analysis.signatures.measures import signature_named
@@ -35,6 +34,7 @@ from coartic.internal.arguments import Asked, Computed, checker_of
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
+from coartic.motion.solution import initial_reward
 from coartic.motion.trial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
@@ -234,10 +234,11 @@ class Study:
         corrective process completes the task with none.
         """
         alone = {}
-        for name in self.tasks:
+        for name, task in self.tasks.items():
             of_hands = self.sequences(name).reward
             highest = max(of_hands.dropna(), default=math.nan)
-            alone[name] = highest if len(of_hands) else initial_reward(self.tasks[name])
+            initial = None if len(of_hands) else initial_reward(task)
+            alone[name] = highest if initial is None else float(initial)
         return alone
 
     @cached_property

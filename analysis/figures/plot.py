@@ -66,7 +66,7 @@ Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 """Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and its tasks."""
 
 
-class Draws(Protocol):
+class DrawsFigure(Protocol):
     """A figure of the report, as a function of a study."""
 
     def __call__(
@@ -87,7 +87,7 @@ class Draws(Protocol):
         """
 
 
-def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], Draws]:
+def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that turns a drawing function of a study into a figure of the report.
 
     The figure is in the style of all figures; its id is the name of the function. The caption
@@ -95,7 +95,7 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
     ``runs`` of the drawn numbers.
     """
 
-    def as_figure(draw: Callable[[Study], Parts | None]) -> Draws:
+    def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
         @wraps(draw)
         def plot(
             study: Study,

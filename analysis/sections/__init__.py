@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coartic.analysis.figures.plot import Draws
+from coartic.analysis.figures.plot import DrawsFigure
 from coartic.analysis.sections import (
     coarticulation,
     costs,
@@ -26,7 +26,7 @@ class Section:
     id: str
     title: str
     tables: tuple[Table, ...]
-    figures: tuple[Draws, ...] = ()
+    figures: tuple[DrawsFigure, ...] = ()
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
     folds all figures but the first."""
     sentence: str = ""

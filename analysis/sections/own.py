@@ -8,7 +8,7 @@ import pandas as pd
 from coartic.analysis.frames import ranking
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.sections.costs import half_of_targets
-from coartic.analysis.sections.ranking import SCORES
+from coartic.analysis.sections.ranking import SCORE_COLUMNS
 from coartic.analysis.standings import board, compared, runs_on, solved_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, run_ids, table
@@ -52,7 +52,7 @@ def list_own(study: Study) -> Rows:
         for name in dict.fromkeys([own, *others]):
             runs = parts[name]
             row: Row = {"own": own, "method": name, "tasks": len(tasks), "runs": len(runs)}
-            row |= {score: scores[score][name] for score in SCORES}
+            row |= {score: scores[score][name] for score in SCORE_COLUMNS}
             if study.methods.information[name] == BY_TRIAL:
                 row |= half_of_targets(study, runs).columns("trials_to_half")
             if name != own:

@@ -30,7 +30,7 @@ from coartic.analysis.words import capital, interval, marked, number
 from coartic.estimates import LEVEL
 from coartic.internal.text import counted
 
-SCORES = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
+SCORE_COLUMNS = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
 """Columns of :func:`.ranking` that are in the table for all tasks and for parts of them."""
 LONGEST = 44
 """Letters of a name in the figure."""
@@ -108,12 +108,12 @@ def list_ranking(study: Study) -> Rows:
         "_two_armed": runs[runs.arms == 2],
         "_early": after(study, runs, EARLY),
     }
-    wide = board(study).reindex(columns=[*SCORES, "tasks", "missing", "without_gain"])
+    wide = board(study).reindex(columns=[*SCORE_COLUMNS, "tasks", "missing", "without_gain"])
     for name, frame in subsets.items():
         if len(frame):
-            ends = [score.partition("_") for score in SCORES]
+            ends = [score.partition("_") for score in SCORE_COLUMNS]
             names = [score + name + line + end for score, line, end in ends]
-            wide = wide.join(ranking(frame).reindex(columns=SCORES).set_axis(names, axis=1))
+            wide = wide.join(ranking(frame).reindex(columns=SCORE_COLUMNS).set_axis(names, axis=1))
     wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
     over: dict[Any, Any] = wide.to_dict("index")
     single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]

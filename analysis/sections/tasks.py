@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
-from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.words import marked, titled_apart
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
+from coartic.motion.solution import initial_reward
 
 
 @table(
