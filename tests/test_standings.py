@@ -11,10 +11,11 @@ from coartic import Task, load_task
 from coartic.analysis import standings
 from coartic.analysis.method_frame import BY_TRIAL, WITHOUT_REWARD, headline_methods
 from coartic.analysis.optima import BestKnown
-from coartic.analysis.report import about
+from coartic.analysis.report import about, render
 from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
 from coartic.analysis.statistics import running_times
+from coartic.analysis.words import number
 from coartic.estimates import SEED
 from tests.support.golden import golden
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
@@ -241,6 +242,8 @@ def test_an_own_method_stands_next_to_others_on_the_tasks_that_it_solved():
     assert rows.gap.tolist() == pytest.approx(gaps)
     assert rows.difference.tolist()[1:] == pytest.approx([gap - gaps[0] for gap in gaps[1:]])
     assert math.isnan(rows.difference_low.iloc[1])  # of two runs there is no interval
+    texts = render.texts_of(TABLES["own"], rows, "difference")
+    assert texts[1].startswith(number(100 * rows.difference.iloc[1], 1))  # per cent, as the gaps
     # Of runs that have the same seeds the interval is for independent ones, as in the ranking.
     rewards, drawn = np.array([-309, -301, -305, -304]), np.random.default_rng(0)
     row_of = TABLES["own"](study(TEN | {("ascending", "mine"): list(rewards)})).loc[

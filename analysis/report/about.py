@@ -73,7 +73,7 @@ def finding(study: Study, section: Section) -> list[str]:
         "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
         "uses": GROUPS, "reference": reference(study, common_tasks(study)),
     }  # fmt: skip
-    text = environment.from_string(section.sentence).render(rows=rows)
+    text = environment.from_string(section.sentence).render(rows=rows, every=frame)
     return [shown(line.strip()) for line in text.split("\n") if line.strip()]
 
 

@@ -58,9 +58,9 @@ SECTIONS = (
 {% endfor %}
 .
 {% endfor %}""",
-        note="On the tasks on which the own method solved every run: the nearest built-in method "
-        "with the same use of the reward, the learner and CMA-ES. What an own method uses is as "
-        "its author declares.",
+        note="On the tasks on which the own method solved every run: the built-in method with the "
+        "nearest gap and the same use of the reward, the learner and CMA-ES. What an own method "
+        "uses is as its author declares.",
         single=False,
     ),
     Section(
@@ -99,11 +99,11 @@ Gap to the {{ reference }}, {{ use }}: \
         sentence="""\
 {% for row in rows.head(1).to_dict("records") %}
 {{ row.title }}, {{ row.place }}: {{ row.verdict }}. Posture difference \
-{{ row.distance | number(2) }} ({{ row.runs }} runs); \
+{{ row.distance | number(2) }} (length units and rad; {{ row.runs }} runs); \
 random search: {{ row.control | number(2) }}{{ " (%s)" % p_value(row.p_random_search) \
 if row.p_random_search >= 0 }}.
 {% endfor %}
-Methods and shared goals by verdict: {{ rows.verdict | counts }}.""",
+Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
         note="Postures are compared in length units and rad. Ticks are compared with those of the "
         "corrective process with the same hands. A first movement that gets slower while the whole "
         "task gets faster is sacrificed for it. Idle hand nearer: share of the path to its next "

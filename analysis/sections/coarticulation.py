@@ -143,7 +143,7 @@ def list_signatures(study: Study) -> Rows:
         for hands, row in rows.items():
             gained = gains[good.hands == hands] if hands else gains
             row |= mean(gained).columns("gain") | {"hands": hands}
-            row |= mean(100 * gained / possible).columns("share") if possible > 0 else {}
+            row |= mean(gained / possible).columns("share") if possible > 0 else {}
             key = " ".join(filter(None, (name, label, hands)))
             yield key, row_of_cell(study, study.cells[name, label]) | row
 

@@ -13,6 +13,7 @@ from coartic.analysis.standings import board, compared, runs_on, solved_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.estimates import FEWER_RESAMPLES, Estimate, mean_of_means
+from coartic.learner.conditions import CONDITIONS
 from coartic.robot import Array
 
 
@@ -25,14 +26,14 @@ def own_methods(study: Study) -> list[str]:
 @table(
     "Own methods, and built-in methods on the tasks that they solved",
     "own: own method; method; gap[]: gap (%) .1; "
-    "difference[]: gap less that of the own method (percentage points) .1; "
+    "difference[]: gap less that of the own method (%) .1; "
     "share[]: share of the gain (%) .0; trials_to_half[]: trials to half of the targets; tasks; "
     "runs",
 )
 def list_own(study: Study) -> Rows:
-    """List each method from a file, then the nearest built-in method with the same use of the
-    reward, the learner that explores most, and CMA-ES, on the tasks on which the method from the
-    file solved every run.
+    """List each method from a file, then the built-in method with the nearest gap and the same use
+    of the reward, the learner that explores most, and CMA-ES, on the tasks on which the method from
+    the file solved every run.
 
     Intervals are for other runs on the same tasks.
     """
@@ -44,9 +45,11 @@ def list_own(study: Study) -> Rows:
         known = study.methods.loc[scores.index[scores.gap.notna()]]
         built_in = known[known.built_in & (known.under == "")]
         same_use = built_in[built_in.information == study.methods.information[own]]
+        apart = (scores.gap[same_use.index[~same_use.is_learner]] - scores.gap[own]).abs()
+        explores = built_in.condition[built_in.is_learner].map([*CONDITIONS].index)
         others = [
-            *same_use.index[~same_use.is_learner][:1],
-            *built_in.index[built_in.is_learner][-1:],
+            *apart.sort_values(kind="stable").index[:1],
+            *explores.sort_values(kind="stable").index[-1:],
             *built_in.index[built_in.index == "cma-es/bandit"],
         ]
         for name in dict.fromkeys([own, *others]):

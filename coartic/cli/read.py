@@ -64,7 +64,7 @@ def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     from coartic.analysis.sections import SECTIONS, TABLES
     from coartic.analysis.words import interval, number
 
-    rows = TABLES["ranking"](study).dropna(subset="gap")
+    rows = TABLES["ranking"](study).dropna(subset="gap").sort_values("gap", kind="stable")
     rows = rows[~rows.method.isin(study.methods.index[study.methods.under != ""])]
     named = [row["method"] for row in leading(rows)]
     rows = rows[rows.method.isin([*rows.method[: 12 - len(named)], *named])]
