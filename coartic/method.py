@@ -443,7 +443,7 @@ class Session:
         until = None if until is None else real_array("until", until)
         with self.lock:
             left = self._affordable(len(given))
-            accounts = self.make_trials(codes[:left], given[:left], until=until)
+            accounts = self._make_trials(codes[:left], given[:left], until=until)
         trials = trials_of(accounts, self.dof)
         if Information.CORRECTIVE_PROCESS in self._information:
             return trials
@@ -475,7 +475,7 @@ class Session:
         not fit."""
         return hand_codes(self._task, hands, count)
 
-    def make_trials(
+    def _make_trials(
         self, codes: Hands, targets: Configs, *, until: ArrayLike | None = None
     ) -> Accounts:
         """Make trials that fit the task and the budget, as :meth:`trials` does, with hands of shape

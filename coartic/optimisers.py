@@ -346,7 +346,7 @@ class Objective:
         with self._session.lock:
             self._trials_left(1)
             self._targets.put(self._entries, point)
-            made = self._session.make_trials(self._codes, self._targets)
+            made = self._session._make_trials(self._codes, self._targets)
             cost = float(min(-made.rewards.item(), FAILED))
             self.evaluations += 1
             if cost < self.best_cost:
@@ -398,7 +398,7 @@ class Objective:
         """Make a trial for each point, write its cost into ``costs``, count it, and note each new
         best."""
         codes, targets = self._trials_of(points, codes)
-        made = self._session.make_trials(codes, targets)
+        made = self._session._make_trials(codes, targets)
         np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self.best_cost:
             before = np.minimum.accumulate(np.append(self.best_cost, costs))[:-1]

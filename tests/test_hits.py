@@ -9,7 +9,8 @@ import pytest
 
 from coartic import CONDITIONS, CoarticError, correct, learn_many, load_task, move
 from coartic.analysis import TwoContexts, read_hits, solutions_of
-from coartic.motion.trial import reach_goals
+from coartic.motion.batch import robot_parameters
+from coartic.motion.trial import ALL_STOP, Requests, reach, reach_goals
 from tests.support import reference
 from tests.support.strategies import metres_task
 
@@ -202,13 +203,33 @@ def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
 @pytest.mark.parametrize("where", ["start", "target", "goal"])
 def test_kernels_end_whatever_they_get(bad, where):
-    """As they are called without checks; a loop that does not end would end the tests."""
+    """Without the checks of their callers; a loop that does not end would end the tests."""
     q, targets = np.tile(TASK.q0, (5, 1)), np.tile(TASK.q0 + 0.5, (5, 1))
     goals = np.tile(TASK.goal_array[0], (5, 1))
     {"start": q, "target": targets, "goal": goals}[where][::2, 0] = bad
-    for given in (targets, None):
-        reached = reach_goals(TASK.robot, q, np.array([0, 1, 0, 1, 0]), goals, TASK.radius, given)
-        assert reached.ticks.shape == (5,)
+    hands, parameters = np.array([[0], [1]] * 2 + [[0]]), robot_parameters(TASK.robot)
+    for given in (targets, np.full(q.shape, np.nan)):
+        arms = Requests(q, hands, given[:, None, None], ALL_STOP, goals[:, None])
+        assert reach(TASK.robot, arms, parameters).rewards.shape == (5,)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "words"),
+    [
+        *(("hands", [0, hand], "needed are 0 .left. and 1 .right.") for hand in (2, 7, -1, 0.5)),
+        *(("hands", hand, "hands") for hand in (10**6, [0], "LR", [True, False], [0, 10**6])),
+        *(("q", q, "^q ") for q in (TASK.q0, [TASK.q0[:9]] * 2, [TASK.q0 * np.nan] * 2)),
+        *(("goals", goals, "^goals ") for goals in ([[1.0, 2.0]], [[1.0, np.inf]] * 2, "x")),
+        *(("targets", targets, "^targets ") for targets in (TASK.q0, np.zeros((2, 9)), "x")),
+        *(("radius", radius, "radius") for radius in (0.0, -1.0, np.nan, "x")),
+        ("locked_base", ("z",), "may name 'x' and 'y'"),
+    ],
+)
+def test_many_arms_are_checked_before_a_kernel_gets_them(name, wrong, words):
+    usual = {"q": [TASK.q0] * 2, "hands": [0, 1], "goals": TASK.goal_array[:2], "radius": 0.1}
+    assert reach_goals(TASK.robot, **usual).hit.all()
+    with pytest.raises(ValueError, match=words):
+        reach_goals(TASK.robot, **usual | {name: wrong})
 
 
 @pytest.mark.parametrize("goal", [(1, 2, 3), (1,), 1.0, (1, np.nan), (np.inf, 1), ("1", "2"), None])

@@ -74,7 +74,12 @@ def robot_parameters(
     model: MotionModel = PAPER,
     checks: bool = True,
 ) -> NDArray[np.void]:
-    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``."""
+    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``.
+
+    Raises ValueError for locks of what is no coordinate of the base.
+    """
+    if not set(locked_base) <= {"x", "y"}:
+        raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     parameters = np.zeros(1, _parameters_type(_links_for(robot)))
     for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
         first, links, *shoulder = robot.arm(hand)

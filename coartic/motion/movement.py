@@ -528,8 +528,6 @@ def correct(
     -----
     Source: paper, Figure 2 (Whitney 1969; Craig 2004).
     """
-    if not set(locked_base) <= {"x", "y"}:
-        raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     _check_arm(robot, hand)
     batch = batch_for(robot, 1)
     run, figures = batch.runs[0], slice(robot.dof)
@@ -623,16 +621,22 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
 def configuration(robot: Robot, q: Any) -> Array:
     """Return a contiguous copy of one configuration. Raises ValueError for a wrong shape or
     figure."""
-    array = np.array(real_array("configuration", q), order="C")
-    if array.shape != (robot.dof,):
-        raise ValueError(f"configuration has shape {array.shape}; this robot needs ({robot.dof},)")
+    return finite_array("configuration", q, (robot.dof,))
+
+
+def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """Return a contiguous copy of an array of numbers, for the kernels. Raises ValueError where the
+    shape is another or a number is not finite or beyond ``LARGEST_ENTRY``."""
+    array = np.array(real_array(name, value), order="C")
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}; needed is {shape}")
     if not (np.abs(array) <= LARGEST_ENTRY).all():
         what = (
             f"has a figure beyond {LARGEST_ENTRY:g}"
             if np.isfinite(array).all()
             else "is not finite"
         )
-        raise ValueError(f"configuration {array.tolist()} {what}")
+        raise ValueError(f"{name} {brief_value(array.tolist())} {what}")
     return array
 
 

@@ -30,7 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
-from coartic.internal.limits import brief_value
+from coartic.internal.arguments import checked_arguments
+from coartic.internal.limits import brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.internal.threads import in_parts
 from coartic.model import PAPER, MotionModel, check_model
@@ -51,6 +52,7 @@ from coartic.motion.movement import (
     configuration,
     correct_slots,
     explain_failure,
+    finite_array,
     move_slots,
     pull_slots,
 )
@@ -392,6 +394,7 @@ class Reached(NamedTuple):
     """Number of forward-kinematics evaluations."""
 
 
+@checked_arguments
 def reach_goals(
     robot: Robot,
     q: Configs,
@@ -405,8 +408,6 @@ def reach_goals(
     model: MotionModel = PAPER,
 ) -> Reached:
     """Let N arms reach for a goal each, side by side, from where they are.
-
-    Arguments are not checked.
 
     Parameters
     ----------
@@ -436,17 +437,34 @@ def reach_goals(
     Reached
         Where the arms ended, and what that took.
 
+    Raises
+    ------
+    ValueError
+        A shape is wrong, a number is not finite, a hand is neither, or the model does not
+        fit the radius. An arm with a target beyond 1e5 does not hit, without a movement.
+
     Notes
     -----
     Source: paper, sections *Generating Movement for Each Goal* and *The Corrective Process*.
     """
-    given = np.full(q.shape, np.nan) if targets is None else np.array(targets, order="C")
+    count = len(np.atleast_2d(q))
+    starts = finite_array("q", q, (count, robot.dof))
+    if targets is None:
+        targets = np.full(starts.shape, np.nan)
+    given = np.array(real_array("targets", targets), order="C")
+    if given.shape != starts.shape:
+        raise ValueError(f"targets has shape {given.shape}; needed is {starts.shape}")
+    codes = finite_array("hands", hands, (count,)).astype(np.int64)
+    if not (np.isin(codes, range(len(HANDS))) & (codes == hands)).all():
+        raise ValueError(f"hands is {brief_value(hands)}; needed are 0 (left) and 1 (right)")
+    check_limits("radius", radius, 1e-9, LARGEST_ENTRY)
+    check_model(model, radius=radius)
     arms = Requests(
-        starts=np.array(q, order="C"),
-        hands=np.array(hands)[:, None],
+        starts=starts,
+        hands=codes[:, None],
         targets=given[:, None, None],
         stops=ALL_STOP,
-        goals=np.array(goals, order="C")[:, None],
+        goals=finite_array("goals", goals, (count, 2))[:, None],
     )
     parameters = robot_parameters(
         robot, radius, locked_base=locked_base, model=model, checks=checks
