@@ -75,6 +75,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     return known
 
 
+@checked_arguments
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the parameters ``base`` and ``other_arm`` of each run, which restrict movements."""
     default = {"base": BASE, "other_arm": "free"}
@@ -84,6 +85,7 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
+@checked_arguments
 def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
     """Return (optimum − reward) / |optimum|: 0 at the optimum, 0.01 for 1 % more ticks."""
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))

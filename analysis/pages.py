@@ -102,6 +102,7 @@ def fill_page(template: str | Path, **values: Any) -> str:
     return environment.get_template(template.name).render()
 
 
+@checked_arguments
 def expect(holds: bool, what: str) -> str:
     """Return an empty text. Raises ValueError if a sentence of the page no longer holds."""
     if not holds:

@@ -30,7 +30,7 @@ from coartic.analysis.signatures.measures import signature_named
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
-from coartic.internal.arguments import Asked, Computed, checker_of
+from coartic.internal.arguments import Asked, Computed, checked_arguments, checker_of
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
@@ -58,12 +58,14 @@ UNITS = {
 """Units of columns of :attr:`Study.runs`, which its ``attrs`` have."""
 
 
+@checked_arguments
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the runs with a solution."""
     have_one = runs.status == "ok"
     return runs if have_one.all() else runs[have_one]
 
 
+@checked_arguments
 def typical_run(runs: pd.DataFrame) -> str:
     """Return the id of the solved run with the reward nearest to the median."""
     rewards = runs.reward.to_numpy(dtype=np.float64)

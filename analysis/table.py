@@ -15,6 +15,7 @@ import pandas as pd
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
+from coartic.internal.arguments import checked_arguments
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -127,6 +128,7 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     }
 
 
+@checked_arguments
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
     """Return what tables with a row for each method on each task say: task, method, numbers of runs
     and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.

@@ -23,6 +23,7 @@ from coartic import Task, TaskError, parse_task
 from coartic.baselines.posture_graph import cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
+from coartic.internal.arguments import checked_arguments
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.tasks.task import letters_of
 
@@ -90,6 +91,7 @@ class OptimumSearch(Method):
         return Result(best.movements, details)
 
 
+@checked_arguments
 def with_locks(task: Task, base: str) -> Task:
     """The task with further base coordinates locked."""
     if base == "task":

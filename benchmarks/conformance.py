@@ -24,6 +24,7 @@ from coartic import (
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.worker import OWN_GENERATOR
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import counted
 from coartic.method import METERED
 from coartic.motion.solution import goals_without_target, hint_of
@@ -50,6 +51,7 @@ class Law(NamedTuple):
     finding: str
 
 
+@checked_arguments
 def law(name: str, problems: Iterable[str], finding: str) -> Law:
     """Return a law that holds if there are no problems; the finding of a broken law is its first
     problem."""

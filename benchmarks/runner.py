@@ -25,6 +25,7 @@ from coartic.benchmarks.reproduce import doubts_of
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
@@ -277,6 +278,7 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
     return missing
 
 
+@checked_arguments
 def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     """Divide jobs for workers, and return them in the order in which they begin; results do not
     depend on the division.

@@ -127,6 +127,7 @@ TAKEN_BY = {
 """Command that takes a thing of each kind."""
 
 
+@checked_arguments
 def kind_of(name: str) -> str:
     """Return the kind of a shipped suite or family, a file or a folder (:data:`TAKEN_BY`); empty
     for any other name."""
@@ -143,6 +144,7 @@ def kind_of(name: str) -> str:
     return next((kind for key, kind in keys.items() if key in content), "")
 
 
+@checked_arguments
 def check_kind(name: str, *kinds: str) -> None:
     """Check that a name, if it is a thing at all, is of one of these kinds. Raises CoarticError,
     which names the command for its kind."""

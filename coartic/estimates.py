@@ -91,12 +91,14 @@ def slices(count: int, most: int) -> Iterator[slice]:
         yield slice(start, min(start + most, count))
 
 
+@checked_arguments
 def varies(values: Array) -> Array:
     """Return whether values differ along the first axis by more than rounding
     (:data:`NEGLIGIBLE`)."""
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 
+@checked_arguments
 def centred(values: Array) -> Array:
     """Values less their mean over the first axis; 0 where they do not differ."""
     return np.where(varies(values), values - values.mean(axis=0), 0.0)
@@ -184,6 +186,7 @@ def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.
     return [[each.astype(np.int16) for each in batch] for batch in drawn(sizes, resamples)]
 
 
+@checked_arguments
 def standard_deviation(values: Array) -> float:
     """SD of values (n,), n - 1 degrees of freedom; 0 without spread, NaN of fewer than two."""
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

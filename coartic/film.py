@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import check_ending, check_output, write_output
 from coartic.internal.text import counted
 
@@ -41,6 +42,7 @@ _COUNTER: Any = {"fontsize": 13, "fontweight": "bold", "va": "bottom"}
 _BESIDE, _BELOW, _ABOVE = 0.08, 0.05, 0.65  # inches beside the axes
 
 
+@checked_arguments
 def write_film(
     movements: Sequence[tuple[str, Trajectory]],
     path: Path,
@@ -90,6 +92,7 @@ def write_film(
     return len(rows), stride / interval_s
 
 
+@checked_arguments
 def check_film(path: Path, *, replace: bool = False) -> None:
     """Raises CoarticError, before anything is drawn, for an ending that is not supported, for MP4
     without ffmpeg, and as :func:`check_output` does."""

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.estimates import Estimate, mean
 from coartic.gym_kernel import VectorState, observe, step_robots
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import counted, unknown
 from coartic.method import Method, MethodError, run_method
@@ -488,6 +489,7 @@ def score(
     return compare(rewards, column(None if each is None else each.reward for each in shipped))
 
 
+@checked_arguments
 def column(rewards: Iterable[float | None]) -> Array:
     """Rewards as a column, shape ``(K, 1)``; NaN for None."""
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
@@ -543,9 +545,13 @@ def _rollout(
     return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
 
 
+@checked_arguments
 def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
     """Compare rewards of policies, shapes ``(K, trials)``, with the best known rewards, shape
     ``(K, 1)``, as :func:`score` returns them."""
+    shapes = [np.shape(earned) for earned in (best, *rewards.values())]
+    if any(len(shape) != 2 or shape[0] != len(best) for shape in shapes):
+        raise ValueError(f"rewards have shapes {shapes}; needed is a row for each task")
     rows, known = {}, np.isfinite(best[:, 0])
     for name, earned in {**rewards, "best known": best}.items():
         gap = ((best - earned) / np.abs(best))[known]

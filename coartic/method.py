@@ -215,6 +215,7 @@ class Outline(NamedTuple):
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
+@checked_arguments
 def outline_of(task: Task) -> Outline:
     """The outline of a task."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)

@@ -22,21 +22,25 @@ IN_MEMORY = 500
 """Most permutations or resamples of runs in memory at once."""
 
 
-def _refuse_other_shapes(*groups: Array) -> None:
-    """Raise ValueError for groups of runs that are not all of shape ``(runs, dof)``."""
+def _groups(*groups: Array) -> list[Array]:
+    """Return groups of runs. Raises ValueError where not all are of shape ``(runs, dof)``."""
     shapes = [np.shape(group) for group in groups]
-    if any(len(shape) != 2 or shape[1:] != shapes[0][1:] for shape in shapes):
+    if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
         raise ValueError(f"runs have shapes {shapes}; needed is (runs, dof) of each")
+    return [np.asarray(group, np.float64) for group in groups]
 
 
+@checked_arguments
 def distance_of_means(first: Array, second: Array) -> float:
     """Return ‖mean(first) − mean(second)‖, the distance of mean configurations of two contexts.
 
     ``first`` and ``second`` have shape ``(runs, dof)``; length unit and rad mixed.
     """
+    first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
 
 
+@checked_arguments
 def standardised_posture_difference(first: Array, second: Array) -> float:
     """Return :func:`distance_of_means` in pooled standard deviations within contexts, 0 to ∞.
 
@@ -45,6 +49,7 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
     a multivariate form of Cohen's d (Cohen 1988). Without an effect of the context the expectation
     of d² is about 1/n₁ + 1/n₂, not 0. NaN if no context has two runs, or if s = 0.
     """
+    first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
     if freedom < 1:
         return math.nan
@@ -68,7 +73,7 @@ def posture_difference_below(
     :func:`standardised_posture_difference` is at least ``bound``; the observed sample counts, too.
     Noise adds to distances, so that p is rather too large. NaN if a context has a single run.
     """
-    _refuse_other_shapes(first, second)
+    first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
         return math.nan
     means, squares = [], np.zeros(resamples)
@@ -83,6 +88,7 @@ def posture_difference_below(
     return float(1 + reached.sum()) / (resamples + 1)
 
 
+@checked_arguments
 def permutation_p(
     first: Array, second: Array, rng: np.random.Generator, *, resamples: Resamples = RESAMPLES
 ) -> float:
@@ -92,6 +98,7 @@ def permutation_p(
     permutations are no more than ``resamples``, 1 if all runs are equal, NaN if a context has a
     single run.
     """
+    first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
         return math.nan
     runs = len(first) + len(second)
@@ -162,7 +169,8 @@ def beyond_p(
     """
     if len(method) != 2 or len(other) != 2:
         raise ValueError("needed are the runs of each method in two contexts")
-    _refuse_other_shapes(*method, *other)
+    groups = _groups(*method, *other)
+    method, other = groups[:2], groups[2:]
     if min(map(len, (*method, *other))) < 2:
         return math.nan
     pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]

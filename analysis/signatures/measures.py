@@ -25,11 +25,13 @@ from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
 
 
+@checked_arguments
 def other(hand: Hand) -> Hand:
     """Return the other hand."""
     return "right" if hand == "left" else "left"
 
 
+@checked_arguments
 def isolated_reaches(
     task: Task, q: Array, goals: NDArray[np.int64], hands: NDArray[np.int64]
 ) -> tuple[Array, Array]:
@@ -49,12 +51,20 @@ def isolated_reaches(
         Ticks, 0 if the hand is within the goal at the start, NaN if the reach ends without a hit;
         and configurations at the end.
     """
+    q = np.asarray(q)
     shape = q.shape[:-1]
+    try:
+        of_reaches = [np.broadcast_to(each, shape).ravel() for each in (goals, hands)]
+        centres = task.goal_array[np.subtract(of_reaches[0], 1, dtype=np.uint64, casting="unsafe")]
+    except (ValueError, IndexError) as error:
+        raise ValueError(
+            f"goals are 1 to {len(task.goals)}, a goal and a hand for each q: {error}"
+        ) from None
     reached = reach_goals(
         task.robot,
         q.reshape(-1, q.shape[-1]),
-        np.broadcast_to(hands, shape).ravel(),
-        task.goal_array[np.broadcast_to(goals, shape).ravel() - 1],
+        of_reaches[1],
+        centres,
         task.radius,
         locked_base=task.locked_base,
     )
@@ -62,6 +72,7 @@ def isolated_reaches(
     return ticks.reshape(shape), reached.q.reshape(q.shape)
 
 
+@checked_arguments
 def gain_at_next(runs: Solutions) -> Array:
     """Return the ticks that the posture at each goal saves on the way to the next, (n, G − 1).
 
@@ -85,6 +96,7 @@ def gain_at_next(runs: Solutions) -> Array:
     return np.where(np.isnan(alone), np.nan, after - nearer)
 
 
+@checked_arguments
 def ticks_slower(runs: Solutions) -> Array:
     """Return the ticks by which each chosen hand is slower for its goal alone, shape ``(n, G)``.
 
@@ -104,6 +116,7 @@ def ticks_slower(runs: Solutions) -> Array:
     return slower
 
 
+@checked_arguments
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     """Return the share of the way to its next goal that the idle hand covers, shape ``(G,)``.
 
@@ -149,6 +162,7 @@ class Signature:
         return values[np.isfinite(values)]
 
 
+@checked_arguments
 def hand(runs: Solutions) -> Array:
     """Return, for each run, the share of goals before the last whose hand is not the fastest for
     that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`."""
@@ -156,6 +170,7 @@ def hand(runs: Solutions) -> Array:
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
+@checked_arguments
 def as_in_isolation(runs: Solutions) -> Array:
     """Return a(i, g): 1 if the chosen hand is the fastest for goal g alone, or else 0.
 
@@ -167,6 +182,7 @@ def as_in_isolation(runs: Solutions) -> Array:
     return np.asarray(ticks_slower(runs) == 0, dtype=np.float64)
 
 
+@checked_arguments
 def other_arm(runs: Solutions) -> Array:
     """Return the mean of :func:`_preshaping_of_the_other_arm` over goals, without NaN."""
     values = _preshaping_of_the_other_arm(runs)
@@ -189,6 +205,7 @@ def _preshaping_of_the_other_arm(runs: Solutions) -> Array:
     return np.array([preshaping(runs.task, run, initial)[:-1] for run in runs.runs])
 
 
+@checked_arguments
 def arm(runs: Solutions) -> Array:
     """Return the mean of :func:`gain_at_next` over goals g < G."""
     if not runs.runs or len(runs.task.goals) < 2:

@@ -47,6 +47,7 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     return [pair for pair in pairs if pair[2]]
 
 
+@checked_arguments
 def movable(task: Task, hand: Hand) -> Array:
     """Return the indices of the joints that can move a hand: free base coordinates and its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
@@ -63,9 +64,15 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     parts in expectation. A difference between contexts is motor-equivalent if the first part
     exceeds the second: another posture with the same position of the hand. Caveat: the radius of
     the goal bounds the second part, and nothing bounds the first. NaN for a space of dimension 0.
+    Raises ValueError for other shapes.
     Source: Mattos, Latash and colleagues, Experimental Brain Research
     (doi:10.1007/s00221-015-4327-4, 10.1007/s00221-018-5215-5).
     """
+    if np.ndim(difference) != 1 or np.shape(jacobian) != (2, len(difference)):
+        raise ValueError(
+            f"difference has shape {np.shape(difference)} and jacobian {np.shape(jacobian)}; "
+            "needed are (k,) and (2, k)"
+        )
     equivalent, other = (
         float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
         for basis in (scipy.linalg.null_space(jacobian), scipy.linalg.orth(jacobian.T))

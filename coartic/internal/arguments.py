@@ -80,8 +80,7 @@ def fits(name: str, value: Any, hint: Any) -> bool:
     if kind in (Union, UnionType) and value is None:
         return type(None) in parts
     if kind is np.ndarray or {*get_args(ArrayLike)} <= {*parts}:
-        real_array(name, value)
-        return True
+        return bool(real_array(name, value).ndim > 0 or kind is not np.ndarray)
     if kind in (Union, UnionType):
         return any(fits(name, value, each) for each in parts)
     if kind is Annotated:
@@ -103,4 +102,5 @@ def fits(name: str, value: Any, hint: Any) -> bool:
         return isinstance(value, kind)
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         return False
-    return not isinstance(value, list | tuple) or all(fits(name, e, parts[0]) for e in value)
+    counted = isinstance(value, list | tuple | np.ndarray)  # others may end only when they are used
+    return not counted or all(fits(name, each, parts[0]) for each in value)

@@ -240,6 +240,7 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
     return [*(zip(levels, places, strict=True) if vertical else zip(places, levels, strict=True))]
 
 
+@checked_arguments
 def broken_rule(family: Family, task: Task) -> str | None:
     """The first rule that a draft breaks; None for a good one.
 
@@ -371,6 +372,7 @@ def shipped_families() -> dict[str, Family]:
     return {family.name: family for family in families}
 
 
+@checked_arguments
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     """Return the families of files by name.
 
@@ -385,6 +387,7 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     return families
 
 
+@checked_arguments
 def load_family(name: str) -> Family:
     """A shipped family by name with version, as ``two-armed/v1``. Raises TaskError."""
     shipped = shipped_families()
@@ -412,6 +415,7 @@ def read_family(path: Path) -> Family:
     return family
 
 
+@checked_arguments
 def instance_names(
     family: str, split: Split, count: int | None = None, year: int | None = None
 ) -> list[str]:

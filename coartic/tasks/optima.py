@@ -46,6 +46,7 @@ class KnownOptimum:
         return self.bound == self.reward
 
 
+@checked_arguments
 def essence(task: Task) -> str:
     """Hash of what makes a task: start, goals, radius, hands, locks, robot."""
     content = task.model_dump(mode="json")
