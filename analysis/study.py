@@ -153,6 +153,7 @@ class Study:
         )
         return f"<p>{html.escape(repr(self))}</p>{counts.reset_index().to_html(index=False)}"
 
+    @checked_arguments
     def only(
         self, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
     ) -> Study:

@@ -28,12 +28,12 @@ from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import MOST_RUN_SEED, check_limits, real_array
+from coartic.internal.limits import MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import Correction, correct
-from coartic.motion.solution import Execution, Movement, check_targets, execute_many
+from coartic.motion.solution import Execution, Movement, SolutionError, check_targets, execute_many
 from coartic.motion.trial import (
     NO_REWARD,
     Accounts,
@@ -334,7 +334,12 @@ class Session:
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Count corrective movements without a target as a use of the corrective process."""
+        """Count corrective movements without a target as a use of the corrective process.
+
+        Raises SolutionError for what is no list of movements.
+        """
+        if not isinstance(solution, Sequence):
+            raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
         for m in solution:
             if getattr(m, "kind", "") == "corrective" and m.target is None:
                 self._use(Information.CORRECTIVE_PROCESS)
@@ -371,8 +376,7 @@ class Session:
         """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1); count its
         iterations, Jacobians and forward-kinematics evaluations."""
         self._use(Information.CORRECTIVE_PROCESS)
-        if not 1 <= goal <= self.goals_count:
-            raise ValueError(f"goal {goal}: goals are numbered 1 to {self.goals_count}")
+        check_limits("goal", goal, 1, self.goals_count)
         correction = correct(
             self._task.robot,
             q,
@@ -442,6 +446,8 @@ class Session:
             self._use(Information.CORRECTIVE_PROCESS)
         codes = hand_codes(self._task, hands, len(given))
         until = None if until is None else real_array("until", until)
+        if until is not None and until.shape != given.shape[:1]:
+            raise ValueError(f"until has shape {until.shape}; needed is {given.shape[:1]}")
         with self.lock:
             left = self._affordable(len(given))
             accounts = self._make_trials(codes[:left], given[:left], until=until)
@@ -559,10 +565,8 @@ class Session:
         for name, count in counts.items():
             if name not in allowed:
                 raise ValueError(f"a method cannot set counter {name!r}, only {', '.join(allowed)}")
-            if count < 0:
-                raise ValueError(f"counter {name!r}: {count} is negative")
-            if getattr(self._meter, name) + count > MOST_COUNT:
-                raise ValueError(f"counter {name!r}: it counts to {MOST_COUNT:,} at most")
+            left = MOST_COUNT - getattr(self._meter, name)
+            check_limits(f"counter {name!r}", count, 0, left)
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:

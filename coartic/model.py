@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 
 PAPER_RADIUS = 0.1
@@ -37,6 +38,7 @@ class MotionModel(NamedTuple):
     max_iterations: int = 20_000
     """Corrective iterations after which a trial has failed (our bound)."""
 
+    @checked_arguments
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
         """Return the model with tolerances that are numbers.
 
@@ -53,6 +55,7 @@ class MotionModel(NamedTuple):
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
 
+    @checked_arguments
     def tolerances(self, radius: float) -> tuple[float, float]:
         """Return the tolerances of arrival and correction for goals of a radius, length unit."""
         tenth, arrival, correction = radius / 10, self.arrival_tolerance, self.correction_tolerance

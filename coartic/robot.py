@@ -345,8 +345,9 @@ class Robot:
         import casadi
 
         arm = self.arm(hand)
-        if q.numel() != self.dof:
-            raise ValueError(f"symbolic q has {q.numel()} entries; this robot needs {self.dof}")
+        size = getattr(q, "numel", lambda: brief_value(q))()
+        if size != self.dof:
+            raise ValueError(f"symbolic q has {size} entries; this robot needs {self.dof}")
         xs: list[Any] = [None] * (len(arm.links) + 1)
         ys: list[Any] = [None] * (len(arm.links) + 1)
         # Plain floats: a NumPy scalar times a CasADi symbol would call NumPy first.

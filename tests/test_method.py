@@ -126,7 +126,7 @@ def test_a_session_counts_per_configuration():
     assert meter.jacobians == 3 + correction.iterations + execution.iterations
     assert (meter.trials, meter.movement_ticks, meter.corrections) == (1, 319, 3)
     assert session.trials_left == 1
-    with pytest.raises(ValueError, match="goals are numbered 1 to 3"):
+    with pytest.raises(ValueError, match="goal is .* from 1 to 3"):
         session.correct(session.q0, "right", 4)
 
 

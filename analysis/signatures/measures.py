@@ -156,6 +156,7 @@ class Signature:
     """Function of solutions that returns the signature of each run, shape ``(n,)``, or NaN."""
     words: str
 
+    @checked_arguments
     def of(self, runs: Solutions) -> Array:
         """Return the signature of the k runs that have it, shape ``(k,)``."""
         values = self.each(runs)
