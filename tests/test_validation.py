@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 import coartic
 from coartic import (
+    PAPER,
     CoarticError,
     ExplorationCondition,
     Movement,
@@ -28,6 +29,7 @@ from coartic import (
     correct,
     corrective_trial,
     execute,
+    gym,
     hand_sequences,
     initial_hands,
     learn,
@@ -62,7 +64,9 @@ from coartic.analysis import (
 )
 from coartic.analysis.figures import picture
 from coartic.analysis.sections import FIGURES, TABLES
+from coartic.analysis.signatures import measures, two_contexts
 from coartic.analysis.signatures.context_tests import posture_difference_below
+from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
     holm,
@@ -75,7 +79,10 @@ from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER
 from coartic.cli.arguments import value_in
 from coartic.internal.text import RENAMED, did_you_mean
+from coartic.method import Information, Session, outline_of
+from coartic.motion.trial import reach_goals
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
+from coartic.tasks.optima import essence
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN, ROOT
@@ -386,6 +393,8 @@ ODD = (
 TASK, ROBOT = load_task("ascending"), Robot()
 TRIAL = corrective_trial(TASK, "RRR")
 PATH = trajectory(TASK, TRIAL.movements)
+SOLUTIONS = Solutions(TASK, "x", (TRIAL, TRIAL))
+SESSION = Session(TASK, 0, frozenset(Information), model=PAPER)
 FOUND = mean_beyond("{}", [1.0, 2.0, 3.0])
 GROUPS = [np.eye(3, 10), np.eye(4, 10)]
 FRAME = pd.DataFrame({"method": "a", "task": "t", "reward": [-300.0], "best_known": -292,
@@ -438,6 +447,29 @@ CALLS = (
     (read_hits, {"path": "nowhere.csv", "task": TASK, "ticks_per_unit": 1.0}),
     (solutions_of, {"task": TASK, "hits": FRAME}),
     (load, {"folder": "nowhere"}),
+    *((function, {"runs": SOLUTIONS}) for function in (
+        measures.arm, measures.as_in_isolation, measures.gain_at_next, measures.hand,
+        measures.other_arm, measures.ticks_slower, measures.signature_named("first").of)),
+    (measures.isolated_reaches, {"task": TASK, "q": np.tile(TASK.q0, (3, 1)), "goals": [1, 2, 3],
+                                 "hands": [1, 1, 1]}),
+    (measures.preshaping, {"task": TASK, "run": TRIAL, "initial": TRIAL}),
+    (measures.other, {"hand": "left"}),
+    (two_contexts.movable, {"task": TASK, "hand": "right"}),
+    (two_contexts.motor_equivalence, {"difference": np.ones(10),
+                                      "jacobian": ROBOT.jacobian(TASK.q0, "right")}),
+    (reach_goals, {"robot": ROBOT, "q": [TASK.q0], "hands": [1], "goals": [(3.0, 2.0)],
+                   "radius": 0.1, "targets": None, "checks": True, "locked_base": (),
+                   "model": PAPER}),
+    (PAPER.for_radius, {"radius": 0.1}),
+    *((getattr(SESSION, name), usual) for name, usual in {
+        "trial": {"solution": TRIAL.movements},
+        "correct": {"q": TASK.q0, "hand": "right", "goal": 1},
+        "trials": {"hands": "RRR", "targets": TRIAL.configurations[None], "until": None},
+        "spend": {"solver_iterations": 1}, "find_initial_hands": {"hands": ("right",)},
+    }.items()),
+    (gym.column, {"rewards": [-300.0, None]}),
+    (instance_names, {"family": "long/v1", "split": "test", "count": 2, "year": None}),
+    *((function, {"task": TASK}) for function in (essence, outline_of)),
 )  # fmt: skip
 CELL = {"task": "two-armed-1", "method": "EC4"}
 OF_STUDY = {

@@ -404,7 +404,7 @@ def reach_goals(
     targets: Configs | None = None,
     *,
     checks: bool = True,
-    locked_base: tuple[str, ...] = (),
+    locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
     """Let N arms reach for a goal each, side by side, from where they are.
@@ -427,7 +427,7 @@ def reach_goals(
     checks : bool
         Whether the hand of an arm without a target may be in its goal already; else the corrective
         process begins at once.
-    locked_base : tuple of {"x", "y"}
+    locked_base : collection of {"x", "y"}
         Coordinates of the base that the corrective process leaves as they are.
     model : MotionModel
         The constants of movement and of the corrective process.
@@ -466,9 +466,8 @@ def reach_goals(
         stops=ALL_STOP,
         goals=finite_array("goals", goals, (count, 2))[:, None],
     )
-    parameters = robot_parameters(
-        robot, radius, locked_base=locked_base, model=model, checks=checks
-    )
+    locked = tuple(locked_base)
+    parameters = robot_parameters(robot, radius, locked_base=locked, model=model, checks=checks)
     ended = reach(robot, arms, parameters).goals[:, 0]
     ended["corrected"][ended["corrections"] == 0] = np.nan
     figures = [ended[name][..., : robot.dof] if name in ("q", "corrected") else ended[name]
