@@ -26,14 +26,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
-from coartic.errors import CoarticError
+from coartic.errors import CoarticError, SolutionError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.internal.validation import in_sentences
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import Correction, correct
-from coartic.motion.solution import Execution, Movement, SolutionError, check_targets, execute_many
+from coartic.motion.solution import Execution, Movement, check_targets, execute_many
 from coartic.motion.trial import (
     NO_REWARD,
     Accounts,
