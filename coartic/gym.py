@@ -84,7 +84,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     num_envs : int
         Number of robots.
     task : Task, str or Path
-        The task; or a family, ``"two-armed/v1"``, of which each trial has an instance.
+        The task; or a family, ``"two-armed/v1"``: each trial has an instance of the family.
     split : {"development", "test", "fresh"}, optional
         Instances to train on (by default), to report on, or those of a ``year``. They never mix.
     count : int, optional
@@ -108,7 +108,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     move, in the order of a configuration; in a family, of arms with the most links.
 
     An observation has an entry for the next goal and for each of those ahead, 1 where there is
-    one; x and y of each from the base, length unit, 0 where there is none; and the joints. In a
+    one; x and y of each from the base, length unit, 0 without a goal; and the joints. In a
     family whose robots differ in links an entry for each joint follows, 1 where the robot can move
     it.
 
@@ -396,7 +396,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     Raises
     ------
     ValueError, TypeError
-        The id is none of coartic's, or an option is wrong.
+        The id is not one of coartic's, or an option is wrong.
     CoarticError
         Stable-Baselines3 is not installed.
     """
@@ -461,7 +461,7 @@ def score(
     Raises
     ------
     ValueError, TypeError
-        The environment is none of coartic's or has a wrapper, an option is wrong, or the policy is
+        The environment is not coartic's or has a wrapper, an option is wrong, or the policy is
         no policy, or an agent that was trained in another wrapper.
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)

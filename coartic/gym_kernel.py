@@ -50,7 +50,7 @@ class VectorState(NamedTuple):
     """Index in ``parameters`` of each task's robot, shape ``(T,)``; -1 for a task that is not
     loaded."""
     goals: Points
-    """Centres of goals, shape ``(T, G, 2)``, of which a task has ``counts``."""
+    """Centres of goals, shape ``(T, G, 2)``; a task has the first ``counts``."""
     counts: Numbers
     """Goals of each task, shape ``(T,)``."""
     movable: Flags
@@ -128,7 +128,7 @@ def _squared_distance(run: Any) -> float:
 def aim(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
     """Phase 2, *aim*: choose the hand that the corrective process brings to the goal by the shorter
     path, or, if the action says so, the other one, and the solution of the process, or the present
-    posture where there is none, plus the action.
+    posture without a solution, plus the action.
 
     ``run`` is changed in place; ``other`` is the run of the other hand, with two hands.
     ``action[0] > 0.5`` takes the other hand; the rest, clipped to ±1, is scaled by

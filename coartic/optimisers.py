@@ -106,7 +106,7 @@ class Objective:
     target is always made and takes a tick at least.
 
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
-    hand sequence, of which the best is kept. A point has these hands, unless others are given
+    hand sequence; the best sequence is kept. A point has these hands, unless others are given
     with it: the lowest cost is that of the best solution with these hands, which other hands may
     better.
 
@@ -498,7 +498,7 @@ def objective(
         Hands do not fit, the half width is not from 1e-9 to 100, or the budget is not from 1 to
         10,000,000, or less than the hand sequences to choose among.
     TypeError
-        The model is none, or the task is neither a Task nor a text nor a path.
+        The model is no MotionModel, or the task is neither a Task nor a text nor a path.
     MethodError
         The corrective process completes no sequence, or there are too many to try.
     """

@@ -106,7 +106,7 @@ def learn(
     CoarticError
         The condition is unknown.
     TypeError
-        The task is neither a Task nor a text nor a path, or the condition or the model is none.
+        The task is neither a Task nor a text nor a path, or condition or model has another type.
     SolutionError
         The first solution breaks the task's rules.
     ValueError

@@ -175,7 +175,7 @@ class Run:
 
     def downsample(self) -> Run:
         """Return the run with the rewards of its best trial and of the trials that were better than
-        all earlier trials; other rewards are None. The run then takes a tenth of the space."""
+        all earlier trials, and None for other trials. The run then takes a tenth of the space."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best
