@@ -243,7 +243,8 @@ class TrajectoryProblem:
         ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
         (0-based) as those lengths allow, instead of short paths. ``stops`` holds all rates at the
-        goals at 0 (smoothness costs only). A solve that fails is a plan that has not converged.
+        goals at 0 (smoothness costs only). A plan has converged if IPOPT says so and every
+        constraint holds.
         """
         goals, at = self.goals, self._layout
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -288,24 +289,18 @@ class TrajectoryProblem:
                     [instance.q0, instance.goals.ravel(), right, [rim], chosen, weights]
                 ),
             )
-            return self.plan_from(instance, solution)
-
-    def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
-        """The plan of a solution; it has converged only if every constraint holds as well."""
-        goals, dof, at = self.goals, self.robot.dof, self._layout
-        x = np.asarray(solution["x"]).ravel()
-        limits = np.asarray(solution["g"]).ravel()
-        statistics = self._solver.stats()
+            statistics = self._solver.stats()
+        x, limits = (np.asarray(solution[name]).ravel() for name in "xg")
         violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
         return PathPlan(
             instance=instance,
             converged=statistics["return_status"] in _SOLVED
             and bool(np.isfinite(x).all() and violation < 1e-8),
             reason=statistics["return_status"],
-            configurations=instance.q0 + np.cumsum(x[at.steps].reshape(goals, dof), axis=0),
+            configurations=instance.q0 + np.cumsum(x[at.steps].reshape(start.shape), axis=0),
             cost=float(solution["f"]),
             durations=x[at.durations],
-            rates=x[at.rates].reshape(self._order, goals + 1, dof),
+            rates=x[at.rates].reshape(self._order, goals + 1, self.robot.dof),
             spent={
                 "forward_kinematics": self._evaluations * statistics.get("n_call_nlp_g", 0),
                 "jacobians": self._evaluations * statistics.get("n_call_nlp_jac_g", 0),
