@@ -24,7 +24,7 @@ from pydantic.dataclasses import dataclass
 
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
-from coartic.internal.validation import in_sentences
+from coartic.internal.validation import changed_values, in_sentences
 
 Hand = Literal["left", "right"]
 """Name of a hand: ``"left"`` or ``"right"``."""
@@ -120,13 +120,8 @@ class Robot:
     drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
 
     def __repr__(self) -> str:
-        paper = type(self).__dataclass_fields__
-        others = {
-            name: getattr(self, name)
-            for name in ("left_shoulder", "right_shoulder", "base_size")
-            if getattr(self, name) != paper[name].default
-        }
-        return short_repr(self, left_links=self.left_links, right_links=self.right_links, **others)
+        links = {"left_links": self.left_links, "right_links": self.right_links}
+        return short_repr(self, **links | changed_values(self))
 
     @cached_property
     def scale(self) -> float:
@@ -213,8 +208,7 @@ class Robot:
         ValueError
             The hand is neither ``"left"`` nor ``"right"``.
         """
-        self.arm(hand)  # refuses what is no hand
-        links = self.left_links if hand == "left" else self.right_links
+        links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 
     def forward_kinematics(self, q: ArrayLike, hand: Hand) -> Array:
