@@ -214,5 +214,4 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
     try:
         return EVERY_CONDITION[condition.removeprefix(METHOD_PREFIX)]
     except KeyError:
-        known = EVERY_CONDITION
-        raise CoarticError(unknown("exploration condition", condition, known)) from None
+        raise CoarticError(unknown("exploration condition", condition, EVERY_CONDITION)) from None

@@ -285,10 +285,10 @@ def _learn_together(
     ]
 
 
-Part = Literal["learner", "motion", "trials"]
+Kernels = Literal["learner", "motion", "trials"]
 
 
-def warm_up(task: Task, *parts: Part) -> None:
+def warm_up(task: Task, *parts: Kernels) -> None:
     """Compile the kernels, or load them, so that no run's time contains it.
 
     They are those of the number of links that the task's robot has: the learner's, those of single
@@ -296,7 +296,7 @@ def warm_up(task: Task, *parts: Part) -> None:
     """
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))
-    wanted = parts or get_args(Part)
+    wanted = parts or get_args(Kernels)
     if "learner" in wanted:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
         _learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)

@@ -91,7 +91,7 @@ def _in_order(span: tuple[int, int]) -> tuple[int, int]:
 _ordered = AfterValidator(_in_order)
 Span = Annotated[tuple[Thousandths, Thousandths], _ordered]
 """From, to; every thousandth between as likely."""
-_Count = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
+_GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
 
@@ -152,7 +152,7 @@ class Family(FileData):
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals; the robot has both arms anyway."""
-    goals: Annotated[tuple[_Count, _Count], _ordered]
+    goals: Annotated[tuple[_GoalsCount, _GoalsCount], _ordered]
     """Least and largest number of goals; each number is equally likely."""
     links: Annotated[tuple[_PerArm, _PerArm], _ordered]
     """Least and largest number of links of each arm; all links have one length (to a

@@ -188,13 +188,13 @@ class Task(FileData):
     def family(self) -> str | None:
         """The family that it is an instance of, with its version; None where of none."""
         address = address_of(self.name)
-        return None if address is None else address.family
+        return address and address.family
 
     @property
     def split(self) -> Split | None:
         """Purpose of an instance of a family; None for other tasks."""
         address = address_of(self.name)
-        return None if address is None else address.split
+        return address and address.split
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
