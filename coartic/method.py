@@ -687,11 +687,9 @@ def run_method(
     method : Method
         The method, with its parameters.
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     seed : int
         Seed of its random numbers.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------

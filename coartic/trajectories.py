@@ -201,11 +201,9 @@ def trajectory(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     movements : iterable of Movement
         The solution: at least one movement for each goal, in the order of the goals.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------

@@ -76,7 +76,6 @@ def learn(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     condition : str or ExplorationCondition
         The condition, or the name of one in ``CONDITIONS`` or ``ABLATIONS``, such as ``"EC4"``.
     seed : int
@@ -84,7 +83,6 @@ def learn(
     trials : int
         Number of trials, the initial one included.
     model : MotionModel
-        The constants of movement and of the corrective process.
     start : sequence of Movement
         A first solution, such as a planner's or an earlier run's. Trial 0 moves with its hands
         straight to the first target that it has for each goal, length unit (base) and rad
