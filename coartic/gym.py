@@ -342,7 +342,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        from coartic.drawing import box, draw_goals, draw_robot, fill_goals
+        from coartic.drawing import box, circle_goals, draw_robot, fill_goals
 
         robots, state = self.robots, self.robots.state
         task = robots.task_at(state.task.item())
@@ -351,7 +351,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
         draw_robot(axes, task, state.q[0, robots.places_of(task.robot)], weight=1.5)
-        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
+        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 

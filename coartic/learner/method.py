@@ -20,7 +20,7 @@ from coartic.learner.conditions import (
     ExplorationCondition,
 )
 from coartic.learner.learning import TRIALS, learn_many
-from coartic.learner.learning_run import CORRECTIONS
+from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
 from coartic.method import (
     Information,
     Meter,
@@ -116,7 +116,7 @@ class DualProcess(Method):
             if not run.learned:
                 results.append(MethodError("infeasible", run.reason))
                 continue
-            details = {CORRECTIONS: run.corrections.tolist()}
+            details = {CORRECTIONS_BY_TENTH: run.corrections.tolist()}
             results.append(Result(run.learned, details, initial=run.initial, replay=run.replay))
         return results
 

@@ -17,7 +17,7 @@ from pydantic import Field, InstanceOf
 
 from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
-from coartic.learner.learning_run import CORRECTIONS
+from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
 from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
@@ -164,7 +164,7 @@ class Run:
     def _corrections(self) -> list[int | None]:
         """Return the corrective movements of a learner in trial 0 and in each tenth of the other
         trials; blanks for other methods."""
-        counts = self.outcome.details.get(CORRECTIONS)
+        counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         return counts if isinstance(counts, list) and len(counts) == 11 else [None] * 11
 
     @property
