@@ -290,7 +290,7 @@ class Study:
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``parts``: labels of the runs; of several, the last label with runs on a task counts;
         - ``title``: name on the page, in tables and figures;
-        - ``algorithm``: algorithm of which the method is a form;
+        - ``algorithm``: algorithm that the method is a form of;
         - ``is_learner``: True for the paper's learner under the paper's conditions;
         - ``is_search``: True for searches for the optimum, which are references;
         - ``information``: use of the reward, one of three groups;

@@ -40,6 +40,12 @@ from coartic.method import Method, Result, Session
 from coartic.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import Array
 
+_CITATION = (
+    "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. A. Auger, N. "
+    "Hansen (2005). A restart CMA evolution strategy with increasing population size. IEEE "
+    "Congress on Evolutionary Computation."
+)
+
 
 class BanditParameters(UninformedParameters):
     """Parameters of the bandit."""
@@ -58,11 +64,10 @@ class Strategy:
         self.trials = 1
         self._rng = session.rng
         self._attempts = attempts
-        self._mask = attempts.explored
         first = attempts.by_correction(hands)
         self.reward = float(first.rewards[0])
         """Best reward so far; -inf where **A** did not complete the sequence."""
-        self._mean: Array = first.reached[0, self._mask]
+        self._mean: Array = first.reached[0, attempts.explored]
         self._restarts = -1
         self._evolution: EvolutionStrategy
 
@@ -75,7 +80,7 @@ class Strategy:
                 self._mean, self.sigma, size * 2**self._restarts, self._rng
             )
         values = self._evolution.ask()[: self._attempts.left]
-        rewards = self._attempts.around(self.hands, self._mask, values).rewards
+        rewards = self._attempts.around(self.hands, values).rewards
         self.generations += 1
         self.trials += len(values)
         self.reward = max(self.reward, float(rewards.max()))
@@ -90,11 +95,8 @@ class CMAES(Method):
 
     name = "cma-es/bandit"
     title = "CMA-ES, a bandit over hand sequences"
-    citation = (
-        "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. "
-        "A. Auger, N. Hansen (2005). A restart CMA evolution strategy with increasing population "
-        "size. IEEE Congress on Evolutionary Computation. "
-        "P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
+    citation = _CITATION + (
+        " P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
         "bandit problem. Machine Learning."
     )
     information = OPTIMISER_INFORMATION
@@ -134,11 +136,7 @@ class GoalByGoal(Method):
 
     name = "cma-es/goal-by-goal"
     title = "CMA-ES, hands chosen goal by goal"
-    citation = (
-        "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. "
-        "A. Auger, N. Hansen (2005). A restart CMA evolution strategy with increasing population "
-        "size. IEEE Congress on Evolutionary Computation."
-    )
+    citation = _CITATION
     information = OPTIMISER_INFORMATION
     Parameters = GoalByGoalParameters
 

@@ -160,6 +160,14 @@ class ControlParameters(Parameters):
 class Control(Method):
     """A controller under every hand sequence; base of the methods that control a hand."""
 
+    information = frozenset(
+        {
+            Information.GOALS,
+            Information.FORWARD_KINEMATICS,
+            Information.JACOBIAN,
+            Information.REWARD_FORMULA,
+        }
+    )
     stochastic = False
     Parameters = ControlParameters
     quick: ClassVar[dict[str, Any]] = {"period": 20}

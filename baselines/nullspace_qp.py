@@ -88,14 +88,6 @@ class LeastMotion(Control):
         "robot manipulators. International Journal of Robotics Research; as quadratic programs "
         "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics."
     )
-    information = frozenset(
-        {
-            Information.GOALS,
-            Information.FORWARD_KINEMATICS,
-            Information.JACOBIAN,
-            Information.REWARD_FORMULA,
-        }
-    )
     secondary = ("least joint changes",)
     controller = HandController
 

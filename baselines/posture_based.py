@@ -26,21 +26,20 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement
-from coartic.baselines.posture_graph import HandSequence
+from coartic.baselines.posture_graph import HandSequence, Layers
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.compile import chain_by, entry, joint_lever
+from coartic.optimisers import explored_joints
 from coartic.robot import BASE_DOF, Array, Hand
 
 Mask = NDArray[np.bool_]
-Layers = dict[tuple[int, Hand], Array]
-"""Postures ``(k, dof)`` with a hand at a goal (0-based)."""
 
 PER_ROUND = 60
 """Postures generated in a round."""
@@ -122,16 +121,6 @@ class TwoGoals(PostureBased):
 METHODS: tuple[type[Method], ...] = (OneGoal, TwoGoals)
 
 
-class Neighbourhood(NamedTuple):
-    """The postures for successive goals around which others are generated."""
-
-    hands: HandSequence
-    promising: Array
-    """Shape ``(goals, dof)``."""
-    noise: Array
-    """Standard noise, shape ``(rounds, PER_ROUND, goals, dof)``."""
-
-
 class PosturePlanner:
     """Makes a plan from a store of postures ``(stored, dof)``; ``q`` is where it is so far."""
 
@@ -150,8 +139,7 @@ class PosturePlanner:
         self.base_and_arm = {hand: np.zeros(session.dof, bool) for hand in session.hands}
         for hand, mask in self.base_and_arm.items():
             mask[:BASE_DOF] = mask[session.joints(hand)] = True
-        self.movable: Mask = np.logical_or.reduce(list(self.base_and_arm.values()))
-        self.movable[:BASE_DOF] = [c not in session.locked_base for c in ("x", "y")]
+        self.movable: Mask = explored_joints(session)
         self.free = {hand: self.movable & mask for hand, mask in self.base_and_arm.items()}
         """Joints that may move towards a posture for each hand."""
         # SDs from zero up: dense near the start, sparse far from it.
@@ -171,14 +159,15 @@ class PosturePlanner:
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
-            retrieved, seeds = self.retrieve(ahead), list[Neighbourhood]()
+            retrieved = self.retrieve(ahead)
+            promising, noise = dict[HandSequence, Array](), list[Array]()
             for hands in itertools.product(self.session.hands, repeat=len(ahead)):
                 layers = [retrieved[key] for key in zip(ahead, hands, strict=True)]
                 if all(len(layer) for layer in layers):
                     shape = self.rounds, PER_ROUND, len(ahead), self.session.dof
-                    noise = self.session.rng.standard_normal(shape)
-                    seeds.append(Neighbourhood(hands, self.most_promising(hands, layers), noise))
-            if not seeds:
+                    noise.append(self.session.rng.standard_normal(shape))
+                    promising[hands] = self.most_promising(hands, layers)
+            if not promising:
                 able = {goal for (goal, _), postures in retrieved.items() if len(postures)}
                 raise MethodError(
                     "infeasible",
@@ -186,7 +175,8 @@ class PosturePlanner:
                     f"stored postures puts the {' or '.join(self.session.hands)} hand within "
                     f"{self.tolerance:g} of it",
                 )
-            _, (hand, *_), postures = min(self.generate(seeds, ahead), key=lambda chain: chain[0])
+            chains = self.generate(promising, np.stack(noise), ahead)
+            _, (hand, *_), postures = min(chains, key=lambda chain: chain[0])
             self.store = np.vstack([self.store, postures])
             movements.append(Movement(goal + 1, hand, "planned", postures[0]))
             # Internal simulation: where the movement hits the goal, and the ticks until then.
@@ -229,14 +219,18 @@ class PosturePlanner:
         return np.stack([first[i], np.where(used, second[j], first[i])])
 
     def generate(
-        self, seeds: list[Neighbourhood], goals: range
+        self, promising: dict[HandSequence, Array], noises: Array, goals: range
     ) -> list[tuple[float, HandSequence, Array]]:
-        """The cheapest postures ``(goals, dof)`` found around each seed by the deadline, after
-        their cost and their hands."""
-        centre = best = np.stack([seed.promising for seed in seeds])
+        """Return the cheapest postures ``(goals, dof)`` found around the promising ones by the
+        deadline, after their cost and their hands.
+
+        ``noises`` are standard, shape ``(hand sequences, rounds, PER_ROUND, goals, dof)``.
+        """
+        sequences = [*promising]
+        centre = best = np.stack([*promising.values()])
         costs = _path_length(self.q, best)
         for number, sd in enumerate(_FIRST_SD * np.geomspace(1.0, _LAST_SD, self.rounds)):
-            noise = sd * np.stack([seed.noise[number] for seed in seeds])
+            noise = sd * noises[:, number]
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
             postures = centre[:, None] + noise
             # Corrected goal by goal, the arm that is not chosen standing where it stood before.
@@ -244,7 +238,7 @@ class PosturePlanner:
             before = np.broadcast_to(self.q, (*postures.shape[:2], postures.shape[-1])).copy()
             for k, goal in enumerate(goals):
                 for hand in self.session.hands:
-                    chosen = [i for i, seed in enumerate(seeds) if seed.hands[k] == hand]
+                    chosen = [i for i, hands in enumerate(sequences) if hands[k] == hand]
                     if chosen:
                         posture = np.where(self.free[hand], postures[chosen, :, k], before[chosen])
                         accurate[chosen] &= self.correct(posture, goal, hand, _GENERATED)
@@ -260,7 +254,7 @@ class PosturePlanner:
                 centre[k] = np.tensordot(weights / weights.sum(), postures[k, better], axes=1)
                 if lengths[k, better[0]] < costs[k]:
                     best[k], costs[k] = postures[k, better[0]], lengths[k, better[0]]
-        return list(zip(costs.tolist(), (seed.hands for seed in seeds), best, strict=True))
+        return list(zip(costs.tolist(), sequences, best, strict=True))
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
         """Feedforward correction of ``(..., dof)`` in place; True where the hand is there."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from coartic.tasks.task import Task
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
+Layers = dict[tuple[int, Hand], Array]
+"""Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
 BEAM_WIDTH = 64
 """Hand sequences that are planned for each graph: all where there are no more, with two hands up to
 six goals; else those that a beam of this width over the goals ends with."""
@@ -70,8 +72,7 @@ def _sample_postures(
     return np.asarray(q[np.hypot(*miss.T) <= task.radius])
 
 
-@dataclass(frozen=True)
-class Beginning:
+class Beginning(NamedTuple):
     """The cheapest chains of nodes for the beginning of a hand sequence."""
 
     hands: HandSequence
@@ -83,88 +84,80 @@ class Beginning:
     """For each goal, the node that a state came from."""
 
 
-@dataclass
-class PostureGraph:
-    """The layers of a task and the dynamic programme over them."""
+def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
+    """Sample the layers of a graph with at most ``count`` nodes per goal and hand.
 
-    task: Task
-    layers: dict[tuple[int, Hand], Array]
-    """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
-    spent: Counter[str] = field(default_factory=Counter)
-    """Forward-kinematics evaluations while sampling."""
+    Half of a layer is sampled around the nodes of the goal before, by whichever hand: of 40
+    one-armed random tasks the best path known was then found more often on 23, less often on 11.
 
-    @classmethod
-    def sample(cls, task: Task, count: int, rng: np.random.Generator) -> PostureGraph:
-        """A graph with at most ``count`` nodes per goal and hand.
+    Returns the layers, and the evaluations and Jacobians that they took.
+    """
+    spent: Counter[str] = Counter()
+    layers: Layers = {}
+    before = np.empty((0, task.robot.dof))
+    for goal in range(len(task.goals)):
+        for hand in task.hands:
+            starts = np.tile(task.q0, (count, 1))
+            if len(before):
+                half = slice(count // 2)
+                starts[half] = before[rng.integers(len(before), size=count // 2)]
+            layers[goal, hand] = _sample_postures(task, goal, hand, starts, rng, spent)
+        before = np.concatenate([layers[goal, hand] for hand in task.hands])
+    return layers, spent
 
-        Half of a layer is sampled around the nodes of the goal before, by whichever hand: of
-        40 one-armed random tasks the best path known was then found more often on 23, less
-        often on 11.
-        """
-        spent: Counter[str] = Counter()
-        layers: dict[tuple[int, Hand], Array] = {}
-        before = np.empty((0, task.robot.dof))
-        for goal in range(len(task.goals)):
-            for hand in task.hands:
-                starts = np.tile(task.q0, (count, 1))
-                if len(before):
-                    half = slice(count // 2)
-                    starts[half] = before[rng.integers(len(before), size=count // 2)]
-                layers[goal, hand] = _sample_postures(task, goal, hand, starts, rng, spent)
-            before = np.concatenate([layers[goal, hand] for hand in task.hands])
-        return cls(task, layers, spent)
 
-    def chains(self, most: int | None = None) -> list[Chain]:
-        """Return the cheapest chain of each hand sequence that has a chain, left before right.
+def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain]:
+    """Return the cheapest chain of each hand sequence that has a chain, left before right.
 
-        At most ``most`` beginnings of sequences are kept at each goal, the cheapest; with fewer
-        sequences than that none is lost.
-        """
-        start = dict.fromkeys(HANDS, np.array(self.task.q0)[None, :])
-        kept = [Beginning((), start, np.zeros((1, 1)), ())]
-        for _ in range(len(self.task.goals)):
-            longer = [more for beginning in kept for more in self.extend(beginning)]
-            ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
-            kept = [longer[i] for i in sorted(ranked[:most])]
-        chains: list[Chain] = []
-        for hands, cost, back in ((whole.hands, whole.cost, whole.back) for whole in kept):
-            i, j = np.unravel_index(cost.argmin(), cost.shape)
-            picked = []
-            for goal in reversed(range(len(hands))):
-                picked.append(self.layers[goal, hands[goal]][i])
-                came = back[goal][i, j]
-                same = goal == 0 or hands[goal - 1] == hands[goal]
-                i, j = (came, j) if same else (j, came)
-            configurations, q = [], np.array(self.task.q0)
-            for hand, node in zip(hands, reversed(picked), strict=True):
-                q = q.copy()
-                q[:BASE_DOF] = node[:BASE_DOF]
-                q[self.task.robot.joints(hand)] = node[self.task.robot.joints(hand)]
-                configurations.append(q)
-            chains.append((hands, np.array(configurations)))
-        return chains
+    At most ``most`` beginnings of sequences are kept at each goal, the cheapest; with fewer
+    sequences than that none is lost.
+    """
+    start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
+    kept = [Beginning((), start, np.zeros((1, 1)), ())]
+    for _ in range(len(task.goals)):
+        longer = [more for beginning in kept for more in _extend(task, layers, beginning)]
+        ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
+        kept = [longer[i] for i in sorted(ranked[:most])]
+    chains: list[Chain] = []
+    for hands, _, cost, back in kept:
+        i, j = np.unravel_index(cost.argmin(), cost.shape)
+        picked = []
+        for goal in reversed(range(len(hands))):
+            picked.append(layers[goal, hands[goal]][i])
+            came = back[goal][i, j]
+            same = goal == 0 or hands[goal - 1] == hands[goal]
+            i, j = (came, j) if same else (j, came)
+        configurations, q = [], np.array(task.q0)
+        for hand, node in zip(hands, reversed(picked), strict=True):
+            q = q.copy()
+            q[:BASE_DOF] = node[:BASE_DOF]
+            q[task.robot.joints(hand)] = node[task.robot.joints(hand)]
+            configurations.append(q)
+        chains.append((hands, np.array(configurations)))
+    return chains
 
-    def extend(self, begun: Beginning) -> Iterator[Beginning]:
-        """Extend the cheapest chains by one goal, with each hand."""
-        hands, nodes, cost = begun.hands, begun.nodes, begun.cost
-        goal = len(hands)
-        for hand in HANDS:
-            layer = self.layers.get((goal, hand))
-            if layer is None or not len(layer):
-                continue
-            last = hands[-1] if hands else hand
-            base = _squared_distances(nodes[last], layer, slice(0, BASE_DOF))
-            arm = _squared_distances(nodes[hand], layer, self.task.robot.joints(hand))
-            # A hand comes from its own node. If it is the last one, (i, j) leads to (k, j) by the
-            # least over i, else to (k, i) by the least over j.
-            came_from, step = (cost, np.sqrt(base + arm)) if hand == last else (cost.T, None)
-            came = np.empty((len(layer), came_from.shape[1]), dtype=np.int32)
-            reached = np.empty(came.shape)
-            for other in range(came.shape[1]):
-                distances = np.sqrt(base[other] + arm) if step is None else step
-                total = came_from[:, other, None] + distances
-                came[:, other], reached[:, other] = total.argmin(axis=0), total.min(axis=0)
-            yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
+
+def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]:
+    """Extend the cheapest chains by one goal, with each hand."""
+    hands, nodes, cost, back = begun
+    goal = len(hands)
+    for hand in sorted(task.hands):  # left before right
+        layer = layers[goal, hand]
+        if not len(layer):
+            continue
+        last = hands[-1] if hands else hand
+        base = _squared_distances(nodes[last], layer, slice(0, BASE_DOF))
+        arm = _squared_distances(nodes[hand], layer, task.robot.joints(hand))
+        # A hand comes from its own node. If it is the last one, (i, j) leads to (k, j) by the
+        # least over i, else to (k, i) by the least over j.
+        came_from, step = (cost, np.sqrt(base + arm)) if hand == last else (cost.T, None)
+        came = np.empty((len(layer), came_from.shape[1]), dtype=np.int32)
+        reached = np.empty(came.shape)
+        for other in range(came.shape[1]):
+            distances = np.sqrt(base[other] + arm) if step is None else step
+            total = came_from[:, other, None] + distances
+            came[:, other], reached[:, other] = total.argmin(axis=0), total.min(axis=0)
+        yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*back, came))
 
 
 def cheapest_chains(
@@ -179,7 +172,7 @@ def cheapest_chains(
     spread: bool = False,
 ) -> Iterator[Chain]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
-    graphs until there are as many ``chains``; ``most`` as in :meth:`PostureGraph.chains`. The
+    graphs until there are as many ``chains``; ``most`` as in :func:`chains_of`. The
     session counts the effort.
 
     With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
@@ -187,16 +180,16 @@ def cheapest_chains(
     """
     yielded = 0
     for number in itertools.count(1):
-        graph = PostureGraph.sample(task, nodes, rng)
-        session.spend(**graph.spent)
-        able = {goal for (goal, _), postures in graph.layers.items() if len(postures)}
+        layers, spent = sample_layers(task, nodes, rng)
+        session.spend(**spent)
+        able = {goal for (goal, _), postures in layers.items() if len(postures)}
         if missing := {*range(len(task.goals))} - able:
             raise MethodError(
                 "infeasible",
                 f"goal {min(missing) + 1}: no posture was found that puts the "
                 f"{' or the '.join(task.hands)} hand inside its disc",
             )
-        for hands, configurations in graph.chains(most):
+        for hands, configurations in chains_of(task, layers, most):
             yielded += 1
             yield hands, configurations
             if spread and len(task.hands) > 1:

@@ -176,14 +176,6 @@ class CurrentGoal(Control):
         "robot manipulators. International Journal of Robotics Research; as quadratic programs "
         "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics. "
     )
-    information = frozenset(
-        {
-            Information.GOALS,
-            Information.FORWARD_KINEMATICS,
-            Information.JACOBIAN,
-            Information.REWARD_FORMULA,
-        }
-    )
     controller = PostureController
 
 

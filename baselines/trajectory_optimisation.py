@@ -108,12 +108,16 @@ class TrajectoryOptimisation(Method):
         # goes through the rims.
         inside = task.radius - session.model.tolerances(task.radius)[0]
         radius = task.radius if self.cost == "path-length" else inside
-        plans, failed, parameters = list[PathPlan](), dict[str, str](), self.parameters
+        plans, failed, stops = (
+            list[PathPlan](),
+            dict[str, str](),
+            getattr(self.parameters, "stop", 0),
+        )
         with session.solving():
             for hands, starts in self.starts(session, task).items():
                 instance = Instance.of(task, hands, still=False, radius=radius)
                 plan = cheapest_plan(session, problem, instance, starts)
-                if plan.converged and isinstance(parameters, SmoothParameters) and parameters.stop:
+                if plan.converged and stops:
                     # A plan that stops starts from the one that passes the goals as well.
                     starts = [plan.configurations, *starts]
                     plan = cheapest_plan(session, problem, instance, starts, stops=True)
@@ -126,23 +130,23 @@ class TrajectoryOptimisation(Method):
                     "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
                 )
             best = plan = min(plans, key=lambda plan: plan.cost)
-            rounded, aimed = None, plan.instance
+            aimed, configurations, steps = plan.instance, plan.configurations, None
             if self.cost == "path-length":
                 rounded = Rounding(session, problem, aimed).nearest(plan)
-                if rounded is None:  # aimed inside the discs it is a plan all the same
+                if rounded is not None:
+                    configurations, steps = rounded.configurations, rounded.steps
+                else:  # aimed inside the discs it is a plan all the same
                     aimed = replace(aimed, radius=inside)
                     plan = problem.solve(aimed, plan.configurations)
+                    configurations = plan.configurations
                     session.spend(**plan.spent)
                     if not plan.converged:
                         reason = f"IPOPT, aimed inside the discs: {plan.reason}"
                         raise MethodError("solver-failed", reason)
-            if issubclass(self.Parameters, SmoothParameters):
+            if len(plan.rates):
                 solution = path_movements(session, task, aimed, spline(plan, SAMPLES))
-            elif rounded is not None:
-                configurations, steps = rounded.configurations, rounded.steps
-                solution = movements(session, task, aimed, configurations, steps)
             else:
-                solution = movements(session, task, aimed, plan.configurations)
+                solution = movements(session, task, aimed, configurations, steps)
         details = {
             "cost": best.cost,
             "path_length": float(best.lengths().sum()),

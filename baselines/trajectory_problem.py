@@ -33,7 +33,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import accumulate, pairwise
 from threading import RLock
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import casadi
 import numpy as np
@@ -145,26 +145,6 @@ class PathPlan:
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
 
-class Layout(NamedTuple):
-    """Places of the variables of a programme in the vector of all of them."""
-
-    steps: slice
-    """Configuration changes, goal by goal."""
-    lengths: slice
-    """Bounds on the path lengths of the segments."""
-    durations: slice
-    depth: slice
-    """Depth inside the rim, for the goals that are deep."""
-    rates: slice
-    """Time derivatives of the configuration at start and goals."""
-
-    @classmethod
-    def of(cls, goals: int, dof: int, order: int) -> Layout:
-        """Lay out a programme for a number of goals and derivatives."""
-        sizes = (goals * dof, goals, goals, 1, order * (goals + 1) * dof)
-        return cls(*map(slice, accumulate((0, *sizes[:-1])), accumulate(sizes)))
-
-
 class TrajectoryProblem:
     """The compiled programme of one cost, for every task of a robot with so many goals."""
 
@@ -172,9 +152,9 @@ class TrajectoryProblem:
         self.robot, self.goals, self.cost = robot, goals, cost
         self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
-        self._layout = Layout.of(goals, dof, order)
         steps = casadi.SX.sym("steps", dof, goals)  # configuration changes, goal by goal
-        lengths = casadi.SX.sym("lengths", goals)
+        lengths = casadi.SX.sym("lengths", goals)  # bounds on the path lengths of the segments
+        # Time derivatives of the configuration at start and goals.
         rates = [casadi.SX.sym(f"rates{d}", dof, goals + 1) for d in range(order)]
         durations = casadi.SX.sym("durations", goals)
         depth = casadi.SX.sym("depth")  # inside the rim, for the goals that are deep
@@ -217,11 +197,16 @@ class TrajectoryProblem:
         self._evaluations = goals * len(hands)  # forward kinematics in one evaluation of the limits
         variables = {"steps": steps, "lengths": lengths, "durations": durations, "depth": depth,
                      "rates": casadi.veccat(*rates)}  # fmt: skip
+        sizes = [variable.numel() for variable in variables.values()]
+        places = (
+            slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)
+        )
+        self._at = dict(zip(variables, places, strict=True))  # in the vector of all variables
         self._solver = casadi.nlpsol(
             "trajectory",
             "ipopt",
             {
-                "x": casadi.veccat(*(variables[name] for name in Layout._fields)),
+                "x": casadi.veccat(*variables.values()),
                 "p": casadi.veccat(q0, centres, right, rim, deep, weights),
                 "f": objective,
                 "g": casadi.vertcat(*limits),
@@ -236,34 +221,35 @@ class TrajectoryProblem:
         *,
         lengths: Array | None = None,
         stops: bool = False,
-        deep: Sequence[int] | None = None,
+        deep: Sequence[int] = (),
     ) -> PathPlan:
         """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
 
         ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
         (0-based) as those lengths allow, instead of short paths. ``stops`` holds all rates at the
-        goals at 0 (smoothness costs only). A solve that fails is a plan that has not converged.
+        goals at 0 (smoothness costs only). A plan has converged if IPOPT says so and every
+        constraint holds.
         """
-        goals, at = self.goals, self._layout
+        goals, at = self.goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
         distances = np.sqrt((steps**2).sum(axis=1))
         # A start, a least and a most value of each variable.
-        first, least, most = bounds = np.zeros((3, at.rates.stop))
-        first[at.steps], least[at.steps], most[at.steps] = steps.ravel(), -free, free
+        first, least, most = bounds = np.zeros((3, at["rates"].stop))
+        bounds[:, at["steps"]] = steps.ravel(), -free, free
         if self.cost == "path-length":
-            first[at.lengths], most[at.lengths] = distances, np.inf
+            first[at["lengths"]], most[at["lengths"]] = distances, np.inf
             if lengths is not None:
                 given = ~np.isnan(lengths)
-                bounds[:, at.lengths][:, given] = lengths[given]
-        bounds[:, at.durations] = 1.0
+                bounds[:, at["lengths"]][:, given] = lengths[given]
+        bounds[:, at["durations"]] = 1.0
         if self._order:  # durations vary at a constant total
             times = np.maximum(distances, 1e-3)
             times = np.maximum(times * (goals / times.sum()), 0.1)
-            first[at.durations] = times * (goals / times.sum())
-            least[at.durations], most[at.durations] = _SHORTEST[self.cost], goals
+            first[at["durations"]] = times * (goals / times.sum())
+            least[at["durations"]], most[at["durations"]] = _SHORTEST[self.cost], goals
         # Rates are 0 at rest (start and end, with stops each goal) and for joints held on either
         # side.
         still = np.vstack([instance.held[:1] | True, instance.held])
@@ -271,12 +257,12 @@ class TrajectoryProblem:
         still[-1] = True
         rates = np.tile(np.where(still | stops, 0.0, np.inf).ravel(), self._order)
         rim = instance.radius - _RIM
-        least[at.rates], most[at.rates] = -rates, rates
-        most[at.depth] = 0.0 if deep is None else rim
+        least[at["rates"]], most[at["rates"]] = -rates, rates
+        most[at["depth"]] = rim if deep else 0.0
         chosen = np.zeros(goals)
-        chosen[[] if deep is None else list(deep)] = 1.0
+        chosen[list(deep)] = 1.0
         right = [float(hand == "right") for hand in instance.hands]
-        weights = [1.0, 0.0] if deep is None else [0.0, 1.0]
+        weights = [0.0, 1.0] if deep else [1.0, 0.0]
         with _ONE_AT_A_TIME:
             solution = self._solver(
                 x0=first,
@@ -288,24 +274,18 @@ class TrajectoryProblem:
                     [instance.q0, instance.goals.ravel(), right, [rim], chosen, weights]
                 ),
             )
-            return self.plan_from(instance, solution)
-
-    def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
-        """The plan of a solution; it has converged only if every constraint holds as well."""
-        goals, dof, at = self.goals, self.robot.dof, self._layout
-        x = np.asarray(solution["x"]).ravel()
-        limits = np.asarray(solution["g"]).ravel()
-        statistics = self._solver.stats()
+            statistics = self._solver.stats()
+        x, limits = (np.asarray(solution[name]).ravel() for name in "xg")
         violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
         return PathPlan(
             instance=instance,
             converged=statistics["return_status"] in _SOLVED
             and bool(np.isfinite(x).all() and violation < 1e-8),
             reason=statistics["return_status"],
-            configurations=instance.q0 + np.cumsum(x[at.steps].reshape(goals, dof), axis=0),
+            configurations=instance.q0 + np.cumsum(x[at["steps"]].reshape(start.shape), axis=0),
             cost=float(solution["f"]),
-            durations=x[at.durations],
-            rates=x[at.rates].reshape(self._order, goals + 1, dof),
+            durations=x[at["durations"]],
+            rates=x[at["rates"]].reshape(self._order, goals + 1, self.robot.dof),
             spent={
                 "forward_kinematics": self._evaluations * statistics.get("n_call_nlp_g", 0),
                 "jacobians": self._evaluations * statistics.get("n_call_nlp_jac_g", 0),

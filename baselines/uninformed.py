@@ -11,7 +11,6 @@ import math
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic.learner.learning import TRIALS
@@ -54,20 +53,20 @@ class Attempts:
         shape = (1, self._session.goals_count, self._session.dof)
         return self.by_targets(hands, np.full(shape, np.nan))
 
-    def around(self, hands: str, mask: NDArray[np.bool_], values: Array) -> Trials:
-        """Trials with one hand sequence and targets ``(N, n)`` for the n joints in its mask; the
-        others keep still."""
-        targets = np.full((len(values), *mask.shape), np.nan)
-        targets[:, mask] = values
+    def around(self, hands: str, values: Array) -> Trials:
+        """Make trials with one hand sequence and targets ``(N, n)`` for the n explored joints of
+        all goals; the other joints keep still."""
+        targets = np.full((len(values), *self.explored.shape), np.nan)
+        targets[:, self.explored] = values
         return self.by_targets(hands, targets)
 
     def by_targets(
         self, hands: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
-        """Trials with one hand sequence or one each, and targets of shape ``(N, G, dof)``.
+        """Make trials with one hand sequence or one each, and targets of shape ``(N, G, dof)``.
 
-        With ``until`` (N,) the last one is the first whose reward exceeds its entry there. Those
-        after it are not made: nothing of them is counted or known.
+        With ``until`` (N,) the last trial is the first whose reward exceeds its entry; trials after
+        it are not made.
         """
         trials = self._session.trials(hands, targets, until=until)
         rewards = trials.rewards

@@ -131,7 +131,7 @@ class Rounding:
         lengths: Array,
         merged: tuple[int, ...],
         *,
-        deep: Sequence[int] | None = None,
+        deep: Sequence[int] = (),
     ) -> PathPlan:
         """The shortest plan near another one, with these lengths and mergers."""
         instance = self._instance

@@ -168,8 +168,8 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 def _unnamed_methods(
     suite: Suite, asked: Iterable[Sequence[str]], registered: Registry
 ) -> list[str]:
-    """Return the ids of methods from files of which no method is named, by the suite or by a
-    request, whose ids are ``asked``."""
+    """Return the ids of methods from files that are not in use: neither the suite nor a request,
+    whose ids are ``asked``, names a method of such a file."""
     named = {
         method
         for block in suite.blocks

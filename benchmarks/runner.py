@@ -171,10 +171,9 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    An interruption keeps finished runs; the next call performs the missing runs, also those that
-    waited without computing, of which it warns. Of each method of
-    a file, a run is made again after a run with another seed; if the results differ, or targets
-    may be meant in degrees, it warns.
+    An interruption keeps finished runs; the next call performs the missing runs. A warning names
+    runs that waited without computing. For each method of a file, a run is made again after a run
+    with another seed; a warning says if the results differ, or if targets may be meant in degrees.
 
     Parameters
     ----------

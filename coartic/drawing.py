@@ -71,7 +71,7 @@ def draw_robot(
     return move
 
 
-def draw_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
+def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
     """Draw every goal as an open circle of its radius; returns the circles."""
     options: Any = {"fill": False, "edgecolor": BLACK, "linewidth": 0.7 * weight, "zorder": 3}
     circles = [Circle(goal, task.radius, **options) for goal in task.goals]

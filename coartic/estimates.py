@@ -41,8 +41,7 @@ SEED = 0
 FEWEST = 3
 """Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
 FEWER_RESAMPLES = 1_999
-"""Number of resamples for intervals of many values and over instances, of which each resample takes
-long."""
+"""Number of resamples for intervals of many values and over instances, which take long."""
 LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""

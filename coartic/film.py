@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
+from coartic.drawing import box, circle_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import check_ending, check_output, write_output
@@ -108,7 +108,7 @@ def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int],
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
     traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}
-    goals = draw_goals(axes, task, weight=_WEIGHT)
+    goals = circle_goals(axes, task, weight=_WEIGHT)
     move = draw_robot(axes, task, task.q0, weight=_WEIGHT, colour=colour)
     counter = axes.text(0, 1.01, "", transform=axes.transAxes, color=colour, **_COUNTER)
 

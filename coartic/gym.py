@@ -85,7 +85,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     num_envs : int
         Number of robots.
     task : Task, str or Path
-        The task; or a family, ``"two-armed/v1"``, of which each trial has an instance.
+        The task; or a family, ``"two-armed/v1"``: each trial has an instance of the family.
     split : {"development", "test", "fresh"}, optional
         Instances to train on (by default), to report on, or those of a ``year``. They never mix.
     count : int, optional
@@ -109,7 +109,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     move, in the order of a configuration; in a family, of arms with the most links.
 
     An observation has an entry for the next goal and for each of those ahead, 1 where there is
-    one; x and y of each from the base, length unit, 0 where there is none; and the joints. In a
+    one; x and y of each from the base, length unit, 0 without a goal; and the joints. In a
     family whose robots differ in links an entry for each joint follows, 1 where the robot can move
     it.
 
@@ -343,7 +343,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        from coartic.drawing import box, draw_goals, draw_robot, fill_goals
+        from coartic.drawing import box, circle_goals, draw_robot, fill_goals
 
         robots, state = self.robots, self.robots.state
         task = robots.task_at(state.task.item())
@@ -352,7 +352,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
         draw_robot(axes, task, state.q[0, robots.places_of(task.robot)], weight=1.5)
-        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
+        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
@@ -397,7 +397,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     Raises
     ------
     ValueError, TypeError
-        The id is none of coartic's, or an option is wrong.
+        The id is not one of coartic's, or an option is wrong.
     CoarticError
         Stable-Baselines3 is not installed.
     """
@@ -462,7 +462,7 @@ def score(
     Raises
     ------
     ValueError, TypeError
-        The environment is none of coartic's or has a wrapper, an option is wrong, or the policy is
+        The environment is not coartic's or has a wrapper, an option is wrong, or the policy is
         no policy, or an agent that was trained in another wrapper.
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)

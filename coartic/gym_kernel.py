@@ -23,7 +23,6 @@ from coartic.motion.trial import (
 )
 from coartic.robot import Array, Configs, Hands, Points, Robot
 
-Flags = NDArray[np.bool_]
 Numbers = NDArray[np.int64]
 
 
@@ -36,7 +35,7 @@ class VectorState(NamedTuple):
     """Index of the next goal, shape ``(N,)``."""
     q: Configs
     """Configurations, shape ``(N, dof)``."""
-    going: Flags
+    going: NDArray[np.bool_]
     """True where the trial goes on, shape ``(N,)``."""
     actions: Array
     """Shape ``(N, A)``: an entry for the hand, if there are two, and one for each joint."""
@@ -50,10 +49,10 @@ class VectorState(NamedTuple):
     """Index in ``parameters`` of each task's robot, shape ``(T,)``; -1 for a task that is not
     loaded."""
     goals: Points
-    """Centres of goals, shape ``(T, G, 2)``, of which a task has ``counts``."""
+    """Centres of goals, shape ``(T, G, 2)``; a task has the first ``counts``."""
     counts: Numbers
     """Goals of each task, shape ``(T,)``."""
-    movable: Flags
+    movable: NDArray[np.bool_]
     """True where the robot of a task can move a joint, shape ``(T, E)``."""
     joints: Numbers
     """Indices in a configuration of the joints that are seen and moved, shape ``(E,)``."""
@@ -125,10 +124,10 @@ def _squared_distance(run: Any) -> float:
 
 
 @inlined
-def aim(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
+def aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
     """Phase 2, *aim*: choose the hand that the corrective process brings to the goal by the shorter
     path, or, if the action says so, the other one, and the solution of the process, or the present
-    posture where there is none, plus the action.
+    posture without a solution, plus the action.
 
     ``run`` is changed in place; ``other`` is the run of the other hand, with two hands.
     ``action[0] > 0.5`` takes the other hand; the rest, clipped to ±1, is scaled by
@@ -162,7 +161,9 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
     others = state.runs[len(state.sides) - 1]
     for i in range(count):
         n = state.indices[i]
-        aim(batch.runs[i], others[i], state.movable[state.task[n]], state.actions[n], state)
+        aim_by_action(
+            batch.runs[i], others[i], state.movable[state.task[n]], state.actions[n], state
+        )
     move(count, robot, batch)
     for i in range(count):
         state.accounts[i].moved[0] = batch.runs[i].ticks

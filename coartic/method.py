@@ -435,8 +435,8 @@ class Session:
         long as trials were made. With ``until``, shape ``(N,)``, the last trial is the first
         whose reward exceeds its entry; those after it are not made.
 
-        Rewards and counts are those of single trials, but for forward kinematics, of which a
-        single trial spends one or two more per goal. Where the corrective process is not
+        Rewards and counts are those of single trials, except that a single trial spends one or two
+        more evaluations of forward kinematics per goal. Where the corrective process is not
         declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
         Raises BudgetError where no trial is left, ValueError for arrays that do not fit the task.
         """
@@ -692,11 +692,9 @@ def run_method(
     method : Method
         The method, with its parameters.
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     seed : int
         Seed of its random numbers.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------

@@ -106,7 +106,7 @@ class Objective:
     target is always made and takes a tick at least.
 
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
-    hand sequence, of which the best is kept. A point has these hands, unless others are given
+    hand sequence; the best sequence is kept. A point has these hands, unless others are given
     with it: the lowest cost is that of the best solution with these hands, which other hands may
     better.
 
@@ -472,18 +472,15 @@ def objective(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     hands : str, optional
         A hand sequence (``"RRLR"``), by default the one with which the corrective process alone
-        does best. These need not be those of the
-        optimum: in ``two-armed-2`` they are others, and no point is known to come within 14 % of
-        it.
+        does best. The optimum can have others: in ``two-armed-2`` no point with these hands is
+        known to come within 14 % of it.
     half_width : float
-        That of the bounds around ``x0``, length unit (base) and rad (joints).
+        Half the width of the bounds around ``x0``, length unit (base) and rad (joints).
     model : MotionModel
-        The constants of movement and of the corrective process.
     budget : int, optional
-        Most trials, those included with which hands are chosen; after them BudgetError is raised.
+        Most trials, among them those by which hands are chosen; then BudgetError is raised.
 
     Returns
     -------
@@ -498,7 +495,7 @@ def objective(
         Hands do not fit, the half width is not from 1e-9 to 100, or the budget is not from 1 to
         10,000,000, or less than the hand sequences to choose among.
     TypeError
-        The model is none, or the task is neither a Task nor a text nor a path.
+        The model is no MotionModel, or the task is neither a Task nor a text nor a path.
     MethodError
         The corrective process completes no sequence, or there are too many to try.
     """
@@ -538,11 +535,9 @@ def problems(
     count : int
         How many, from 1 to 10,000.
     half_width : float
-        That of the bounds around ``x0``, length unit (base) and rad (joints).
     model : MotionModel
-        The constants of movement and of the corrective process.
     budget : int, optional
-        Most trials of each, those included with which hands are chosen.
+        For each problem, as of :func:`objective`.
 
     Returns
     -------

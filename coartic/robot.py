@@ -24,7 +24,7 @@ from pydantic.dataclasses import dataclass
 
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
-from coartic.internal.validation import in_sentences
+from coartic.internal.validation import changed_values, in_sentences
 
 Hand = Literal["left", "right"]
 """Name of a hand: ``"left"`` or ``"right"``."""
@@ -104,7 +104,9 @@ class Robot:
     gives the published initial rewards of the one-armed tasks (docs/model.md).
 
     A configuration ``q`` has shape ``(dof,)``: the base's x and y (length unit), the joint angles
-    of the left arm and those of the right one (rad, each from the link before).
+    of the left arm and those of the right one (rad, each from the link before). Methods take one or
+    many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another shape or that is not
+    finite, and for a hand that is neither ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
@@ -120,13 +122,8 @@ class Robot:
     drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
 
     def __repr__(self) -> str:
-        paper = type(self).__dataclass_fields__
-        others = {
-            name: getattr(self, name)
-            for name in ("left_shoulder", "right_shoulder", "base_size")
-            if getattr(self, name) != paper[name].default
-        }
-        return short_repr(self, left_links=self.left_links, right_links=self.right_links, **others)
+        links = {"left_links": self.left_links, "right_links": self.right_links}
+        return short_repr(self, **links | changed_values(self))
 
     @cached_property
     def scale(self) -> float:
@@ -172,13 +169,7 @@ class Robot:
         }
 
     def arm(self, hand: Hand) -> Arm:
-        """The arm that carries a hand.
-
-        Raises
-        ------
-        ValueError
-            The hand is neither ``"left"`` nor ``"right"``; so in all methods that take a hand.
-        """
+        """Return the arm that carries a hand."""
         try:
             return self._arms[hand]
         except (KeyError, TypeError):
@@ -191,11 +182,6 @@ class Robot:
         -------
         slice
             ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad.
-
-        Raises
-        ------
-        ValueError
-            The hand is neither ``"left"`` nor ``"right"``.
         """
         arm = self.arm(hand)
         return slice(arm.first, arm.first + len(arm.links))
@@ -207,14 +193,8 @@ class Robot:
         -------
         tuple of float
             The least and the greatest distance, length unit.
-
-        Raises
-        ------
-        ValueError
-            The hand is neither ``"left"`` nor ``"right"``.
         """
-        self.arm(hand)  # refuses what is no hand
-        links = self.left_links if hand == "left" else self.right_links
+        links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 
     def forward_kinematics(self, q: ArrayLike, hand: Hand) -> Array:
@@ -223,23 +203,17 @@ class Robot:
         Parameters
         ----------
         q : array_like, shape (..., dof)
-            Configurations, length unit (base) and rad (joints).
         hand : {"left", "right"}
-            The hand.
 
         Returns
         -------
         ndarray, shape (..., 2)
-            Its positions, x and y, length unit.
+            Positions of the hand, x and y, length unit.
 
         Raises
         ------
         ValueError
-            ``q`` has another shape or is not finite, or there is no such hand.
-
-        Notes
-        -----
-        Source: Craig (2004), planar serial chain.
+            ``q`` or ``hand`` does not fit the robot.
         """
         array = self._configuration(q)
         return self._hand(*self._numpy_chain(array, hand), array)
@@ -250,9 +224,7 @@ class Robot:
         Parameters
         ----------
         q : array_like, shape (..., dof)
-            Configurations, length unit (base) and rad (joints).
         hand : {"left", "right"}
-            The hand of the arm.
 
         Returns
         -------
@@ -262,20 +234,18 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape or is not finite, or there is no such hand.
+            ``q`` or ``hand`` does not fit the robot.
         """
         xs, ys = self._numpy_chain(self._configuration(q), hand)
         return np.stack([np.stack(xs, axis=-1), np.stack(ys, axis=-1)], axis=-1)
 
     def jacobian(self, q: ArrayLike, hand: Hand) -> Array:
-        """The Jacobian of a hand's position.
+        """Compute the Jacobian of a hand's position.
 
         Parameters
         ----------
         q : array_like, shape (..., dof)
-            Configurations, length unit (base) and rad (joints).
         hand : {"left", "right"}
-            The hand.
 
         Returns
         -------
@@ -286,7 +256,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape or is not finite, or there is no such hand.
+            ``q`` or ``hand`` does not fit the robot.
         """
         return self.linearised(q, hand)[1]
 
@@ -298,11 +268,6 @@ class Robot:
         tuple of ndarray
             Hand positions, shape ``(..., 2)``, length unit, and their Jacobians, shape
             ``(..., 2, dof)``, length unit per length unit (base) and per rad (joints).
-
-        Raises
-        ------
-        ValueError
-            ``q`` has another shape than ``(..., dof)`` or is not finite, or there is no such hand.
         """
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
@@ -315,12 +280,11 @@ class Robot:
         return self._hand(xs, ys, array), result
 
     def base_outline(self, q: ArrayLike) -> Array:
-        """The corners of the base.
+        """Return the corners of the base.
 
         Parameters
         ----------
         q : array_like, shape (..., dof)
-            Configurations, length unit (base) and rad (joints).
 
         Returns
         -------
@@ -330,7 +294,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another shape or is not finite.
+            ``q`` does not fit the robot.
         """
         array = self._configuration(q)
         half = np.array(self.drawn_base) / 2
@@ -348,11 +312,9 @@ class Robot:
         size = getattr(q, "numel", lambda: brief_value(q))()
         if size != self.dof:
             raise ValueError(f"symbolic q has {size} entries; this robot needs {self.dof}")
-        xs: list[Any] = [None] * (len(arm.links) + 1)
-        ys: list[Any] = [None] * (len(arm.links) + 1)
         # Plain floats: a NumPy scalar times a CasADi symbol would call NumPy first.
-        plain = arm._replace(links=[float(length) for length in arm.links])
-        chain(q, plain, xs, ys, casadi.cos, casadi.sin)
+        plain = arm._replace(links=arm.links.tolist())
+        xs, ys = _points_of(q, plain, casadi.cos, casadi.sin)
         return casadi.vertcat(xs[-1], ys[-1])
 
     def _configuration(self, q: ArrayLike) -> Array:
@@ -366,12 +328,8 @@ class Robot:
         return array
 
     def _numpy_chain(self, q: Array, hand: Hand) -> tuple[list[Any], list[Any]]:
-        arm = self.arm(hand)
-        xs: list[Any] = [None] * (len(arm.links) + 1)
-        ys: list[Any] = [None] * (len(arm.links) + 1)
         by_joint = q if q.ndim == 1 else np.moveaxis(q, -1, 0)
-        chain(by_joint, arm, xs, ys, np.cos, np.sin)
-        return xs, ys
+        return _points_of(by_joint, self.arm(hand), np.cos, np.sin)
 
     @staticmethod
     def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
@@ -379,6 +337,14 @@ class Robot:
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]
         return position
+
+
+def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
+    """Return x and y of shoulder, joints and hand (:func:`chain`)."""
+    xs: list[Any] = [None] * (len(arm.links) + 1)
+    ys = [*xs]
+    chain(q, arm, xs, ys, cos, sin)
+    return xs, ys
 
 
 def directions(angles: ArrayLike) -> Array:

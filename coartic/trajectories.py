@@ -147,7 +147,7 @@ class Trajectory:
         """
         from matplotlib.figure import Figure
 
-        from coartic.drawing import box, draw_goals, draw_robot, number_goals
+        from coartic.drawing import box, circle_goals, draw_robot, number_goals
 
         figure = Figure(figsize=(6, 4.5), layout="constrained")
         low, high = box(self.task, self.configurations)
@@ -159,7 +159,7 @@ class Trajectory:
         for number, hand in enumerate(self.hands, 1):
             x, y = self.task.robot.forward_kinematics(self.subtask(number), hand).T
             axes.plot(x, y, color="0.5", linewidth=0.8, zorder=1)
-        draw_goals(axes, self.task)
+        circle_goals(axes, self.task)
         number_goals(axes, self.task)
         axes.set_title(f"{self.task.name}: {self.execution.hands}, reward −{-self.reward}")
         return figure
@@ -201,11 +201,9 @@ def trajectory(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     movements : iterable of Movement
         The solution: at least one movement for each goal, in the order of the goals.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------

@@ -26,7 +26,7 @@ def shipped():
 
 def test_robots_and_goals_are_drawn_where_they_are():
     task, axes = load_task("two-armed-1"), Figure().add_subplot()
-    circles = drawing.draw_goals(axes, task)
+    circles = drawing.circle_goals(axes, task)
     drawing.fill_goals(circles, [True, False, False, False])
     assert [circle.get_fill() for circle in circles] == [True, False, False, False]
     assert [circle.center for circle in circles] == [*map(tuple, task.goals)]

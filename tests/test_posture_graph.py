@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 
 from coartic import load_task
-from coartic.baselines.posture_graph import PostureGraph, cheapest_chains, move_other_arm
+from coartic.baselines.posture_graph import (
+    chains_of,
+    cheapest_chains,
+    move_other_arm,
+    sample_layers,
+)
 from coartic.method import MethodError, Session
 from tests.support.strategies import changed
 
 
-def cheapest(graph, hands):
+def cheapest(task, layers, hands):
     """Every combination of nodes, one by one."""
-    task, best = graph.task, np.inf
-    layers = [graph.layers[goal, hand] for goal, hand in enumerate(hands)]
-    for nodes in itertools.product(*layers):
+    best = np.inf
+    for nodes in itertools.product(*(layers[key] for key in enumerate(hands))):
         length, before = 0.0, np.array(task.q0)
         for hand, node in zip(hands, nodes, strict=True):
             q = before.copy()
@@ -35,12 +39,12 @@ def length_of(task, configurations):
 @pytest.mark.parametrize("name", ["two-armed-2", "two-armed-1", "ascending"])
 def test_chains_are_the_cheapest(name):
     task = load_task(name)
-    graph = PostureGraph.sample(task, 5, np.random.default_rng(3))
-    chains = dict(graph.chains())
+    layers, _ = sample_layers(task, 5, np.random.default_rng(3))
+    chains = dict(chains_of(task, layers))
     assert len(chains) == len(task.hands) ** len(task.goals)
     for hands, configurations in chains.items():
         steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
-        assert length_of(task, configurations) == pytest.approx(cheapest(graph, hands))
+        assert length_of(task, configurations) == pytest.approx(cheapest(task, layers, hands))
         for goal, hand in enumerate(hands):
             (other,) = {"left", "right"} - {hand}
             assert np.all(steps[goal][task.robot.joints(other)] == 0.0)
@@ -50,9 +54,9 @@ def test_chains_are_the_cheapest(name):
 
 def test_a_free_arm_is_spread_over_its_way():
     task = load_task("two-armed-2")
-    graph = PostureGraph.sample(task, 10, np.random.default_rng(6))
+    layers, _ = sample_layers(task, 10, np.random.default_rng(6))
     hands = ("left", "right", "right", "left")
-    chain = dict(graph.chains())[hands]
+    chain = dict(chains_of(task, layers))[hands]
     spread = move_other_arm(task, hands, chain)
     left = task.robot.joints("left")
     first, last = chain[0, left], chain[3, left]
@@ -63,7 +67,8 @@ def test_a_free_arm_is_spread_over_its_way():
 
 def test_a_goal_without_a_posture_is_named():
     task = changed("two-armed-1", goals=[[2, 3.6], [2, 40]], locked_base=["y"], initial_hands="RR")
-    assert list(PostureGraph.sample(task, 20, np.random.default_rng(7)).chains()) == []
+    layers, _ = sample_layers(task, 20, np.random.default_rng(7))
+    assert chains_of(task, layers) == []
     options = {"nodes": 20, "graphs": 1, "chains": 1}
     with pytest.raises(MethodError, match="^goal 2: no posture was found that puts the left or"):
         [*cheapest_chains(Session(task, 0, ()), task, np.random.default_rng(7), **options)]
@@ -71,13 +76,13 @@ def test_a_goal_without_a_posture_is_named():
 
 def test_a_beam_keeps_the_cheapest_beginnings():
     task = load_task("two-armed-1")
-    graph = PostureGraph.sample(task, 12, np.random.default_rng(8))
-    by_hands = dict(graph.chains())
+    layers, _ = sample_layers(task, 12, np.random.default_rng(8))
+    by_hands = dict(chains_of(task, layers))
     assert list(by_hands) == list(itertools.product(("left", "right"), repeat=4))
     for most in (1, 5, 16):
-        kept = list(graph.chains(most=most))
+        kept = chains_of(task, layers, most)
         assert len(kept) == most
         for hands, configurations in kept:
             assert np.array_equal(configurations, by_hands[hands])
     best = min(by_hands, key=lambda hands: length_of(task, by_hands[hands]))
-    assert best in dict(graph.chains(most=5))
+    assert best in dict(chains_of(task, layers, 5))

@@ -95,7 +95,7 @@ def one_by_one(task, seed, parameters):
         if hands in centres:
             centre, reward = centres[hands]
             values = centre + parameters.sigma * rng.standard_normal(len(centre))
-            attempt = attempts.around(hands, mask, values[None])
+            attempt = attempts.around(hands, values[None])
         else:
             attempt, reward = attempts.by_correction(hands), -np.inf
         if attempt.rewards[0] == reward == -np.inf:
@@ -137,7 +137,7 @@ class HalfOfAPlain:
     def by_correction(self, hands):
         return SimpleNamespace(rewards=np.array([-300.0]), reached=np.zeros((1, 1, 3)))
 
-    def around(self, hands, mask, values):
+    def around(self, hands, values):
         self.sizes.append(len(values))
         self.failed = values[:, 0] > 0.5
         rewards = -100.0 * ((values - 1.0) ** 2).sum(axis=1)

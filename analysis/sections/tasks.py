@@ -16,7 +16,7 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.words import marked, titled_apart
-from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
+from coartic.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
 from coartic.motion.solution import initial_reward
 
 
@@ -91,7 +91,7 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
         if len(task.hands) > 1:  # what shows of an arm under the other one
             left = task.robot.joint_positions(task.q0, "left").T
             axes.plot(*left, color=style.GREY, alpha=0.5, linewidth=3.2, zorder=1.7)
-        draw_goals(axes, task)
+        circle_goals(axes, task)
         number_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)

@@ -19,7 +19,7 @@ from coartic.internal.text import unknown
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 _KINDS: dict[Any, Any] = {bool: bool | np.bool_, int: Integral, float: Real, str: str}
-_WORDS = {"bool": "True or False", "int": "a whole number", "float": "a number", "str": "a text"}
+_NEEDED = {"bool": "True or False", "int": "a whole number", "float": "a number", "str": "a text"}
 
 
 class ArgumentError(CoarticError, ValueError, TypeError):
@@ -61,7 +61,7 @@ def checker_of(function: Callable[..., Any]) -> Callable[..., None]:
                 parameter, hint = signature.parameters[name], hint_of(name)
                 for each in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
                     if type(each) is not hint and not fits(name, each, hint):
-                        needed = _WORDS.get(parameter.annotation, parameter.annotation)
+                        needed = _NEEDED.get(parameter.annotation, parameter.annotation)
                         raise ValueError(f"{name} is {brief_value(each)}; needed is {needed}")
         except TypeError as error:
             raise ArgumentError(f"{function.__name__}: {error}") from None

@@ -67,6 +67,16 @@ def in_sentences(kind: type[T]) -> type[T]:
     return kind
 
 
+def changed_values(thing: Any) -> dict[str, Any]:
+    """Return the values of an object of a pydantic class that have no default or differ from it."""
+    return {
+        name: getattr(thing, name)
+        for name, field in type(thing).__pydantic_fields__.items()
+        if field.is_required()
+        or getattr(thing, name) != field.get_default(call_default_factory=True)
+    }
+
+
 @in_sentences
 class FileData(BaseModel):
     """Content of a file, which cannot be changed and has known keys only."""
@@ -75,12 +85,7 @@ class FileData(BaseModel):
 
     def __repr__(self) -> str:
         """Return the values that differ from the defaults, in a few lines."""
-        stated = {}
-        for name, field in type(self).model_fields.items():
-            value = getattr(self, name)
-            if field.is_required() or value != field.get_default(call_default_factory=True):
-                stated[name] = value
-        return short_repr(self, **stated)
+        return short_repr(self, **changed_values(self))
 
     def __str__(self) -> str:
         return repr(self)
@@ -117,7 +122,7 @@ def sentence_error(text: str) -> PydanticCustomError:
     return PydanticCustomError("sentence", "{text}", {"text": text})
 
 
-def _explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
+def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
     """Return one sentence about a problem; ``keys`` are the keys that an unknown key may have
     meant."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links

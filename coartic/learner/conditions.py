@@ -18,7 +18,7 @@ measures what each does to learning.
 
 from __future__ import annotations
 
-from dataclasses import MISSING, fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
@@ -33,7 +33,7 @@ from pydantic.dataclasses import dataclass
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import short_repr, unknown
-from coartic.internal.validation import in_sentences, sentence_error
+from coartic.internal.validation import changed_values, in_sentences, sentence_error
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -143,15 +143,10 @@ class ExplorationCondition:
         return any(self.drifts) or self.pull > 0
 
     def __repr__(self) -> str:
-        positional = ("hands", "modify_chosen", "modify_other", "hand_exploration")
-        facts = {
-            field.name: getattr(self, field.name)
-            for field in fields(self)
-            if field.default is not MISSING and getattr(self, field.name) != field.default
-        }
-        return short_repr(
-            self, brief_value(self.id), *(repr(getattr(self, name)) for name in positional), **facts
-        )
+        facts = changed_values(self)
+        required = ("hands", "modify_chosen", "modify_other", "hand_exploration")
+        positional = [repr(facts.pop(name)) for name in required]
+        return short_repr(self, brief_value(facts.pop("id")), *positional, **facts)
 
     def why_not(self, task: Task | Outline) -> str | None:
         """Why the condition does not apply to a task, or None where it does."""
@@ -219,5 +214,4 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
     try:
         return EVERY_CONDITION[condition.removeprefix(METHOD_PREFIX)]
     except KeyError:
-        known = EVERY_CONDITION
-        raise CoarticError(unknown("exploration condition", condition, known)) from None
+        raise CoarticError(unknown("exploration condition", condition, EVERY_CONDITION)) from None

@@ -76,7 +76,6 @@ def learn(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     condition : str or ExplorationCondition
         The condition, or the name of one in ``CONDITIONS`` or ``ABLATIONS``, such as ``"EC4"``.
     seed : int
@@ -84,7 +83,6 @@ def learn(
     trials : int
         Number of trials, the initial one included.
     model : MotionModel
-        The constants of movement and of the corrective process.
     start : sequence of Movement
         A first solution, such as a planner's or an earlier run's. Trial 0 moves with its hands
         straight to the first target that it has for each goal, length unit (base) and rad
@@ -106,7 +104,7 @@ def learn(
     CoarticError
         The condition is unknown.
     TypeError
-        The task is neither a Task nor a text nor a path, or the condition or the model is none.
+        The task is neither a Task nor a text nor a path, or condition or model has another type.
     SolutionError
         The first solution breaks the task's rules.
     ValueError
@@ -285,10 +283,10 @@ def _learn_together(
     ]
 
 
-Part = Literal["learner", "motion", "trials"]
+Kernels = Literal["learner", "motion", "trials"]
 
 
-def warm_up(task: Task, *parts: Part) -> None:
+def warm_up(task: Task, *parts: Kernels) -> None:
     """Compile the kernels, or load them, so that no run's time contains it.
 
     They are those of the number of links that the task's robot has: the learner's, those of single
@@ -296,7 +294,7 @@ def warm_up(task: Task, *parts: Part) -> None:
     """
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))
-    wanted = parts or get_args(Part)
+    wanted = parts or get_args(Kernels)
     if "learner" in wanted:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
         _learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)

@@ -17,7 +17,7 @@ from coartic.motion.solution import Execution, Movement, execute, hands_in
 from coartic.robot import Array
 from coartic.tasks.task import Task
 
-CORRECTIONS = "corrections"
+CORRECTIONS_BY_TENTH = "corrections"
 """Detail of a stored run: corrective movements in trial 0 and in each tenth of the others."""
 
 

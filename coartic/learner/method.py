@@ -20,7 +20,7 @@ from coartic.learner.conditions import (
     ExplorationCondition,
 )
 from coartic.learner.learning import TRIALS, learn_many
-from coartic.learner.learning_run import CORRECTIONS
+from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
 from coartic.method import (
     Information,
     Meter,
@@ -116,7 +116,7 @@ class DualProcess(Method):
             if not run.learned:
                 results.append(MethodError("infeasible", run.reason))
                 continue
-            details = {CORRECTIONS: run.corrections.tolist()}
+            details = {CORRECTIONS_BY_TENTH: run.corrections.tolist()}
             results.append(Result(run.learned, details, initial=run.initial, replay=run.replay))
         return results
 
@@ -159,6 +159,7 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
     )
 
 
+_LEARNERS = tuple(map(_method_for, EVERY_CONDITION.values()))
 _optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 
 
@@ -170,17 +171,7 @@ class CustomDualProcess(DualProcess):
 
     name = f"{METHOD_PREFIX}custom"
     title = "Dual-process learner, any exploration condition"
-    information = frozenset(
-        {
-            Information.CORRECTIVE_PROCESS,
-            Information.REWARD_BY_TRIAL,
-            Information.REWARD_BY_SUBTASK,
-            Information.GOALS,
-            Information.FORWARD_KINEMATICS,
-            Information.JACOBIAN,
-            Information.REWARD_FORMULA,
-        }
-    )
+    information = frozenset[Information]().union(*(each.information for each in _LEARNERS))
     Parameters: ClassVar[type[Parameters]] = create_model(
         "CustomParameters", __base__=CustomParameters, **_optional
     )
@@ -191,7 +182,4 @@ class CustomDualProcess(DualProcess):
         return _condition_of(base, self.parameters)
 
 
-METHODS: tuple[type[DualProcess], ...] = (
-    *map(_method_for, EVERY_CONDITION.values()),
-    CustomDualProcess,
-)
+METHODS: tuple[type[DualProcess], ...] = (*_LEARNERS, CustomDualProcess)

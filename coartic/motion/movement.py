@@ -386,7 +386,7 @@ def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
     """Let **A** descend in the first ``count`` slots until each has ended.
 
     The ``target`` of each run becomes what its slot ends with; ``converged`` and ``iterations`` of
-    its record are set. ``pull`` is None, or a kernel that is called with rows, ``count``, robot and
+    its record are set. ``pull`` may be a kernel; it is called with rows, ``count``, robot and
     runs and fills in the rows ``pull``: what an iteration adds to the base and to the joints of the
     arm at its iterate ``q``, zero for what is locked.
     """

@@ -196,8 +196,8 @@ def execute(
 
 
 def hint_of(movements: Iterable[Movement]) -> str:
-    """Return the hint of movements of which a target turns a joint so far as degrees would; empty
-    without such a target."""
+    """Return a hint if a target of some movements turns a joint as far as degrees would; else an
+    empty text."""
     for movement in movements:
         if movement.kind != "corrective" and movement.target is not None:
             angle = max(movement.target[BASE_DOF:].tolist(), key=abs)
@@ -462,8 +462,8 @@ def _check_point(task: Task, point: Any) -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Return the points, ``(..., dof)``, of which locked base coordinates that move by no more than
-    :data:`HELD` are put back. Raises ValueError where one moves by more."""
+    """Put locked base coordinates of points, ``(..., dof)``, back if they move by no more than
+    :data:`HELD`, and return the points. Raises ValueError where one moves by more."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
         moved = np.abs(points[..., k] - task.q0[k])

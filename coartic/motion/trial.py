@@ -4,7 +4,7 @@ A goal has five phases. A run, one of many side by side,
 
 1. *begins*: its next goal is set;
 2. *aims*: a hand and, perhaps, a target are chosen, which is what callers differ in;
-3. *moves* to the target, or, where there is none, finds that its hand is in the goal already;
+3. *moves* to the target, or, without a target, finds that its hand is in the goal already;
 4. *corrects*: where the goal is missed, the corrective process **A** looks for a configuration that
    hits it, and the arm moves there;
 5. *accounts*: what happened is noted, and the trial goes on where the goal is hit

@@ -73,7 +73,7 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """One first goal before two others."""
+    """Return a preset with one first goal before two others."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 

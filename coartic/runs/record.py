@@ -17,7 +17,7 @@ from pydantic import Field, InstanceOf
 
 from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
-from coartic.learner.learning_run import CORRECTIONS
+from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
 from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
@@ -164,7 +164,7 @@ class Run:
     def _corrections(self) -> list[int | None]:
         """Return the corrective movements of a learner in trial 0 and in each tenth of the other
         trials; blanks for other methods."""
-        counts = self.outcome.details.get(CORRECTIONS)
+        counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         return counts if isinstance(counts, list) and len(counts) == 11 else [None] * 11
 
     @property
@@ -175,7 +175,7 @@ class Run:
 
     def downsample(self) -> Run:
         """Return the run with the rewards of its best trial and of the trials that were better than
-        all earlier trials; other rewards are None. The run then takes a tenth of the space."""
+        all earlier trials, and None for other trials. The run then takes a tenth of the space."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best

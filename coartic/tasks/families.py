@@ -91,7 +91,7 @@ def _in_order(span: tuple[int, int]) -> tuple[int, int]:
 _ordered = AfterValidator(_in_order)
 Span = Annotated[tuple[Thousandths, Thousandths], _ordered]
 """From, to; every thousandth between as likely."""
-_Count = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
+_GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
 
@@ -152,7 +152,7 @@ class Family(FileData):
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals; the robot has both arms anyway."""
-    goals: Annotated[tuple[_Count, _Count], _ordered]
+    goals: Annotated[tuple[_GoalsCount, _GoalsCount], _ordered]
     """Least and largest number of goals; each number is equally likely."""
     links: Annotated[tuple[_PerArm, _PerArm], _ordered]
     """Least and largest number of links of each arm; all links have one length (to a
@@ -160,7 +160,7 @@ class Family(FileData):
     reach: Thousandths = 4 * _PARTS
     """Sum of an arm's links, length unit; the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
-    """Bases, of which one is drawn: free, on a rail (it cannot move in y), or locked."""
+    """Bases; each instance has one: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
     """Bases, in addition to the instance's own, with which every instance can be completed."""
     radius: Thousandths = 100
@@ -170,7 +170,7 @@ class Family(FileData):
     line: _Alignment | None = None
     """Goals on a line: table ``[line]``; scattered over the region where left out."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
-    """Starting postures, of which one is drawn: tables ``[[start]]``."""
+    """Starting postures; each instance has one: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
     """Policy that finds the hands of trial 0; the instance names the hands."""
     apart: Thousandths = 300

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Sequence
 from typing import TypeVar
 
-T = TypeVar("T")
+Choice = TypeVar("Choice")
 Words = tuple[int, int, int, int]
 _WORD = (1 << 32) - 1
 _ROUNDS = 10
@@ -57,6 +57,6 @@ class Draws:
         2^64."""
         return least + (next(self._pairs) * (most - least + 1) >> 64)
 
-    def one_of(self, choices: Sequence[T]) -> T:
+    def one_of(self, choices: Sequence[Choice]) -> Choice:
         """Draw one of the choices, each equally likely."""
         return choices[self.integer(0, len(choices) - 1)]

@@ -188,13 +188,13 @@ class Task(FileData):
     def family(self) -> str | None:
         """The family that it is an instance of, with its version; None where of none."""
         address = address_of(self.name)
-        return None if address is None else address.family
+        return address and address.family
 
     @property
     def split(self) -> Split | None:
         """Purpose of an instance of a family; None for other tasks."""
         address = address_of(self.name)
-        return None if address is None else address.split
+        return address and address.split
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
@@ -205,12 +205,14 @@ class Task(FileData):
     @classmethod
     def _with_start(cls, content: Any) -> Any:
         """Read ``q0`` as the start, or let both arms point along +x without a start."""
-        if isinstance(content, dict) and "penalty" in content:
+        if not isinstance(content, dict):
+            return content
+        if "penalty" in content:
             reads = "version 1.1.0 of coartic reads tasks with a penalty"
             raise sentence_error(f"{reads}; here a reward is minus the ticks")
-        if isinstance(content, dict) and {"start", "q0"} <= content.keys():
+        if {"start", "q0"} <= content.keys():
             raise sentence_error("q0 and start both say where a trial begins: give one of them")
-        if not isinstance(content, dict) or "start" in content:
+        if "start" in content:
             return content
         robot = content.get("robot", Robot())
         try:
@@ -235,8 +237,8 @@ class Task(FileData):
         for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
             if len(set(values)) < len(values):
                 raise sentence_error(f"{key} names the same entry twice: {', '.join(values)}")
-        for hand, angles in (("left", self.start.left), ("right", self.start.right)):
-            joints = len(self.robot.left_links if hand == "left" else self.robot.right_links)
+        for hand in HANDS:
+            angles, joints = getattr(self.start, hand), len(self.robot.arm(hand).links)
             if len(angles) != joints:
                 raise sentence_error(
                     f"start.{hand} has {len(angles)} joint angles; the {hand} arm has {joints} "
@@ -460,7 +462,7 @@ def task_text(task: Task) -> str:
             lines += [
                 "",
                 f"[{key}]",
-                *(f"{k} = {_toml_value(v)}" for k, v in table.items() if v is not None),
+                *(f"{k} = {_toml_value(v)}" for k, v in table.items()),
             ]
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,4 @@
-"""How much coarticulation belongs to a gain, and does it matter who gains?
+"""Coarticulation that belongs to a gain: how much is it, and does it matter who gains?
 
     coartic run studies/gain/suite.toml --out results/gain
     python studies/gain/study.py results/gain

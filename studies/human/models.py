@@ -1,4 +1,4 @@
-"""Models that are compared with people, and which runs are of which model."""
+"""Models that are compared with people, and the runs of each model."""
 
 import json
 import re

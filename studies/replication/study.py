@@ -1,4 +1,4 @@
-"""What of Shah, Barto & Fagg (2013) comes out again?
+"""Replication: what of Shah, Barto & Fagg (2013) comes out again?
 
     coartic run comparison --out results/comparison
     python studies/replication/study.py results/comparison [FOLDER ...] [--out FOLDER]
