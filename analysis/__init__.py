@@ -3,9 +3,7 @@
 ``coartic.analysis.load(folder)`` reads a results folder as a :class:`Study`.
 """
 
-from typing import Any
-
-from coartic.internal.lazy import find, names_of
+from coartic.internal.lazy import lazy
 
 _MODULES = {
     "SIGNATURES": "coartic.analysis.signatures.measures",
@@ -38,12 +36,4 @@ _MODULES = {
 }
 __all__ = [*_MODULES]
 
-
-def __getattr__(name: str) -> Any:
-    """Import a name of the API on first use: not every command needs all of them."""
-    return find(__name__, name, _MODULES)
-
-
-def __dir__() -> list[str]:
-    """The names of the API."""
-    return names_of(__name__, _MODULES)
+__getattr__, __dir__ = lazy(__name__, _MODULES)

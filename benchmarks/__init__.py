@@ -3,9 +3,9 @@
 ``coartic.benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`coartic.benchmarks.runner`).
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from coartic.internal.lazy import find, names_of
+from coartic.internal.lazy import lazy
 
 if TYPE_CHECKING:
     from coartic.benchmarks.planning import plan_suite
@@ -19,12 +19,4 @@ _MODULES = {
 }
 __all__ = ["Progress", "perform", "plan_suite", "run_suite"]
 
-
-def __getattr__(name: str) -> Any:
-    """Import a name of the API on first use; worker processes need no name of it."""
-    return find(__name__, name, _MODULES)
-
-
-def __dir__() -> list[str]:
-    """The names of the API."""
-    return names_of(__name__, _MODULES)
+__getattr__, __dir__ = lazy(__name__, _MODULES)

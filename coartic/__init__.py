@@ -5,9 +5,9 @@ Coarticulation in Motor Skill Acquisition*, and everything its alternatives shar
 with it: robot, tasks, movement, corrective process, execution and scoring.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from coartic.internal.lazy import find, names_of
+from coartic.internal.lazy import lazy
 
 if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
@@ -100,12 +100,4 @@ _HOMES = {
 HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
 """Module of each name of the API."""
 
-
-def __getattr__(name: str) -> Any:
-    """Import a name of the API on first use."""
-    return find(__name__, name, HOME)
-
-
-def __dir__() -> list[str]:
-    """The names of the API."""
-    return names_of(__name__, HOME)
+__getattr__, __dir__ = lazy(__name__, HOME)
