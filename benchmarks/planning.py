@@ -25,9 +25,10 @@ from coartic.benchmarks.suites import (
 )
 from coartic.internal.limits import (
     MOST_CELLS,
+    MOST_RUNS,
     MOST_SEED,
     MOST_TRIALS,
-    number_or_range,
+    check_limits,
 )
 from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain_inline, sentence_error
@@ -46,15 +47,18 @@ def _task_or_name(value: Any) -> Task | str:
 
 def _runs_asked(value: Any) -> int | range | None:
     """Return a number of runs, a range of runs, or None."""
+    is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
+    first, last = (value.start, value.stop) if is_range else (0, value)
     try:
-        example = "range(50, 100), or 50..99 in a command"
-        return None if value is None else number_or_range("runs", value, example)
+        if value is not None:
+            check_limits("runs", last, 1, MOST_RUNS)
+            check_limits("its first run", first, 0, MOST_RUNS)
     except ValueError as error:
-        raise sentence_error(str(error)) from None
+        example = "range(50, 100), or 50..99 in a command"
+        raise sentence_error(f"{error}, or a range, such as {example}") from None
+    return value if is_range or value is None else int(value)
 
 
-JobOf = Callable[..., Job]
-"""Function :func:`_job_of` for a suite and a request."""
 _Tasks = tuple[Annotated[Any, PlainValidator(_task_or_name)], ...]
 _Files = tuple[Path, ...]
 _plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.number) else value)
@@ -243,9 +247,14 @@ def _asked_tasks(
 
 
 def _suite_jobs(
-    suite: Suite, registered: Registry, own: Collection[str], task_named: TaskNamed, job: JobOf
+    suite: Suite,
+    registered: Registry,
+    own: Collection[str],
+    task_named: TaskNamed,
+    job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs of a suite; ``own`` names the tasks that the request brings.
+    """Yield the jobs of a suite, each from ``job``, which is :func:`_job_of` for the suite and the
+    request; ``own`` names the tasks that the request brings.
 
     Raises CoarticError for a method that is unknown or does not apply to a task, and for parameters
     that a method does not take.
@@ -268,7 +277,10 @@ def _suite_jobs(
 
 
 def _extra_jobs(
-    jobs: Sequence[Job], own: Mapping[str, Task], methods: Sequence[MethodInfo], job: JobOf
+    jobs: Sequence[Job],
+    own: Mapping[str, Task],
+    methods: Sequence[MethodInfo],
+    job: Callable[..., Job],
 ) -> Iterator[Job]:
     """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
     does not have on the tasks of the suite, and all methods on the tasks that the request

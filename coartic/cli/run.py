@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
     from coartic.benchmarks.suites import Suite
     from coartic.runs.method_info import MethodInfo
-    from coartic.runs.plan import Job
     from coartic.tasks.families import Family
     from coartic.tasks.task import Task
 
@@ -45,7 +44,9 @@ def run(
         Any,
         given.asked("runs", "Runs of each method on each task, or a part of them, such as 50..99."),
     ] = None,
-    trials: Annotated[Any, given.asked("trials", "Trials of each run.")] = None,
+    trials: Annotated[
+        Any, given.asked("trials", "Trials of each run, for methods that have this parameter.")
+    ] = None,
     jobs: Annotated[
         int | None, given.within("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
     ] = None,
@@ -64,7 +65,7 @@ def run(
         Any, given.asked("time_limit_s", "Most CPU time of a run.", "SECONDS")
     ] = None,
     trial_budget: Annotated[
-        Any, given.asked("trial_budget", "Most trials that a run may make.")
+        Any, given.asked("trial_budget", "Most trials of a run, whatever its method.")
     ] = None,
     scheduler: Annotated[
         str | None, given.option("ADDRESS", "Dask scheduler to use instead of this machine.")
@@ -79,8 +80,13 @@ def run(
     If it is interrupted, repeat the command: it resumes where it stopped, and repeats runs that
     crashed.
     """
+    from coartic.analysis.study import load
+    from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.include import include_folders
     from coartic.benchmarks.planning import plan, request_for
+    from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.runner import perform
     from coartic.benchmarks.suites import load_suite, suites
 
     if suite is None:
@@ -99,32 +105,7 @@ def run(
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    jobs_asked, is_part = plan(chosen, request, registered), isinstance(runs, range)
-    _perform_and_say(jobs_asked, out, include or [], jobs, scheduler, is_part=is_part)
-
-
-def _perform_and_say(
-    plan: Sequence[Job],
-    out: Path,
-    include: Sequence[str],
-    jobs: int | None,
-    scheduler: str | None,
-    *,
-    is_part: bool = False,
-) -> None:
-    """Perform the missing runs of a plan and print the findings; exit with code 1 if a run crashed.
-
-    ``include`` names folders whose runs are copied into folder ``out`` first. Runs are performed by
-    a Dask scheduler, or by this machine with ``jobs`` processes. Of a part of the runs there are no
-    findings.
-    """
-    from coartic.analysis.study import load
-    from coartic.benchmarks.cluster import Dask
-    from coartic.benchmarks.include import include_folders
-    from coartic.benchmarks.pool import Local
-    from coartic.benchmarks.runner import perform
-
-    display = Display()
+    asked, display = plan(chosen, request, registered), Display()
 
     def saved() -> str:
         done = counted(display.done, "finished run")
@@ -134,17 +115,16 @@ def _perform_and_say(
 
     with interruptible(saved), display:
         if include:
-            plan = include_folders(plan, include, out)
+            asked = include_folders(asked, include, out)
             display.line(f"Included the runs of {' and '.join(include)}.")
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
-        progress = perform(plan, out, executor=executor, watch=display.update)
+        progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
-    if is_part:
+    if isinstance(runs, range):
         part = f"{out} has a part of the runs: --include {out}, with all other parts, joins them"
         say_pairs([("Next", part)])
-        sys.exit(1 if progress.crashed else 0)
-    study = load(out)
-    say_ranking(study, ("Next", f"coartic report {out}"))
+    else:
+        say_ranking(load(out), ("Next", f"coartic report {out}"))
     if progress.crashed:
         sys.exit(1)
 

@@ -71,7 +71,8 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def say_part(name: str) -> None:
-    """Show on a terminal what is being made, in one line that changes; an empty name ends it."""
+    """Show on a terminal what is being made, in one line that changes; an empty name ends the
+    line."""
     if sys.stderr.isatty():
         width = shutil.get_terminal_size().columns - 1
         print("\r", end="", file=sys.stderr)
@@ -128,9 +129,7 @@ class Display:
             last = "starting processes"
             if cell is not None:
                 last = f"{cell.task.label}, {title_of(cell.method.name)}"
-            width = shutil.get_terminal_size().columns - 1
-            print("\r", end="", file=sys.stderr)
-            say(f"{plain(f'{text}  {last}', width):{width}}", stream=sys.stderr, end="")
+            say_part(f"{text}  {last}")
             self._end = "\n"
         elif there == total or (self.done and time.monotonic() - self._last >= self.EVERY_S):
             self._last = time.monotonic()

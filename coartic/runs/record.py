@@ -26,8 +26,8 @@ from coartic.robot import Array
 from coartic.runs.plan import Cell, Job
 from coartic.tasks.task import Task
 
-STATUSES = ("ok", "infeasible", "solver-failed", "timeout", "crashed")
-"""Statuses of a run."""
+Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
+"""Status of a run."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """Prefixes of columns by the part of a run that they score: the solution, the first trial of a
 learner, and one noiseless greedy trial after learning."""
@@ -72,7 +72,7 @@ class Times:
 class Outcome:
     """The result of a run as its method states it, in plain data, before it is scored."""
 
-    status: Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
+    status: Status
     reason: str = ""
     """The reason why the run is not ok; empty if the run is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)

@@ -22,7 +22,7 @@ from contextlib import closing, contextmanager
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -39,8 +39,8 @@ from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
     PARTS,
-    STATUSES,
     Run,
+    Status,
     movement_data,
     movement_from,
     reward_bytes,
@@ -64,6 +64,8 @@ _DTYPES: dict[str, Any] = {
 }
 """Types of the columns of views in data frames; all have room for missing values."""
 _CELL = TypeAdapter(Cell)
+_OF_METHOD = ("title", "citation", "stochastic", "defaults", "origin", "code")
+"""Columns of table ``cells`` that are fields of the method."""
 
 
 def _rule(name: str, kind: str) -> str:
@@ -97,7 +99,7 @@ _SCHEMA = (
     f"""CREATE TABLE results (id INTEGER PRIMARY KEY, cell INTEGER NOT NULL REFERENCES cells,
     suite_seed INTEGER NOT NULL, environment INTEGER NOT NULL REFERENCES environments,
     details TEXT NOT NULL, {_STORED}, UNIQUE (cell, suite_seed, run),
-    CHECK (status IN {STATUSES}),
+    CHECK (status IN {get_args(Status)}),
     CHECK ((status = 'ok') = (reward IS NOT NULL) AND (status = 'ok') = (hands IS NOT NULL)))""",
     """CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL,
     "order" INTEGER NOT NULL, goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL,
@@ -228,9 +230,7 @@ class Store:
     def present(self) -> list[tuple[int, int, str, float | None]]:
         """Return the runs of the plan that the folder has: for each run the position of its job in
         the plan, its number, its status and its time limit in s."""
-        query = "SELECT position, run, status, time_limit_s FROM asked"
-        with explain_errors(self.folder):
-            return list(map(tuple, self._db.execute(query)))
+        return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def stale(self) -> int:
         """Return the number of runs of the plan that other code made."""
@@ -238,21 +238,18 @@ class Store:
             JOIN cells AS old ON old.digest = now.digest AND old.code != now.code
             JOIN results ON results.cell = old.id AND suite_seed = suite.seed AND run < plan.runs
             WHERE old.id NOT IN (SELECT cell FROM plan)"""
-        with explain_errors(self.folder):
-            return int(self._one(query)[0])
+        return int(self._one(query)[0])
 
     def others(self) -> Counter[int]:
         """Return the number of runs that the plan does not ask for, by the seed of their suite."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
-        with explain_errors(self.folder):
-            return Counter(dict(self._db.execute(query)))
+        return Counter(dict(self._rows(query)))
 
     def ids(self, prefix: str = "") -> list[str]:
         """Return the ids of all runs that begin with ``prefix``, of earlier plans as well."""
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
-        with explain_errors(self.folder):
-            return [run_id for (run_id,) in self._db.execute(query, (len(prefix), prefix))]
+        return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
     # Writing and reading runs.
 
@@ -295,13 +292,11 @@ class Store:
 
     def runs(self) -> pd.DataFrame:
         """Return view ``runs`` as a data frame, with nullable types."""
-        with explain_errors(self.folder):
-            return self._frame("runs")
+        return self._frame("runs")
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions`` as a data frame, with nullable types."""
-        with explain_errors(self.folder):
-            return self._frame("solutions")
+        return self._frame("solutions")
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
         """Return the movements of a part (:data:`PARTS`) of runs that are ok, by run id.
@@ -356,9 +351,11 @@ class Store:
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
         """Return a cell from its row. Raises ValueError or TaskError if coartic cannot have written
         the row."""
-        method = {name: row[name] for name in ("title", "citation", "stochastic", "origin", "code")}
-        method |= {"name": row["method"], "defaults": json.loads(row["defaults"])}
-        method |= {"information": tuple(filter(None, row["information"].split(", ")))}
+        method = {name: row[name] for name in _OF_METHOD} | {
+            "name": row["method"],
+            "defaults": json.loads(row["defaults"]),
+            "information": tuple(filter(None, row["information"].split(", "))),
+        }
         content = {
             "task": parse_task(json.loads(row["definition"]), str(self.folder / RUNS_FILE)),
             "method": method,
@@ -399,18 +396,24 @@ class Store:
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
         return int(self._db.execute(text, [*map(_as_text, row.values())]).lastrowid or 0)
 
+    def _rows(self, query: str, *values: object) -> list[Any]:
+        """Return the rows of a query."""
+        with explain_errors(self.folder):
+            return self._db.execute(query, values).fetchall()
+
     def _one(self, query: str, *values: object) -> Any:
         """Return the first row of a query, or None."""
-        return self._db.execute(query, values).fetchone()
+        return next(iter(self._rows(query, *values)), None)
 
     def _frame(self, view: str) -> pd.DataFrame:
         """Return a view as a data frame, with nullable types."""
         import pandas as pd
 
-        rows = self._db.execute(f"SELECT * FROM {view}")
-        names = [column[0] for column in rows.description]
-        frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
-        with np.errstate(invalid="ignore"):  # astype refuses numbers that are too large
+        # astype refuses numbers that are too large
+        with explain_errors(self.folder), np.errstate(invalid="ignore"):
+            rows = self._db.execute(f"SELECT * FROM {view}")
+            names = [column[0] for column in rows.description]
+            frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
             return frame.astype({name: _DTYPES[name] for name in names})
 
     def _wait_for(self, statement: str) -> None:
@@ -437,19 +440,13 @@ def _as_text(value: Any) -> Any:
 
 def _cell_row(cell: Cell) -> dict[str, Any]:
     """Return the row of a cell in table ``cells``, without its id."""
-    method = cell.method
-    return {
+    method = vars(cell.method)
+    return {name: method[name] for name in _OF_METHOD} | {
         "digest": cell.digest,
-        "code": method.code,
         "task": cell.task.name,
         "definition": cell.definition,
-        "method": method.name,
-        "title": method.title,
-        "citation": method.citation,
-        "information": ", ".join(method.information),
-        "stochastic": method.stochastic,
-        "defaults": method.defaults,
-        "origin": method.origin,
+        "method": cell.method.name,
+        "information": ", ".join(cell.method.information),
         "parameters": cell.parameters,
         "setting": cell.setting,
         "model": PAPER.for_radius(cell.task.radius)._asdict(),
