@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from coartic import CoarticError, Task
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted
-from coartic.internal.toml_files import refuse_foreign
+from coartic.internal.text import counted, foreign_file
 from coartic.motion.movement import LARGEST_ENTRY
 
 LARGEST_ANGLE = 20.0
@@ -56,7 +55,8 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     CoarticError
         The file is no such table. A sentence says where and what is needed.
     """
-    refuse_foreign(path, "recorded hits are a CSV file, see docs/howto/people.md")
+    if words := foreign_file(str(path), "recorded hits are a CSV file, see docs/howto/people.md"):
+        raise CoarticError(words)
     headings, rows, lines = _read_lines(path)
     frame = pd.DataFrame(rows, columns=headings, dtype=object)
     if "ticks" not in frame and "duration" in frame:

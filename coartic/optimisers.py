@@ -299,7 +299,7 @@ class Objective:
             raise ValueError(f"x has shape {point.shape}; needed is ({self.dim},)")
         self._check(point[None])
         chosen = self.hands if hands is None else hands
-        codes, targets = self._trials_of(point[None], self._session.hand_codes(chosen, 1))
+        codes, targets = self._session.hand_codes(chosen, 1), self._targets_of(point[None])
         made = make_trials(compiled_task(task, self._session.model), codes, targets[:, :, None])
         given = ~np.isnan(targets[0]).all(axis=1, keepdims=True)
         targets = self._targets_in(made, 0)
@@ -382,23 +382,21 @@ class Objective:
         if array.ndim != 2 or array.shape[1] != self.dim:
             raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
         self._check(array)
-        codes = None if hands is None else self._session.hand_codes(hands, len(array))
+        codes = self._session.hand_codes(self.hands if hands is None else hands, len(array))
         costs = np.empty(len(array))
         with self._session.lock:
             left = self._trials_left(len(array))
             for first in range(0, left, CHUNK):
                 part = slice(first, min(first + CHUNK, left))
-                of_part = None if codes is None else codes[part]
-                self._evaluate(array[part], of_part, costs[part])
+                self._evaluate(array[part], codes[part], costs[part])
         if left < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
 
-    def _evaluate(self, points: Array, codes: Hands | None, costs: Array) -> None:
+    def _evaluate(self, points: Array, codes: Hands, costs: Array) -> None:
         """Make a trial for each point, write its cost into ``costs``, count it, and note each new
         best."""
-        codes, targets = self._trials_of(points, codes)
-        made = self._session._make_trials(codes, targets)
+        made = self._session._make_trials(codes, self._targets_of(points))
         np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self.best_cost:
             before = np.minimum.accumulate(np.append(self.best_cost, costs))[:-1]
@@ -411,7 +409,6 @@ class Objective:
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
         """Note the best trial so far, whose cost is below that of each one before it."""
-        assert cost < self.best_cost
         self.best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
         self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
@@ -421,19 +418,17 @@ class Objective:
         """Targets of a trial as moved to, ``(G, dof)``."""
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
-    def _trials_of(self, points: Array, codes: Hands | None) -> tuple[Hands, Configs]:
-        """Hands ``(N, G)``, and targets ``(N, G, dof)``, NaN for joints that have none."""
+    def _targets_of(self, points: Array) -> Configs:
+        """Return targets ``(N, G, dof)`` of points, NaN for joints without an entry."""
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
-        codes = np.repeat(self._codes, len(points), axis=0) if codes is None else codes
-        return codes, targets
+        return targets
 
     def _check(self, points: Array) -> None:
         """Raises ValueError for goals that are NaN in part, and for infinite entries."""
         if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
             return
-        _, targets = self._trials_of(points, self._codes)
-        missing = (np.isnan(targets) & self.joints).sum(axis=2)
+        missing = (np.isnan(self._targets_of(points)) & self.joints).sum(axis=2)
         in_part = (missing > 0) & (missing < self.joints.sum(axis=1))
         if in_part.any():
             point, goal = np.argwhere(in_part)[0]

@@ -131,13 +131,20 @@ FOREIGN = (
 """Endings of files of robots and recordings that other programs write."""
 
 
+def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
+    """Return a sentence on a file of another program, empty for any other file; ``wanted`` says
+    what is read and where it is explained."""
+    if not path.lower().endswith(FOREIGN):
+        return ""
+    ending = path.lower().rpartition(".")[2]
+    return f"{plain(path, LONGEST_LINE)}: coartic reads no .{ending} file; {wanted}"
+
+
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """A sentence on a name that is not among some names: the nearest of them, or all; or on the
     file of another program."""
-    if isinstance(name, str) and name.lower().endswith(FOREIGN):
-        ending = name.lower().rpartition(".")[2]
-        wanted = "a task is a TOML file, see docs/howto/task.md"
-        return f"{plain(name, LONGEST_LINE)}: coartic reads no .{ending} file; {wanted}."
+    if isinstance(name, str) and (words := foreign_file(name)):
+        return f"{words}."
     several = list(names)
     shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
     more = f" and {counted(len(several) - shown, 'other')}" if len(several) > shown else ""

@@ -11,16 +11,7 @@ from typing import Any
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_BYTES
-from coartic.internal.text import FOREIGN, LONGEST_LINE, plain
-
-
-def refuse_foreign(
-    path: str | Path, wanted: str, *, error: type[CoarticError] = CoarticError
-) -> None:
-    """Raises ``error`` for a file of another program; ``wanted`` says what is read and where it is
-    explained."""
-    if (ending := Path(path).suffix.lower()) in FOREIGN:
-        raise error(f"{plain(str(path), LONGEST_LINE)}: coartic reads no {ending} file; {wanted}")
+from coartic.internal.text import LONGEST_LINE, plain
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from coartic.errors import TaskError
 from coartic.internal.limits import brief_value
-from coartic.internal.text import unknown
-from coartic.internal.toml_files import refuse_foreign
+from coartic.internal.text import foreign_file, unknown
 from coartic.tasks.families import instance
 from coartic.tasks.task import Task, read_task, shipped_tasks
 
@@ -53,8 +52,8 @@ def load_task(name_or_path: str | Path) -> Task:
             f"task is {brief_value(name_or_path)}; it must be the name of a task, such as "
             "'ascending', or the path of a task file"
         )
-    wanted = "a task is a TOML file, see docs/howto/task.md"
-    refuse_foreign(name_or_path, wanted, error=TaskError)
+    if words := foreign_file(str(name_or_path)):
+        raise TaskError(words)
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         task = read_task(Path(name_or_path))
         if "/" in task.name and task != instance(task.name):

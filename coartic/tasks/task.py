@@ -27,7 +27,7 @@ from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import Line, counted, did_you_mean, short_repr
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain_file, sentence_error
-from coartic.model import PAPER, PAPER_RADIUS, MotionModel, check_model
+from coartic.model import PAPER, PAPER_RADIUS
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
@@ -386,18 +386,11 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
     return max(distance - far, inside) - tolerance
 
 
-def check_task(task: Task, model: MotionModel = PAPER) -> Task:
-    """The task itself; TaskError where a model's corrective process cannot do it.
-
-    Goals that are not larger than its accuracy, and goals farther out of reach than that.
-    """
-    try:
-        check_model(model, radius=task.radius)
-    except ValueError as error:
-        raise TaskError(f"task {task.name!r}: {error}") from None
-    _, tolerance = model.tolerances(task.radius)
-    problem = _out_of_reach(task, tolerance)
-    if problem is not None:
+def check_task(task: Task) -> Task:
+    """Return the task itself. Raises TaskError for goals that the paper's corrective process cannot
+    reach."""
+    _, tolerance = PAPER.tolerances(task.radius)
+    if (problem := _out_of_reach(task, tolerance)) is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
     return task
 
