@@ -131,8 +131,7 @@ class MoveRow(NamedTuple):
     hand: str
     kind: str  # learned, planned, corrective, path
     ticks: int
-    target: Floats
-    waypoints: Floats  # of a path, a row each
+    corners: Floats  # a row each: the target, or the waypoints of a path
 
 
 def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
@@ -164,9 +163,9 @@ def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Fl
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     """Make a movement from q: where it stops, after how many ticks, and whether that is a hit.
     One of more ticks than are stored ends a tick after these."""
-    _, goal, hand, kind, most, target, waypoints = movement
+    _, goal, hand, kind, most, corners = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
-    points = path(q, waypoints, model, most) if on_path else line(q, target, model, most)
+    points = path(q, corners, model, most) if on_path else line(q, corners[-1], model, most)
     x, y = hand_at(points, arm, on_path)
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
     hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
@@ -191,7 +190,7 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
             end, ticks, hits = make(task, q, movement)
             if hit or (is_corrective and hits and ticks == 1):
                 # Nothing is to be done. A movement of no ticks to where it is names the hand.
-                is_none = len(to_goal) == 1 and not movement.ticks and (movement.target == q).all()
+                is_none = len(to_goal) == 1 and not movement.ticks and (movement.corners == q).all()
                 need(is_none, f"{which} is made after goal {goal} is hit")
                 hit = True
                 continue
@@ -212,14 +211,14 @@ def _check_rules(task: Any, movements: list[MoveRow]) -> None:
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
     need(goals == sorted(goals), f"its goals are out of order: {goals}")
     need([goal for goal, _ in hands] == [*range(1, len(task.goals) + 1)], "a goal has not one hand")
-    for order, _, hand, kind, _, target, _ in movements:
+    for order, _, hand, kind, _, corners in movements:
         which = f"movement {order}"
-        need(target.shape == task.q0.shape, f"{which} has not a number for each joint")
+        need(corners.shape[1:] == task.q0.shape, f"{which} has not a number for each joint")
         need(hand in task.hands, f"{which} uses the {hand} hand, which the task does not have")
         need(kind in ("learned", "planned", "corrective", "path"), f"{which} is of no known kind")
-    corners = np.array([corner for each in movements for corner in (*each.waypoints, each.target)])
-    need((np.abs(corners) <= 1e5).all(), "a movement has an entry that is no number up to 1e5")
-    need((corners == task.q0)[:, task.locked].all(), "a movement moves a locked base")
+    every = np.concatenate([each.corners for each in movements])
+    need((np.abs(every) <= 1e5).all(), "a movement has an entry that is no number up to 1e5")
+    need((every == task.q0)[:, task.locked].all(), "a movement moves a locked base")
 
 
 class Report(NamedTuple):
@@ -395,10 +394,9 @@ def _move_row(order: int, stored: list[Any]) -> MoveRow:
     need(is_count, f"movement {order} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
     need(len(text) <= LONGEST_PATH, f"movement {order} is too long")
     points = np.array(json.loads(text), dtype=np.float64)
-    is_path = kind == "path"
-    need(points.ndim == 1 + is_path and len(points), f"movement {order}: {kind} has no such points")
-    target, waypoints = (points[-1], points) if is_path else (points, points[:0])
-    return MoveRow(order, goal, hand, kind, ticks, target, waypoints)
+    is_place = points.ndim == 1 + (kind == "path") and len(points)
+    need(is_place, f"movement {order}: {kind} has no such points")
+    return MoveRow(order, goal, hand, kind, ticks, np.atleast_2d(points))
 
 
 def main() -> int:

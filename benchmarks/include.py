@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from coartic.benchmarks.provenance import command, current_environment, now
+from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.benchmarks.scoring import score
 from coartic.errors import CoarticError
@@ -67,7 +67,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
         target = stack.enter_context(writing(out))
         begun = SHIPPED in sources and target.begin_as(sources[SHIPPED])
         with target.transaction():
-            target.replace_plan(joined, current_environment(), command(), now())
+            target.replace_plan(joined, made_with())
             origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
                 if not (begun and name == SHIPPED):  # it is a copy of them

@@ -61,11 +61,12 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def command() -> list[str]:
-    """Return the command line of this process, or ``a notebook``."""
-    if "ipykernel" in sys.argv[0]:
-        return ["a notebook"]
-    return [plain(word) for word in (Path(sys.argv[0]).name, *sys.argv[1:])]
+def made_with() -> dict[str, Any]:
+    """Return the environment of this process with its command line (``a notebook`` in a notebook)
+    and the date."""
+    words = [Path(sys.argv[0]).name, *sys.argv[1:]]
+    command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
+    return current_environment() | {"command": command, "date": now()}
 
 
 def process_peak_mb() -> float | None:

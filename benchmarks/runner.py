@@ -20,7 +20,7 @@ from typing import Any
 from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
-from coartic.benchmarks.provenance import command, current_environment, now
+from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import doubts_of
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
@@ -205,7 +205,7 @@ def perform(
         known = " or ".join(_EXECUTORS.values())
         raise CoarticError(f"executor is {brief_value(executor)}; it must be {known}")
     with writing(folder) as store:
-        store.replace_plan(plan, current_environment(), command(), now())
+        store.replace_plan(plan, made_with())
         progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
         progress.others[plan[0].seed] -= progress.stale
         missing = _missing_jobs(plan, store, progress)

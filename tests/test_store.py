@@ -21,7 +21,7 @@ import pytest
 from coartic import CoarticError, Movement
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
-from coartic.benchmarks.provenance import command, current_environment, now
+from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.runner import perform
 from coartic.benchmarks.worker import fail
 from coartic.runs import store as store_module
@@ -127,7 +127,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
         raise KeyboardInterrupt
 
     with writing(tmp_path) as store:
-        store.replace_plan(planned(CELLS, trials=40), current_environment(), command(), now())
+        store.replace_plan(planned(CELLS, trials=40), made_with())
         with pytest.raises(KeyboardInterrupt):
             store.write(some())
         assert len(store.ids()) == 0

@@ -182,8 +182,8 @@ def by_checker(task, model, cases):
             continue
         stored = [
             checker.MoveRow(
-                n, m.goal, m.hand, m.kind, m.ticks, m.target,
-                [] if m.waypoints is None else list(m.waypoints),
+                n, m.goal, m.hand, m.kind, m.ticks,
+                np.atleast_2d(m.target if m.waypoints is None else m.waypoints),
             )
             for n, m in enumerate(execution.movements)
         ]  # fmt: skip

@@ -82,7 +82,7 @@ def true_folder(tmp_path_factory):
         for task, each, runs in asked
     ]
     with writing(folder) as store:
-        store.replace_plan(plan, {}, [], "")
+        store.replace_plan(plan, {"command": [], "date": ""})
         for job, (_, _, runs) in zip(plan, asked, strict=True):
             store.write(run_of(job, number, made, **more) for number, made, more in runs)
     return folder
@@ -232,11 +232,9 @@ def test_a_movement_of_endless_steps_is_made_as_far_as_its_ticks():
         tiny_task().model_dump_json(), json.dumps(PAPER.for_radius()._asdict())
     )
     task.model.step = 1e-12
-    far = np.full(10, 1e4)
-    for kind, waypoints in (("learned", []), ("path", [far])):
-        _, ticks, hit = checker.make(
-            task, task.q0, checker.MoveRow(0, 1, "right", kind, 7, far, waypoints)
-        )
+    far = np.full((1, 10), 1e4)
+    for kind in ("learned", "path"):
+        _, ticks, hit = checker.make(task, task.q0, checker.MoveRow(0, 1, "right", kind, 7, far))
         assert (ticks, hit) == (8, False)
 
 
@@ -290,7 +288,8 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
     else:
         stops = kind == "learned"
         due = move(robot, q, target, hand, goal, judge.radius, stop_on_arrival=stops, model=model)
-    movement = checker.MoveRow(0, 1, hand, kind, 10**6, target, [middle, target])
+    corners = np.array([middle, target][not on_path :])
+    movement = checker.MoveRow(0, 1, hand, kind, 10**6, corners)
     stopped, *rest = checker.make(judge, q, movement)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 

@@ -145,27 +145,25 @@ class Store:
             other._db.backup(self._db)
         return empty
 
-    def replace_plan(
-        self, plan: Sequence[Job], environment: dict[str, Any], command: list[str], date: str
-    ) -> None:
+    def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
         """Put a plan in place of the earlier plan. Runs that only the earlier plan asked for stay
-        in the file, and no view shows them.
+        in the file, and no view shows them. ``made_with`` is as of :meth:`made_with`.
 
         Raises CoarticError if the folder holds another suite.
         """
-        first = plan[0]
+        first, environment = plan[0], dict(made_with)
+        suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
+        suite |= {name: environment.pop(name) for name in ("command", "date")}
         with self.transaction():
-            for row in self._db.execute("SELECT name FROM suite"):
-                if row["name"] != first.suite:
-                    raise CoarticError(
-                        f"{self.folder} holds results of suite {row['name']!r}: name another "
-                        f"folder for suite {first.suite!r}"
-                    )
+            there = self._one("SELECT name FROM suite")
+            if there is not None and there["name"] != first.suite:
+                raise CoarticError(
+                    f"{self.folder} holds results of suite {there['name']!r}: name another folder "
+                    f"for suite {first.suite!r}"
+                )
             self._db.execute("DELETE FROM suite")
             self._db.execute("DELETE FROM plan")
-            suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
-            ran = {"command": command, "date": date, "environment": self._environment(environment)}
-            self._insert("suite", suite | ran)
+            self._insert("suite", suite | {"environment": self._environment(environment)})
             for position, job in enumerate(plan):
                 row = _cell_row(job.cell)
                 cell = self._id_of("cells", row, "digest", "code")

@@ -51,10 +51,9 @@ def changed_runs(folder: Path) -> Iterator[str]:
 def pack(folder: Path, out: Path) -> None:
     """Write the downsampled results of a folder, and the hashes of all results, into ``out``."""
     with open_store(folder) as source, tempfile.TemporaryDirectory() as made:
-        plan, made_with = source.plan(), source.made_with()
-        ran, date = made_with.pop("command"), made_with.pop("date")
+        plan = source.plan()
         with writing(Path(made)) as target:
-            target.replace_plan(plan, made_with, ran, date)
+            target.replace_plan(plan, source.made_with())
             target.write(source.run(run_id).downsample() for run_id in source.runs().run_id)
         content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
     (out / f"{plan[0].suite}{shipped.PACKED}").write_bytes(content)

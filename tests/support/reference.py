@@ -41,9 +41,8 @@ def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PA
         radius=radius,
     )
     kind = "path" if len(waypoints) else "learned" if stop_on_arrival else "corrective"
-    movement = verify.MoveRow(
-        0, 1, hand, kind, verify.MOST_TICKS, np.array(target), list(waypoints)
-    )
+    corners = np.atleast_2d(waypoints if len(waypoints) else target)
+    movement = verify.MoveRow(0, 1, hand, kind, verify.MOST_TICKS, corners)
     end, ticks, hit = verify.make(rules, np.array(q, dtype=np.float64), movement)
     return MoveResult(end, ticks, hit, ticks + 1)
 
