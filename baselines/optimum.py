@@ -14,13 +14,12 @@ two-armed-1: one tick more, and three fewer with the other arm still.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from coartic import Task, TaskError, parse_task
-from coartic.baselines.posture_graph import cheapest_chains
+from coartic.baselines.posture_graph import Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.internal.arguments import checked_arguments
@@ -37,11 +36,11 @@ class OptimumParameters(Parameters):
     """``still``: the arm that is not chosen does not move."""
     base: Literal["task", "y", "xy"] = "task"
     """Base coordinates that are locked: those of the task, or these in addition."""
-    nodes: Annotated[int, Field(ge=10, le=1000)] = 200
+    nodes: Nodes = 200
     """Postures per goal and hand."""
-    graphs: Annotated[int, Field(ge=1)] = 3
+    graphs: Count = 3
     """Independent graphs, or more, until there are as many ``chains``."""
-    chains: Annotated[int, Field(ge=1)] = 100
+    chains: Count = 100
     """Starts, over all graphs and hand sequences, each with the other arm spread out, too. With
     three, the best path known was missed on 9 of 40 random tasks for one arm."""
 

@@ -12,10 +12,11 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from coartic.method import MethodError, Session
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
@@ -26,6 +27,10 @@ Chain = tuple[HandSequence, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
 Layers = dict[tuple[int, Hand], Array]
 """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
+Nodes = Annotated[int, Field(ge=10, le=1000)]
+"""Parameter: nodes of a layer."""
+Count = Annotated[int, Field(ge=1)]
+"""Parameter: a number of graphs, chains or starts."""
 BEAM_WIDTH = 64
 """Hand sequences that are planned for each graph: all where there are no more, with two hands up to
 six goals; else those that a beam of this width over the goals ends with."""

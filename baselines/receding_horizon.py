@@ -26,7 +26,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement
-from coartic.baselines.posture_graph import cheapest_chains
+from coartic.baselines.posture_graph import Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import (
     REWARD_INFORMATION,
     ShortestPlans,
@@ -44,13 +44,13 @@ class RecedingHorizonParameters(Parameters):
 
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
     """Goals in view beyond the one to be hit; all where there are no more."""
-    nodes: Annotated[int, Field(ge=10, le=1000)] = 200
+    nodes: Nodes = 200
     """Postures per goal of a posture graph, shared by the hands: with two, half as many each."""
-    graphs: Annotated[int, Field(ge=1)] = 3
+    graphs: Count = 3
     """Independent graphs for each window, or more, until there are as many ``chains``."""
-    chains: Annotated[int, Field(ge=1)] = 24
+    chains: Count = 24
     """Chains of each window, over all graphs and hand sequences."""
-    starts: Annotated[int, Field(ge=1)] = 24
+    starts: Count = 24
     """Starts of each window that are polished, the shortest: all chains, and all of them with the
     other arm spread out, are ranked by length."""
 

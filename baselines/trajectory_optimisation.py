@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import BEAM_WIDTH, HandSequence, cheapest_chains
+from coartic.baselines.posture_graph import BEAM_WIDTH, Count, HandSequence, Nodes, cheapest_chains
 from coartic.baselines.trajectory_problem import (
     MODEL_BASED,
     Cost,
@@ -39,15 +39,15 @@ SAMPLES = 200  # points of a smooth path between goals; four times as many chang
 class TrajectoryParameters(Parameters):
     """The hand sequences that are planned, and the starts of each."""
 
-    most_sequences: Annotated[int, Field(ge=1)] = BEAM_WIDTH
+    most_sequences: Count = BEAM_WIDTH
     """Hand sequences that are planned for: all where there are no more, with two hands up to six
     goals; else those that a beam of this width over the goals ends with in some graph."""
-    nodes: Annotated[int, Field(ge=10, le=1000)] = 150
+    nodes: Nodes = 150
     """Postures per goal and hand in a graph."""
-    graphs: Annotated[int, Field(ge=1)] = 3
+    graphs: Count = 3
     """Independent graphs, one or two starts for a hand sequence from each. With one, the best
     path was missed on 3 of 23 small random tasks."""
-    chains: Annotated[int, Field(ge=1)] = 30
+    chains: Count = 30
     """Chains of all hand sequences, from as many further graphs as that takes."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
@@ -64,9 +64,9 @@ class SmoothParameters(TrajectoryParameters):
 class HandJerkParameters(SmoothParameters):
     """Fewer starts, as a plan by jerk of the hand takes some ten times as long."""
 
-    graphs: Annotated[int, Field(ge=1)] = 1
+    graphs: Count = 1
     """Independent graphs, one or two starts for a hand sequence from each."""
-    chains: Annotated[int, Field(ge=1)] = 1
+    chains: Count = 1
     """Chains of all hand sequences, from as many further graphs as that takes."""
     noisy_starts: Annotated[int, Field(ge=0)] = 0
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""

@@ -40,18 +40,8 @@ class MotionModel(NamedTuple):
 
     @checked_arguments
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
-        """Return the model with tolerances that are numbers.
-
-        Parameters
-        ----------
-        radius : float
-            Radius of the goals, length unit; the default is the paper's.
-
-        Returns
-        -------
-        MotionModel
-            The constants; a tolerance of None is a tenth of the radius.
-        """
+        """Return the model with tolerances that are numbers, for goals of a radius, length unit: a
+        tolerance of None becomes a tenth of it."""
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
 

@@ -176,24 +176,13 @@ class Robot:
             raise ValueError(f"unknown hand {hand!r}: a hand is 'left' or 'right'") from None
 
     def joints(self, hand: Hand) -> slice:
-        """Return the part of a configuration that has the joint angles of one arm.
-
-        Returns
-        -------
-        slice
-            ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad.
-        """
+        """Return the part of a configuration that has the joint angles of one arm:
+        ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad."""
         arm = self.arm(hand)
         return slice(arm.first, arm.first + len(arm.links))
 
     def reach(self, hand: Hand) -> tuple[float, float]:
-        """Return the least and the largest distance of a hand from its shoulder.
-
-        Returns
-        -------
-        tuple of float
-            The least and the greatest distance, length unit.
-        """
+        """Return the least and the largest distance of a hand from its shoulder, length unit."""
         links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 
@@ -261,14 +250,7 @@ class Robot:
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """:meth:`forward_kinematics` and :meth:`jacobian` of the same ``q``, in one computation.
-
-        Returns
-        -------
-        tuple of ndarray
-            Hand positions, shape ``(..., 2)``, length unit, and their Jacobians, shape
-            ``(..., 2, dof)``, length unit per length unit (base) and per rad (joints).
-        """
+        """Compute :meth:`forward_kinematics` and :meth:`jacobian` of the same ``q`` together."""
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1

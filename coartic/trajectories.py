@@ -69,57 +69,27 @@ class Trajectory:
         return -self.execution.ticks
 
     def hand_path(self, hand: Hand) -> Array:
-        """The path of a hand.
-
-        Parameters
-        ----------
-        hand : {"left", "right"}
-            Either hand, also one that the task does not let hit goals.
-
-        Returns
-        -------
-        ndarray, shape (rows, 2)
-            Its position in each row of ``configurations``, length unit.
-
-        Raises
-        ------
-        ValueError
-            The hand is neither ``"left"`` nor ``"right"``.
-        """
+        """Return the position of a hand in each row of ``configurations``, shape ``(rows, 2)``,
+        length unit; also of a hand that the task does not let hit goals."""
         return self.task.robot.forward_kinematics(self.configurations, hand)
 
     def subtask(self, goal: int) -> Array:
-        """The configurations from the hit of the goal before, or the start, to that of a goal.
+        """Return the rows of ``configurations`` from the hit of the goal before, or the start, to
+        the hit of a goal, both included.
 
-        Parameters
-        ----------
-        goal : int
-            Number of the goal, from 1.
-
-        Returns
-        -------
-        ndarray, shape (k, dof)
-            Rows of ``configurations``, both ends included.
-
-        Raises
-        ------
-        ValueError
-            There is no goal of that number.
+        ``goal`` is a number from 1. Raises ValueError if there is no such goal.
         """
         check_limits("goal", goal, 1, len(self.hits))
         first = self.hits[goal - 2] if goal > 1 else 0
         return self.configurations[first : self.hits[goal - 1] + 1]
 
     def to_frame(self) -> pd.DataFrame:
-        """The movement as a table.
+        """Return the movement as a table, a row for each control tick.
 
-        Returns
-        -------
-        DataFrame
-            A row for each control tick. ``goal`` is the number of the goal that the robot moves to,
-            ``hand`` the hand that is to hit it. Then the configuration (``base_x``, ``base_y`` in
-            length units, ``left_1`` and so on in rad) and the place of both hands (``left_x``,
-            ``left_y``, ``right_x``, ``right_y``, length unit). ``attrs["units"]`` has these units.
+        ``goal`` is the number of the goal that the robot moves to, ``hand`` the hand that is to hit
+        it. Then the configuration (``base_x``, ``base_y`` in length units, ``left_1`` and so on in
+        rad) and the place of both hands (``left_x``, ``left_y``, ``right_x``, ``right_y``, length
+        unit). ``attrs["units"]`` has these units.
         """
         import pandas as pd
 
@@ -138,13 +108,8 @@ class Trajectory:
         return frame
 
     def plot(self) -> Figure:
-        """A picture of the movement.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The robot at the start (pale) and at each hit, with the path of the hand that hits.
-        """
+        """Draw the robot at the start (pale) and at each hit, with the path of the hand that
+        hits."""
         from matplotlib.figure import Figure
 
         from coartic.drawing import box, circle_goals, draw_robot, number_goals

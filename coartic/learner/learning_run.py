@@ -124,18 +124,8 @@ class LearningRun:
         return int(self.rewards[0]) if self.completed[0] else None
 
     def execute(self) -> Execution:
-        """Execute the learned solution again, apart from the learner.
-
-        Returns
-        -------
-        Execution
-            What happened; its reward is that of the run.
-
-        Raises
-        ------
-        CoarticError
-            Nothing was learned.
-        """
+        """Execute the learned solution again, apart from the learner: the reward is that of the
+        run. Raises CoarticError if nothing was learned."""
         if not self.learned:
             raise CoarticError(f"nothing to execute: {self.reason}")
         return execute(self.task, self.learned, model=self.model)

@@ -277,20 +277,8 @@ class Task(FileData):
 
     @checked_arguments
     def save(self, path: str | Path, *, replace: bool = False) -> None:
-        """Write the task as a file, which :func:`load_task` reads.
-
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            The file, whose name ends in ``.toml``.
-        replace : bool
-            Whether a file that is there is written over.
-
-        Raises
-        ------
-        CoarticError
-            The file cannot be written.
-        """
+        """Write the task as a file ``.toml``, which :func:`load_task` reads. With ``replace`` a
+        file that is there is written over. Raises CoarticError if the file cannot be written."""
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
             raise CoarticError(f"cannot write {file}: the name of a task's file ends in .toml")
