@@ -20,7 +20,7 @@ from typing import Annotated
 from pydantic import Field
 
 from coartic.learner.conditions import MOST_NOISE
-from coartic.learner.learning import TRIALS
+from coartic.learner.learning import TRIALS, runs_at_once
 from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
 from coartic.optimisers import OPTIMISER_INFORMATION, Objective, sequences_of
 
@@ -59,40 +59,21 @@ def draw_trials(session: Session, hands: str | None, sigma: float, trials: int) 
     return problem
 
 
-class RandomSearch(Method):
-    """Gaussian noise around the postures in which the corrective process hits the goals.
-
-    The best trial is the solution.
-    """
-
-    name = "random-search"
-    title = "Random search around the corrective process"
-    citation = (
-        "L. A. Rastrigin (1963). The convergence of the random search method in the extremal "
-        "control of a many parameter system. Automation and Remote Control."
-    )
-    information = OPTIMISER_INFORMATION
-    Parameters = RandomSearchParameters
-
-    def solve(self, session: Session) -> Result:
-        """Draw targets until no trial is left."""
-        parameters: RandomSearchParameters = self.parameters
-        with session.solving():
-            try:
-                best = draw_trials(session, parameters.hands, parameters.sigma, parameters.trials)
-            except BudgetError:
-                raise MethodError("infeasible", "the budget leaves no trial to make") from None
-        return Result(best.solution, {"evaluations": best.evaluations})
-
-
 class RandomSearchHands(Method):
     """Random search for each hand sequence; for the task's own alone where there are too many."""
 
     name = "random-search/hands"
     title = "Random search with every hand sequence"
-    citation = RandomSearch.citation
+    citation = (
+        "L. A. Rastrigin (1963). The convergence of the random search method in the extremal "
+        "control of a many parameter system. Automation and Remote Control."
+    )
     information = OPTIMISER_INFORMATION
     Parameters = RandomSearchHandsParameters
+
+    def most_together(self) -> int:
+        """As many as fit into one job."""
+        return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
         """Draw targets for one sequence after the other; the solution is the best trial's."""
@@ -110,6 +91,27 @@ class RandomSearchHands(Method):
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         best = min(problems, key=lambda problem: problem.best_cost)
         return Result(best.solution, {"sequences": len(problems)})
+
+
+class RandomSearch(RandomSearchHands):
+    """Gaussian noise around the postures in which the corrective process hits the goals.
+
+    The best trial is the solution.
+    """
+
+    name = "random-search"
+    title = "Random search around the corrective process"
+    Parameters = RandomSearchParameters
+
+    def solve(self, session: Session) -> Result:
+        """Draw targets until no trial is left."""
+        parameters: RandomSearchParameters = self.parameters
+        with session.solving():
+            try:
+                best = draw_trials(session, parameters.hands, parameters.sigma, parameters.trials)
+            except BudgetError:
+                raise MethodError("infeasible", "the budget leaves no trial to make") from None
+        return Result(best.solution, {"evaluations": best.evaluations})
 
 
 METHODS: tuple[type[Method], ...] = (RandomSearch, RandomSearchHands)

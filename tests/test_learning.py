@@ -345,8 +345,8 @@ def test_a_condition_keeps_its_limits(field, value):
         ({"goals": ((3.0, 1.0),) * 5}, "for each of 5 goals"),
         ({"goals": ((3.0, 1.0),) * 3 + ((3.0, np.nan),)}, "not finite"),
         ({"initial_hands": "L"}, "'L' do not fit task"),
-        ({"robot": Robot(left_links=(1.0,) * 6, right_links=(1.0,) * 6)}, r"needs \(14,\)"),
-        ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"needs \(4,\)"),
+        ({"robot": Robot(left_links=(1.0,) * 6, right_links=(1.0,) * 6)}, r"needed is \(14,\)"),
+        ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"needed is \(4,\)"),
         ({"radius": np.inf}, "radius is inf"),
     ],
 )

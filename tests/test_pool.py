@@ -109,7 +109,7 @@ HANDLED = {
     "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
              "solver-failed", "returned no solution"),
     "spends": ("for _ in range(2): session.spend(gradients=2**62)",
-               "crashed", "counter 'gradients' is .* from 0 to"),
+               "crashed", "it must be a whole number from 0 to 4,6"),
     "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),
     "trials": ("for _ in range(9): session.trial(corrected(session))",
                "crashed", "the budget of 3 trials is spent"),

@@ -58,6 +58,13 @@ from coartic.tasks.task import Task, check_hands, letters_of
 
 TRIALS = 10_000  # trials of one run (published)
 _MOST_KEPT = 200_000_000  # trials of one call, whose rewards take 9 bytes each
+_MOST_TOGETHER = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
+
+
+def runs_at_once(trials: int) -> int:
+    """Return how many runs with this number of trials are performed in one job: as many as there
+    are slots, if their rewards fit into one answer."""
+    return max(1, min(SLOTS, _MOST_TOGETHER // trials))
 
 
 def learn(

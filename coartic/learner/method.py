@@ -19,7 +19,7 @@ from coartic.learner.conditions import (
     METHOD_PREFIX,
     ExplorationCondition,
 )
-from coartic.learner.learning import TRIALS, learn_many
+from coartic.learner.learning import TRIALS, learn_many, runs_at_once
 from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
 from coartic.method import (
     Information,
@@ -31,9 +31,7 @@ from coartic.method import (
     Result,
     Session,
 )
-from coartic.motion.batch import SLOTS
 
-_MOST_TRIALS = 4_000_000  # of runs that are performed together
 _FIELDS: dict[str, Any] = get_type_hints(ExplorationCondition, include_extras=True)
 del _FIELDS["id"], _FIELDS["hands"]  # which parameters do not change
 
@@ -88,9 +86,8 @@ class DualProcess(Method):
         return result
 
     def most_together(self) -> int:
-        """As many as there are slots, if their rewards fit into one answer."""
-        trials: int = self.parameters.trials
-        return max(1, min(SLOTS, _MOST_TRIALS // trials))
+        """As many as fit into one job."""
+        return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Learn in each session; a solution is the best trial's, or the replay's."""
