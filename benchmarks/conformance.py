@@ -24,7 +24,6 @@ from coartic import (
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.worker import OWN_GENERATOR
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import counted
 from coartic.method import METERED
 from coartic.motion.solution import goals_without_target, hint_of
@@ -34,9 +33,9 @@ from coartic.runs.record import Outcome, Run
 from coartic.tasks.task import check_task
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
-CHECK_LIMIT_S = 120.0
-BUDGET = 7  # trial budget of the runs that check law ``limits``
-NO_SEED = (
+_LIMIT_S = 120.0
+_BUDGET = 7  # trial budget of the runs that check law ``limits``
+_NO_SEED = (
     "\nanother seed gives the same result as well: random numbers come from session.rng or "
     "session.seed; without any, stochastic = False saves runs"
 )
@@ -51,8 +50,7 @@ class Law(NamedTuple):
     finding: str
 
 
-@checked_arguments
-def law(name: str, problems: Iterable[str], finding: str) -> Law:
+def _law(name: str, problems: Iterable[str], finding: str) -> Law:
     """Return a law that holds if there are no problems; the finding of a broken law is its first
     problem."""
     problem = next(iter(problems), None)
@@ -81,13 +79,13 @@ def check_method(
     jobs = {}
     for kind, seed, budget in (
         *(("first", 1, None), ("again", 1, None), ("other seed", 2, None)),
-        *(("after others", 1, None), ("budget", 1, BUDGET)),
+        *(("after others", 1, None), ("budget", 1, _BUDGET)),
     ):
         for task in tasks:
             cell = cell_of(task, info, parameters, trial_budget=budget)
-            jobs[kind, task.name] = Job(cell, seed, (0,), CHECK_LIMIT_S)
+            jobs[kind, task.name] = Job(cell, seed, (0,), _LIMIT_S)
     for task in filter(applies, [_hopeless_task(tasks[0])]):
-        jobs["hopeless", task.name] = Job(cell_of(task, info, parameters), 1, (0,), CHECK_LIMIT_S)
+        jobs["hopeless", task.name] = Job(cell_of(task, info, parameters), 1, (0,), _LIMIT_S)
     runs = dict(zip(jobs, perform_in_order([*jobs.values()], verbose=verbose), strict=True))
     last = tasks[-1].name
     runs["elsewhere", last] = next(perform_in_order([jobs["first", last]]))
@@ -120,7 +118,7 @@ def _laws_of_runs(
         if goals
     )
     hints = ((task, hint_of(movements)) for task, movements in solutions.items())
-    yield law(
+    yield _law(
         "solution",
         chain(
             (f"on {task}: {each.status}: {each.reason}" for task, each in first.items()
@@ -139,7 +137,7 @@ def _laws_of_runs(
         changes("other seed", "declared not to be stochastic, but another seed on {}"),
     )
     differs = next(changes("other seed", "{}"), None)
-    yield law(
+    yield _law(
         "determinism",
         chain(
             changes("again", "same seed on {}, same process"),
@@ -147,22 +145,22 @@ def _laws_of_runs(
             () if info.stochastic else by_seed,
         ),
         f"the same result under {'the same' if info.stochastic else 'any'} seed, in one process "
-        "and in another" + ("" if differs or not info.stochastic else NO_SEED),
+        "and in another" + ("" if differs or not info.stochastic else _NO_SEED),
     )
-    yield law(
+    yield _law(
         "no hidden state",
         changes("after others", "after other runs, {} with the same seed"),
         "other runs in between change nothing",
     )
-    yield law(
+    yield _law(
         "limits",
         (
-            f"a budget of {BUDGET} trials on {task}: {each.reason or each.meter}"
+            f"a budget of {_BUDGET} trials on {task}: {each.reason or each.meter}"
             for task, each in of_kind("budget")
             if each.status not in ("ok", "infeasible")
-            or (each.meter and each.meter.trials > BUDGET)
+            or (each.meter and each.meter.trials > _BUDGET)
         ),
-        f"keeps to a budget of {BUDGET} trials",
+        f"keeps to a budget of {_BUDGET} trials",
     )
     used = {name for each in first.values() for name in each.used} - {OWN_GENERATOR}
     unused = {item.value for item in METERED if item.value in info.information} - used
@@ -173,9 +171,9 @@ def _laws_of_runs(
     )
     never = [f"declared but never used: {', '.join(sorted(unused))}"] if unused else []
     declared = f"declared and used: {', '.join(sorted(used)) or 'nothing'}"
-    yield law("information", [*undeclared, *never], declared)
+    yield _law("information", [*undeclared, *never], declared)
     hopeless = [each for _, each in of_kind("hopeless")]
-    yield law(
+    yield _law(
         "failure",
         (
             f"on a task out of reach it gives {each.status} {each.reason}; it should "
@@ -203,12 +201,12 @@ def _laws_of_declaration(info: MethodInfo) -> list[Law]:
         problems.append("they can be changed after validation; freeze them")
     values = ", ".join(f"{key}={value}" for key, value in parameters.items())
     return [
-        law(
+        _law(
             "declaration",
             (f"{name} is empty" for name in empty),
             f"{info.title}; information: {', '.join(info.information) or 'none'}",
         ),
-        law("parameters", problems, values or "none"),
+        _law("parameters", problems, values or "none"),
     ]
 
 
@@ -250,14 +248,14 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
     methods = [name for name, info in registered.items() if info.why_not(task) is None]
     return [
         Law("valid", True, f"{task.name}, {counted(len(task.goals), 'goal')}"),
-        law(
+        _law(
             "name",
             [f"name {task.name!r} belongs to a different, shipped task"] * shipped,
             f"name {task.name!r} is its own",
         ),
-        law("distinct goals", near, "successive goals lie apart"),
-        law("solvable", unsolved, solved),
-        law(
+        _law("distinct goals", near, "successive goals lie apart"),
+        _law("solvable", unsolved, solved),
+        _law(
             "methods",
             ["no method applies to it"] * (not methods),
             f"{counted(len(methods), 'method')} can run on it, such as {', '.join(methods[:2])}",

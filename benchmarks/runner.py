@@ -25,7 +25,6 @@ from coartic.benchmarks.reproduce import doubts_of
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
@@ -38,7 +37,7 @@ _EXECUTORS = {
     "scheduler": "Dask(scheduler) of coartic.benchmarks.cluster",
 }
 """Options of ``coartic run`` that are executors in Python."""
-LEAST_BATCH = 8
+_LEAST_BATCH = 8
 """Most runs of a cell that are not divided among workers."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
@@ -213,7 +212,7 @@ def perform(
             progress.waiting[job.cell.method.name] += len(job.numbers)
         progress.workers = executor.workers
         watch(progress, None)
-        jobs, first = divided(missing, executor.workers), dict[str, Run]()
+        jobs, first = _divided(missing, executor.workers), dict[str, Run]()
         while jobs:
             alone: list[Job] = []
             with closing(executor.perform(jobs)) as answers:  # ends workers after an error here
@@ -277,8 +276,7 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
     return missing
 
 
-@checked_arguments
-def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
+def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     """Divide jobs for workers, and return them in the order in which they begin; results do not
     depend on the division.
 
@@ -293,7 +291,7 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         for first in range(0, len(job.numbers), size):
             yield replace(job, numbers=job.numbers[first : first + size])
 
-    share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), LEAST_BATCH)
+    share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), _LEAST_BATCH)
     parts: list[Job] = []
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
@@ -302,7 +300,7 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     even = len(parts) - len(parts) % workers
     ordered, last = parts[:even], parts[even:]
     for job in last:
-        ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), LEAST_BATCH))
+        ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), _LEAST_BATCH))
 
     def trials(job: Job) -> float:
         return trials_in(job.cell.parameters) * len(job.numbers) or math.inf
