@@ -156,16 +156,16 @@ class TaskVectorEnv(Recorded, VectorEnv):
             hands, goals = only.hands, len(only.goals)
         self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
         # All robots are taken for the widest, some of whose links have no length.
-        self.widest = Robot((1.0,) * links, (1.0,) * links)
-        self.starts = np.zeros((len(self.tasks), self.widest.dof))
-        self.kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
+        self._widest = Robot((1.0,) * links, (1.0,) * links)
+        self._starts = np.zeros((len(self.tasks), self._widest.dof))
+        self._kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
         base = [place for place, axis in enumerate("xy") if axis not in locked]
-        arms = [np.arange(self.widest.dof)[self.widest.joints(hand)] for hand in hands]
+        arms = [np.arange(self._widest.dof)[self._widest.joints(hand)] for hand in hands]
         joints, view = np.concatenate([base, *arms]).astype(np.int64), ahead + 1
         sizes = [view, 2 * view + len(joints), len(joints) * (fewest < links)]
         high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
         self.state = VectorState.empty(
-            self.widest,
+            self._widest,
             (num_envs, len(self.tasks), goals),
             joints,
             np.array([HANDS.index(hand) for hand in hands]),
@@ -181,46 +181,47 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self._rngs: list[Any] = [None] * num_envs
 
     def task_at(self, number: int) -> Task:
-        """A task by its number; it is loaded when it is first asked for."""
+        """A task by its number, from 0; it is loaded when it is first asked for."""
+        check_limits("number", number, 0, len(self.tasks) - 1)
         task, state = as_task(self.tasks[number]), self.state
         if state.kinds[number] < 0:
             check_model(self.model, radius=task.radius)
-            self.tasks[number], places = task, self.places_of(task.robot)
-            self.starts[number, places] = task.q0
+            self.tasks[number], places = task, self._places_of(task.robot)
+            self._starts[number, places] = task.q0
             locked = ["xy".index(axis) for axis in task.locked_base]
             state.movable[number] = np.isin(state.joints, np.setdiff1d(places, locked))
             state.goals[number, : len(task.goals)] = task.goal_array
             state.counts[number] = len(task.goals)
             kind = task.robot, float(task.radius), task.locked_base
-            if kind not in self.kind_of:
-                self.kind_of[kind] = len(state.parameters)
+            if kind not in self._kind_of:
+                self._kind_of[kind] = len(state.parameters)
                 parameters = robot_parameters(
-                    self.widest, task.radius, locked_base=task.locked_base, model=self.model
+                    self._widest, task.radius, locked_base=task.locked_base, model=self.model
                 ).copy()
                 for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
                     _, links, arm["shoulder_x"], arm["shoulder_y"] = task.robot.arm(hand)
                     arm["links"] = np.pad(links, (0, len(arm["links"]) - len(links)))
                 known = np.concatenate([state.parameters, parameters])
                 self.state = state._replace(parameters=known)
-            state.kinds[number] = self.kind_of[kind]
+            state.kinds[number] = self._kind_of[kind]
         return task
 
-    def places_of(self, robot: Robot) -> NDArray[np.int64]:
+    def _places_of(self, robot: Robot) -> NDArray[np.int64]:
         """Return the indices of a robot's entries among the entries of the widest robot's
         configurations."""
         left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
-        return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self.widest.most_links + right])
+        return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self._widest.most_links + right])
 
-    def begin(self, rows: RowIndex, numbers: ArrayLike) -> None:
+    def _begin(self, rows: RowIndex, numbers: ArrayLike) -> None:
         """Put robots at the start of the tasks of these numbers."""
         state = self.state
         state.task[rows], state.goal[rows], state.going[rows] = numbers, 0, True
         for number in {*state.task[rows].tolist()}:
             self.task_at(number)
-        state.q[rows] = self.starts[state.task[rows]]
+        state.q[rows] = self._starts[state.task[rows]]
         observe(*self.state)
 
-    def move(self, actions: ArrayLike, rows: RowIndex = slice(None)) -> None:
+    def _move(self, actions: ArrayLike, rows: RowIndex = slice(None)) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
         of these rows.
 
@@ -275,7 +276,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         state = self.state
         if not state.going.all():
             raise ResetNeeded("no trial goes on: reset first")
-        self.move(actions)
+        self._move(actions)
         final, ended = {}, ~state.going
         if ended.any():
             last = np.full(self.num_envs, None, dtype=object)
@@ -290,7 +291,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     def _begin_anew(self, ended: NDArray[np.bool_]) -> None:
         number, rows = len(self.tasks), np.flatnonzero(ended)
         drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
-        self.begin(rows, drawn)
+        self._begin(rows, drawn)
 
     def _masked_infos(self, there: NDArray[np.bool_] | bool = True) -> dict[str, Any]:
         infos = self.infos()
@@ -323,7 +324,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         """Begin a trial."""
         super().reset(seed=_whole_seed(seed))
         _check_no_options(options)
-        self.robots.begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
+        self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
         return self.robots.state.seen[0].copy(), self._info()
 
     def step(
@@ -333,7 +334,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         state = self.robots.state
         if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
-        self.robots.move(real_array("action", action)[None])
+        self.robots._move(real_array("action", action)[None])
         return state.seen[0].copy(), state.rewards.item(), not state.going[0], False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -351,7 +352,7 @@ class TaskEnv(Recorded, gymnasium.Env):
         figure = Figure(figsize=(6, 4))
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-        draw_robot(axes, task, state.q[0, robots.places_of(task.robot)], weight=1.5)
+        draw_robot(axes, task, state.q[0, robots._places_of(task.robot)], weight=1.5)
         fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
@@ -362,7 +363,7 @@ class TaskEnv(Recorded, gymnasium.Env):
 
 def _check_no_options(options: Mapping[str, Any] | None) -> None:
     """Refuse options of a reset, which has none. Raises ValueError for any."""
-    if options:
+    if options is not None and not (isinstance(options, Mapping) and not options):
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 
 
@@ -535,9 +536,9 @@ def _rollout(
     """
     rows = np.arange(trials * tasks)
     robots, totals = TaskVectorEnv(len(rows), **options), np.zeros(len(rows))
-    robots.begin(rows, rows // trials)
+    robots._begin(rows, rows // trials)
     while len(rows):
-        robots.move(act(robots.state.seen[rows]), rows)
+        robots._move(act(robots.state.seen[rows]), rows)
         totals[rows] += robots.state.rewards[rows]
         rows = np.flatnonzero(robots.state.going)
     return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)

@@ -216,7 +216,7 @@ def test_actions_that_are_none():
     [
         ({"ahead": -1}, ValueError, "ahead is -1; it must be a whole number from 0"),
         ({"model": None}, TypeError, "model is None; it must be a MotionModel"),
-        ({"split": "train"}, ValueError, "split is 'train'; it is one of 'development', 'test'"),
+        ({"split": "train"}, ValueError, "unknown split 'train'. Known: development, test"),
         ({"task": "two-armed/v9"}, coartic.TaskError, "two-armed/v9"),
         ({"task": "ascending", "count": 3}, ValueError, "are for families, not 'ascending'"),
         ({"task": {"goals": 3}}, coartic.TaskError, "goals is 3; it should be a list of points"),
