@@ -71,9 +71,8 @@ CPU microseconds of one core for a trial, by the function that makes it: medians
 | --- | {rules} |
 """
 FOOT = """
-The *plain loop* is the model as a programmer would first write it with Numba
-(`docs/scripts/plain_loop.py`). The kernel moves many arms side by side and skips steps in which
-the hand provably stays out of the goal; *kinematics alone* is its lower limit.
+*Plain loop*: the model as a programmer would first write it with Numba. The kernel moves many arms
+side by side and skips steps in which the hand provably stays out of the goal.
 """
 
 
