@@ -14,6 +14,9 @@ from sphinx.application import Sphinx
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
+from coartic.analysis.methods import title_of
+from coartic.benchmarks.registry import built_in
+from coartic.method import Information
 from coartic.play.page import part_of_page, play_page, player_figure, preset_of, up_or_down
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import Task, shipped_tasks
@@ -89,6 +92,29 @@ def tasks() -> Iterator[str]:
 
     heads = "task", "hands", "base", "goals (length units)", "best known reward", "reconstructed"
     yield from table(heads, map(row, shipped_tasks().values()))
+
+
+def methods(group: str) -> Iterator[str]:
+    """Yield the table of the built-in methods that use the reward of trials, its ``formula``, or
+    ``none`` of it, with a letter for each information."""
+    letters = dict(zip(Information, "GFJATUKRS", strict=True))
+
+    def group_of(uses: Sequence[Information]) -> str:
+        if Information.REWARD_BY_TRIAL in uses:
+            return "trials"
+        return "formula" if Information.REWARD_FORMULA in uses else "none"
+
+    declared = {name: [*map(Information, info.information)] for name, info in built_in().items()}
+    rows = (
+        (
+            title_of(name),
+            f"`{name}`",
+            " ".join(sorted(map(letters.get, uses), key="GFJATUKRS".find)),
+        )
+        for name, uses in declared.items()
+        if group_of(uses) == group
+    )
+    yield from table(("name", "id", "information"), rows)
 
 
 def columns() -> Iterator[str]:

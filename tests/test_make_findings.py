@@ -2,14 +2,12 @@
 
 import re
 import tomllib
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from coartic.analysis import fill_page
-from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.suites import Suite
 from coartic.tasks.families import Family
 from coartic.tasks.task import Task
@@ -74,19 +72,10 @@ def check_keys(kind, content, notes, place=(), **beside):
 
 def test_the_page_of_files_has_every_key_with_what_holds_without_it():
     page = (DOCS / "reference" / "files.md").read_text(encoding="utf-8")
-    task, family, suite, methods = re.findall("```toml\n(.*?)```", page, re.DOTALL)
+    task, family, suite = re.findall("```toml\n(.*?)```", page, re.DOTALL)
     check_keys(Task, *read_example(task))
     check_keys(Family, *read_example(family), name="mine/v1")
     check_keys(Suite, *read_example(suite), name="mine")
-    used = set()
-    for name, info in built_in().items():
-        of = {key: at for key, at in tomllib.loads(methods).items() if fnmatchcase(name, key)}
-        used |= {*of}
-        shown = {key: value for at in of.values() for key, value in at.items() if key != "hands"}
-        defaults = info.load().Parameters().model_dump(exclude={"hands"}, exclude_none=True)
-        assert shown == defaults, name
-        assert "hands" not in info.load().Parameters.model_fields or "hands" in of[name]
-    assert used == {*tomllib.loads(methods)}
 
 
 def test_links_of_pages_name_files_that_are_there():

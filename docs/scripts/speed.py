@@ -61,20 +61,19 @@ def main(*, is_long: bool = False) -> None:
 
 
 PAGE = Path(__file__).parents[1] / "how-fast.md"
+INTERNAL = ("the empty call", "kernel, one by one", "kernel, 1000 at once", "kinematics alone")
+"""Ways that the page leaves out."""
 HEAD = """\
 # How fast
 
-CPU microseconds of one core for a trial, by the function that makes it: medians, measured in one
-run by `make speed`. Times depend on the machine, ratios less.
+CPU microseconds of one core for a trial, by the function that makes it: medians of one run of
+`make speed`. Times depend on the machine, ratios less.
 
-| way | {heads} |
+| µs a trial | {heads} |
 | --- | {rules} |
 """
 FOOT = """
-The *plain loop* is the model as a programmer would first write it with Numba
-(`docs/scripts/plain_loop.py`); it needs the same ticks. The kernel moves many arms side by side and
-skips steps in which the hand provably stays out of the goal. *Kinematics alone* is a lower limit
-for the kernel.
+*Plain loop*: the model as a programmer would first write it with Numba.
 """
 
 
@@ -86,11 +85,10 @@ def kinematics(count: int, repeats: int, batch: Any) -> None:
 
 
 def write_page(columns: list[dict[str, float]], tasks: tuple[str, ...]) -> None:
-    """Write the page: microseconds by way and task, and ratios to the plain loop."""
-    heads = " | ".join(f"{task}, µs a trial | times as fast as the plain loop" for task in tasks)
-    text = HEAD.format(heads=heads, rules=" | ".join(["---: | ---:"] * len(tasks)))
-    for way in columns[0]:
-        cells = (f"{us[way]:.3g} | {us['plain loop'] / us[way]:.3g}" for us in columns)
+    """Write the page: microseconds by way and task."""
+    text = HEAD.format(heads=" | ".join(tasks), rules=" | ".join(["---:"] * len(tasks)))
+    for way in (way for way in columns[0] if way not in INTERNAL):
+        cells = (f"{us[way]:.3g}" for us in columns)
         text += f"| {way} | {' | '.join(cells)} |\n"
     PAGE.write_text(text + FOOT, encoding="utf-8")
 
@@ -111,8 +109,6 @@ def show_ways() -> None:
             f"{distance:32}" + "".join(f"{a:14.2f}{b:8.2f}{c:8.2f}" for a, b, c in times),
             flush=True,
         )
-    for of_task in medians:
-        del of_task["the empty call"]
     write_page(medians, tasks)
 
 
