@@ -73,7 +73,9 @@ CPU microseconds of one core for a trial, by the function that makes it: medians
 | --- | {rules} |
 """
 FOOT = """
-*Plain loop*: the model as a programmer would first write it with Numba.
+*Plain loop*: the model as a programmer would first write it, with Numba or in C
+(`docs/scripts/plain_loop.c`); *bounds* skip the steps during which the hand provably stays out of
+the goal, as this package does.
 """
 
 
@@ -138,6 +140,8 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     plain = plain_loop.arguments(task, hands)
     reference = session.trials(hands, targets)
     assert (plain_loop.trials(task.q0, targets, *plain) == reference.ticks).all()
+    in_c = plain_loop.trials_in_c(task, hands, targets)
+    assert all((make() == reference.ticks).all() for make in in_c.values())
     evaluations, batch = int(reference.evaluations.sum()), batch_for(task.robot)
     env, many = TaskEnv(task), TaskVectorEnv(1000, task)
     shape = (len(best), *many.action_space.shape)
@@ -151,6 +155,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
 
     return {
         "plain loop": (1000, lambda: plain_loop.trials(task.q0, targets, *plain)),
+        **{way: (1000, make) for way, make in in_c.items()},
         "the empty call": (100, lambda: [reach_kernel(*none) for _ in range(100)]),
         "kernel, one by one": (100, lambda: [reach_kernel(*each) for each in alone]),
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
