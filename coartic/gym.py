@@ -169,9 +169,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
             joints,
             np.array([HANDS.index(hand) for hand in hands]),
             len(high),
-            ahead=ahead,
-            reach=REACH,
-            failed=-float(FAILED),
+            ahead,
+            REACH,
         )
         self.single_action_space = Box(-1.0, 1.0, self.state.actions.shape[1:], np.float32)
         self.single_observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
