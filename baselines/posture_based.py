@@ -36,7 +36,6 @@ from coartic import Movement
 from coartic.baselines.posture_graph import HandSequence, Layers
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.compile import chain_by, entry, joint_lever
-from coartic.optimisers import explored_joints
 from coartic.robot import BASE_DOF, Array, Hand
 
 Mask = NDArray[np.bool_]
@@ -139,7 +138,8 @@ class PosturePlanner:
         self.base_and_arm = {hand: np.zeros(session.dof, bool) for hand in session.hands}
         for hand, mask in self.base_and_arm.items():
             mask[:BASE_DOF] = mask[session.joints(hand)] = True
-        self.movable: Mask = explored_joints(session)
+        self.movable: Mask = np.logical_or.reduce(list(self.base_and_arm.values()))
+        self.movable[:BASE_DOF] = [c not in session.locked_base for c in ("x", "y")]
         self.free = {hand: self.movable & mask for hand, mask in self.base_and_arm.items()}
         """Joints that may move towards a posture for each hand."""
         # SDs from zero up: dense near the start, sparse far from it.

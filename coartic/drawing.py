@@ -42,15 +42,14 @@ def draw_robot(
     of lines, ``alpha`` makes all paler. Set the limits of ``axes``: patches do not widen them,
     which takes long.
     """
-    outline = task.robot.base_outline(q)
-    base = [
-        Polygon(outline, facecolor=BASE_GREY, alpha=0.25 * alpha, edgecolor="none", zorder=1.5),
-        Polygon(
-            outline, fill=False, edgecolor=colour, linewidth=0.6 * weight, alpha=alpha, zorder=1.6
-        ),
-    ]
-    for patch in base:
-        axes.add_artist(patch)
+    base = Polygon(
+        task.robot.base_outline(q),
+        facecolor=(BASE_GREY, 0.25 * alpha),
+        edgecolor=(colour, alpha),
+        linewidth=0.6 * weight,
+        zorder=1.5,
+    )
+    axes.add_artist(base)
     style: Any = {
         "color": colour,
         "linewidth": 0.9 * weight,
@@ -63,8 +62,7 @@ def draw_robot(
     }
 
     def move(q: Array) -> None:
-        for patch in base:
-            patch.set_xy(task.robot.base_outline(q))
+        base.set_xy(task.robot.base_outline(q))
         for hand, arm in arms.items():
             arm.set_data(*task.robot.joint_positions(q, hand).T)
 

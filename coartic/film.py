@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from coartic.drawing import box, circle_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.files import check_ending, check_output, write_output
+from coartic.internal.files import check_ending, check_output, errors_in_words, write_output
 from coartic.internal.text import counted
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def write_film(
     mp4 = path.suffix.lower() == ".mp4"
     writer = FFMpegWriter(rate, codec="h264") if mp4 else PillowWriter(gif_rate)
     try:
-        with tempfile.TemporaryDirectory() as folder:
+        with errors_in_words(path), tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
                 for row in rows:
@@ -85,8 +85,6 @@ def write_film(
                     for _ in range(1 + round(stands.get(row, 0) / interval_s)):
                         writer.grab_frame()
             write_output(path, film.read_bytes(), replace=replace)
-    except OSError as error:
-        raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
     except subprocess.CalledProcessError as error:
         raise CoarticError(f"cannot write {path}: ffmpeg failed: {error.stderr}") from None
     return len(rows), stride / interval_s

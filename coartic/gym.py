@@ -170,9 +170,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
             joints,
             np.array([HANDS.index(hand) for hand in hands]),
             len(high),
-            ahead=ahead,
-            reach=REACH,
-            failed=-float(FAILED),
+            ahead,
+            REACH,
         )
         self.single_action_space = Box(-1.0, 1.0, self.state.actions.shape[1:], np.float32)
         self.single_observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
@@ -405,14 +404,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     except ImportError:
         raise CoarticError("coartic.gym.sb3 needs: pip install 'coartic[rl]'") from None
 
-    return RobotEnvs(TaskVectorEnv(num_envs, **_known_env(env) | options))
-
-
-def _known_env(env: str) -> dict[str, Any]:
-    """The options of an id of this package. Raises ValueError for another one."""
-    if env not in IDS:
-        raise ValueError(unknown("environment", str(env), IDS))
-    return IDS[env]
+    return RobotEnvs(TaskVectorEnv(num_envs, **_options_of(env) | options))
 
 
 Policy = Callable[[NDArray[np.float32]], ArrayLike] | Method | Any
@@ -466,7 +458,7 @@ def score(
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
-    given = (_known_env(env) if isinstance(env, str) else _options_of(env)) | options
+    given = _options_of(env) | options
     if given.get("task") in [*shipped_families()]:  # a Task has no hash
         given = {"split": "test", **given}
     setting = TaskVectorEnv(1, **given)
@@ -506,22 +498,21 @@ def _acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
             _without_wrappers(each, "the agent's environment")
         see = normal.normalize_obs if normal else np.asarray
         return lambda seen: policy.predict(see(seen), deterministic=True)[0]
-    if callable(policy):
-        return lambda seen: _without_state(policy(seen))
-    raise TypeError(
-        f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
-        "with predict, or a Method"
-    )
-
-
-def _without_state(actions: Any) -> ArrayLike:
-    """Return actions. Raises TypeError for the pair that an agent's ``predict`` returns."""
-    if isinstance(actions, tuple):
+    if not callable(policy):
         raise TypeError(
-            f"the policy returned a tuple of {len(actions)}; needed are the actions alone, which "
-            "are the first entry of what an agent's predict returns"
+            f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
+            "with predict, or a Method"
         )
-    return actions  # type: ignore[no-any-return]
+
+    def act(seen: NDArray[np.float32]) -> Any:
+        if isinstance(actions := policy(seen), tuple):
+            raise TypeError(
+                f"the policy returned a tuple of {len(actions)}; needed are the actions alone, "
+                "which are the first entry of what an agent's predict returns"
+            )
+        return actions
+
+    return act
 
 
 def _rollout(
@@ -569,7 +560,14 @@ def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
 
 
 def _options_of(env: Any) -> dict[str, Any]:
-    """The options of an environment of this package. Raises TypeError for anything else."""
+    """Return the options of an environment of this package, or of its id.
+
+    Raises ValueError for an unknown id, and TypeError for anything else.
+    """
+    if isinstance(env, str):
+        if env not in IDS:
+            raise ValueError(unknown("environment", env, IDS))
+        return IDS[env]
     if not isinstance(getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"

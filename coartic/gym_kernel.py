@@ -21,6 +21,7 @@ from coartic.motion.trial import (
     move,
     set_off,
 )
+from coartic.optimisers import FAILED
 from coartic.robot import Array, Configs, Hands, Points, Robot
 
 Numbers = NDArray[np.int64]
@@ -62,8 +63,6 @@ class VectorState(NamedTuple):
     """Goals that are seen beyond the next one."""
     reach: float
     """How far from the middle a target can be, length unit or rad."""
-    failed: float
-    """Reward of a step in which the corrective process fails."""
     runs: NDArray[np.void]
     """Runs of a lot of robots with each hand, shape ``(H, SLOTS)``."""
     at: NDArray[np.void]
@@ -83,7 +82,8 @@ class VectorState(NamedTuple):
         joints: Numbers,
         sides: Hands,
         entries: int,
-        **constants: float,
+        ahead: int,
+        reach: float,
     ) -> VectorState:
         """State in which no task is loaded: of N environments on T tasks with G goals at most, the
         ``shape``, whose observations have so many entries."""
@@ -104,13 +104,14 @@ class VectorState(NamedTuple):
             movable=np.zeros((tasks, len(joints)), np.bool_),
             joints=joints,
             sides=sides,
+            ahead=ahead,
+            reach=reach,
             runs=np.stack([batch.runs] * len(sides)),
             at=batch.at,
             corrected=batch.corrected,
             moved=batch.moved,
             accounts=empty_accounts(robot, SLOTS, 1).goals[:, 0],
             indices=np.zeros(SLOTS, np.int64),
-            **constants,  # type: ignore[arg-type]
         )
 
 
@@ -173,7 +174,7 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
         account(batch.runs[i], goal)
         fill_row(state.q[n], goal.q)
         state.goal[n] += goal.hit
-        state.rewards[n] = -goal.ticks if goal.hit else state.failed
+        state.rewards[n] = -goal.ticks if goal.hit else -FAILED
         state.going[n] = goal.hit and state.goal[n] < state.counts[state.task[n]]
 
 

@@ -178,7 +178,7 @@ class Objective:
             counted(self.evaluations, "evaluation"),
             f"best cost {self.best_cost:g}",
         ]
-        if (known := self._known) is not None:
+        if self._task is not None and (known := self._known) is not None:
             facts.append(f"best known {-known.reward} with hands {known.hands}")
         return ", ".join(facts) + ")"
 
@@ -198,8 +198,8 @@ class Objective:
 
     @property
     def _known(self) -> KnownOptimum | None:
-        paper = self._session.model == PAPER
-        return best_shipped(self._task) if self._task is not None and paper else None
+        task = self.task
+        return best_shipped(task) if self._session.model == PAPER else None
 
     @property
     def best_known(self) -> int | None:
@@ -208,14 +208,14 @@ class Objective:
         None where none is shipped: for a task of your own, for instances after the first 40 of a
         family's test split, and for another model.
         """
-        self.task  # noqa: B018 (refused in a method)
-        return None if self._known is None else -self._known.reward
+        known = self._known
+        return None if known is None else -known.reward
 
     @property
     def proven(self) -> bool:
         """True if it is proven that no solution costs less than ``best_known``."""
-        self.task  # noqa: B018 (refused in a method)
-        return self._known is not None and self._known.proven
+        known = self._known
+        return known is not None and known.proven
 
     @property
     def hand_sequences(self) -> list[str]:

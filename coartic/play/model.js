@@ -696,17 +696,15 @@ function receding_horizon(problem, horizon) {
     const goal = trial.reached.length;
     const end = Math.min(goal + horizon + 1, count);
     const plan = shortest_plan(problem, trial.q, goal, end);
-    if (!plan) trial.going = false;
-    else {
-      const followed = end < count ? 1 : end - goal;
-      for (let k = 0; trial.going && k < followed; k += 1) {
-        // Through the rim: the target lies beyond the corner, so that the movement ends with the first step inside.
-        const corner = plan.corners[k];
-        const beyond = THROUGH / (distance_of(corner, trial.q) + 1e-9);
-        const target = corner.map((value, j) => value + beyond * (value - trial.q[j]));
-        const hits = move(problem, trial.q.slice(), target, goal + k, plan.hands[k], true) > 0; // else a step passes over the goal
-        trial.reaches(goal + k, plan.hands[k], hits ? target : corner);
-      }
+    const followed = end < count ? 1 : end - goal;
+    trial.going = plan !== null;
+    for (let k = 0; trial.going && k < followed; k += 1) {
+      // Through the rim: the target lies beyond the corner, so that the movement ends with the first step inside.
+      const corner = plan.corners[k];
+      const beyond = THROUGH / (distance_of(corner, trial.q) + 1e-9);
+      const target = corner.map((value, j) => value + beyond * (value - trial.q[j]));
+      const hits = move(problem, trial.q.slice(), target, goal + k, plan.hands[k], true) > 0; // else a step passes over the goal
+      trial.reaches(goal + k, plan.hands[k], hits ? target : corner);
     }
   }
   return trial;
