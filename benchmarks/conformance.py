@@ -33,9 +33,9 @@ from coartic.runs.record import Outcome, Run
 from coartic.tasks.task import check_task
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
-CHECK_LIMIT_S = 120.0
-BUDGET = 7  # trial budget of the runs that check law ``limits``
-NO_SEED = (
+_LIMIT_S = 120.0
+_BUDGET = 7  # trial budget of the runs that check law ``limits``
+_NO_SEED = (
     "\nanother seed gives the same result as well: random numbers come from session.rng or "
     "session.seed; without any, stochastic = False saves runs"
 )
@@ -79,13 +79,13 @@ def check_method(
     jobs = {}
     for kind, seed, budget in (
         *(("first", 1, None), ("again", 1, None), ("other seed", 2, None)),
-        *(("after others", 1, None), ("budget", 1, BUDGET)),
+        *(("after others", 1, None), ("budget", 1, _BUDGET)),
     ):
         for task in tasks:
             cell = cell_of(task, info, parameters, trial_budget=budget)
-            jobs[kind, task.name] = Job(cell, seed, (0,), CHECK_LIMIT_S)
+            jobs[kind, task.name] = Job(cell, seed, (0,), _LIMIT_S)
     for task in filter(applies, [_hopeless_task(tasks[0])]):
-        jobs["hopeless", task.name] = Job(cell_of(task, info, parameters), 1, (0,), CHECK_LIMIT_S)
+        jobs["hopeless", task.name] = Job(cell_of(task, info, parameters), 1, (0,), _LIMIT_S)
     runs = dict(zip(jobs, perform_in_order([*jobs.values()], verbose=verbose), strict=True))
     last = tasks[-1].name
     runs["elsewhere", last] = next(perform_in_order([jobs["first", last]]))
@@ -145,7 +145,7 @@ def _laws_of_runs(
             () if info.stochastic else by_seed,
         ),
         f"the same result under {'the same' if info.stochastic else 'any'} seed, in one process "
-        "and in another" + ("" if differs or not info.stochastic else NO_SEED),
+        "and in another" + ("" if differs or not info.stochastic else _NO_SEED),
     )
     yield law(
         "no hidden state",
@@ -155,12 +155,12 @@ def _laws_of_runs(
     yield law(
         "limits",
         (
-            f"a budget of {BUDGET} trials on {task}: {each.reason or each.meter}"
+            f"a budget of {_BUDGET} trials on {task}: {each.reason or each.meter}"
             for task, each in of_kind("budget")
             if each.status not in ("ok", "infeasible")
-            or (each.meter and each.meter.trials > BUDGET)
+            or (each.meter and each.meter.trials > _BUDGET)
         ),
-        f"keeps to a budget of {BUDGET} trials",
+        f"keeps to a budget of {_BUDGET} trials",
     )
     used = {name for each in first.values() for name in each.used} - {OWN_GENERATOR}
     unused = {item.value for item in METERED if item.value in info.information} - used

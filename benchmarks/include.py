@@ -63,7 +63,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
                 message = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 raise CoarticError(message)
             sources[name] = stack.enter_context(open_store(folder_named(name)))
-        joined = join(plan, sources)
+        joined = _join(plan, sources)
         target = stack.enter_context(writing(out))
         begun = SHIPPED in sources and target.begin_as(sources[SHIPPED])
         with target.transaction():
@@ -75,7 +75,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
     return joined
 
 
-def join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
+def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
     """Return the plan with the cells of the sources. A cell has the runs that the plan asks for,
     and the runs that follow in the sources without a gap.
 
@@ -130,18 +130,18 @@ def _warn_of_gaps(
             elif digest not in digests and method.stochastic and there < most:
                 few.append(job)
         if lacking:
-            words = f"{name} is not finished: it lacks runs of {named(lacking)}"
+            words = f"{name} is not finished: it lacks runs of {_named(lacking)}"
             warnings.warn(
                 f"{words}, and gives those before the first that is missing", stacklevel=4
             )
         if few:
             words = (
-                f"{counted(len(few[0].numbers), 'run')} of {named(few)}; {most} are asked for here"
+                f"{counted(len(few[0].numbers), 'run')} of {_named(few)}; {most} are asked for here"
             )
             warnings.warn(f"{name} has {words}", stacklevel=4)
 
 
-def named(jobs: Sequence[Job]) -> str:
+def _named(jobs: Sequence[Job]) -> str:
     """Name the cell of the first job, and count the other cells."""
     others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"

@@ -50,7 +50,7 @@ def current_environment() -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
         "platform": plain(platform.platform(), LONGEST_LINE),
-        "processor": plain(f"{processor} (arithmetic {arithmetic()})", LONGEST_LINE),
+        "processor": plain(f"{processor} (arithmetic {_arithmetic()})", LONGEST_LINE),
         "cores": threads_for(-1),
         "threads": ONE_THREAD,
     }
@@ -100,7 +100,7 @@ def _commit_of_checkout() -> dict[str, Any] | None:
         return None
 
 
-def arithmetic() -> str:
+def _arithmetic() -> str:
     """Return a hash of the bits of eigenvectors and logarithms. Where the hash is the same, NumPy
     and its linear algebra round alike; they choose their instructions by the processor, and the
     processor's name says little on virtual machines."""

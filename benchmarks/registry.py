@@ -25,7 +25,7 @@ from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.method import MODULES
 from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
 
-RESERVED = (METHOD_PREFIX, "optimum/")
+_RESERVED = (METHOD_PREFIX, "optimum/")
 """Beginnings of ids that have a meaning in every table; they are reserved for built-in methods."""
 NAMES = ("CMA-ES", "learner", "optimum")
 """Names of built-in methods that an id of another method must not repeat."""
@@ -85,8 +85,8 @@ def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) 
     for info in infos:
         names = (*registered, *EVERY_CONDITION, *NAMES)
         why = ""
-        if info.name.startswith(RESERVED):
-            ours = " or ".join(map(repr, RESERVED))
+        if info.name.startswith(_RESERVED):
+            ours = " or ".join(map(repr, _RESERVED))
             why = f"is reserved: ids that begin with {ours} are this project's"
         elif info.name in registered:
             why = f"is already taken ({registered[info.name].origin})"

@@ -14,7 +14,7 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.worker import OWN_GENERATOR
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value
-from coartic.internal.text import plain, unknown
+from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.motion.solution import hint_of
 from coartic.runs.plan import Job
@@ -23,9 +23,8 @@ from coartic.runs.store import RUNS_FILE, open_store
 from coartic.trajectories import Trajectory, trajectory
 
 
-def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
-    """Find the run whose id begins with ``prefix`` in a results folder or any folder below it;
-    return its folder and the run.
+def find_run(prefix: str, folder: Path) -> Run:
+    """Find the run whose id begins with ``prefix`` in a results folder or any folder below it.
 
     Raises CoarticError if there is no such run, or more than one.
     """
@@ -53,10 +52,10 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
         raise CoarticError(f"{prefix!r} is the beginning of {len(folder_of)} runs: {some}")
     ((run_id, place),) = folder_of.items()
     with open_store(place) as store:
-        return place, store.run(run_id)
+        return store.run(run_id)
 
 
-def trajectory_of(folder: Path, run: Run) -> Trajectory:
+def trajectory_of(run: Run) -> Trajectory:
     """Return the solution of a run tick by tick. Raises CoarticError if the run has no solution, or
     none that can be executed."""
     if "solution" not in run.scores:
@@ -69,7 +68,7 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
             raise execution
         return trajectory(task, movements)
     except (SolutionError, ValueError) as error:
-        raise CoarticError(f"{folder}: run {run.id} cannot be shown: {error}") from None
+        raise CoarticError(f"run {run.id} cannot be shown: {error}") from None
 
 
 def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
@@ -79,21 +78,19 @@ def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[
 
 
 def perform_again(run: Run, registered: Registry) -> Run:
-    """Perform a stored run again with the present code.
+    """Perform a stored run again with the present code of its method.
 
-    Raises CoarticError if the method is unknown, or no longer takes the parameters of the run.
+    Raises CoarticError if the method no longer takes the parameters of the run.
     """
-    name = run.cell.method.name
-    if name not in registered:
-        raise CoarticError(unknown("method", name, registered))
+    method = registered[run.cell.method.name]
     try:
-        registered[name].complete(run.cell.parameters)
+        method.complete(run.cell.parameters)
     except CoarticError as error:
         version = plain(str((run.outcome.environment or {}).get("coartic")), 20)
         raise CoarticError(
             f"run {run.id} cannot be performed here: {error}. Version {version} of coartic made it."
         ) from None
-    cell = replace(run.cell, method=registered[name])
+    cell = replace(run.cell, method=method)
     return next(perform_in_order([replace(run.job, cell=cell)]))
 
 

@@ -37,7 +37,7 @@ _EXECUTORS = {
     "scheduler": "Dask(scheduler) of coartic.benchmarks.cluster",
 }
 """Options of ``coartic run`` that are executors in Python."""
-LEAST_BATCH = 8
+_LEAST_BATCH = 8
 """Most runs of a cell that are not divided among workers."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
@@ -292,7 +292,7 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         for first in range(0, len(job.numbers), size):
             yield replace(job, numbers=job.numbers[first : first + size])
 
-    share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), LEAST_BATCH)
+    share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), _LEAST_BATCH)
     parts: list[Job] = []
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
@@ -301,7 +301,7 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     even = len(parts) - len(parts) % workers
     ordered, last = parts[:even], parts[even:]
     for job in last:
-        ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), LEAST_BATCH))
+        ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), _LEAST_BATCH))
 
     def trials(job: Job) -> float:
         return trials_in(job.cell.parameters) * len(job.numbers) or math.inf

@@ -27,13 +27,12 @@ from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
-Scalar = bool | int | float | str
-Value = Scalar | tuple[float, ...]
+_Plain = bool | int | float | str | tuple[float, ...]
 TaskNamed = Callable[[str], Task]
 """A function that returns the task of a name or of a file."""
 
 
-def _plain_value(value: Any) -> Value:
+def _plain_value(value: Any) -> _Plain:
     """Return the value of a parameter. Raises an error for any other value."""
     numbers = value if isinstance(value, list | tuple) else [value]
     if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
@@ -47,7 +46,7 @@ def _plain_value(value: Any) -> Value:
 RunCount = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
 TrialCount = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
 Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
-_Value = Annotated[Value, PlainValidator(_plain_value)]
+_Value = Annotated[_Plain, PlainValidator(_plain_value)]
 _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
@@ -116,7 +115,7 @@ class Suite(FileData):
     """Blocks of tasks and methods: tables ``[[blocks]]``."""
 
 
-TAKEN_BY = {
+_TAKEN_BY = {
     "results folder": "coartic report {}",
     "suite": "coartic run {}",
     "task": "coartic run SUITE --tasks {}",
@@ -128,7 +127,7 @@ TAKEN_BY = {
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of a shipped suite or family, a file or a folder (:data:`TAKEN_BY`); empty
+    """Return the kind of a shipped suite or family, a file or a folder (:data:`_TAKEN_BY`); empty
     for any other name."""
     if name in suites():
         return "suite"
@@ -148,7 +147,7 @@ def check_kind(name: str, *kinds: str) -> None:
     which names the command for its kind."""
     kind = kind_of(name)
     if kind and kind not in kinds:
-        raise CoarticError(f"{name} is a {kind}: {TAKEN_BY[kind].format(quote(name))}")
+        raise CoarticError(f"{name} is a {kind}: {_TAKEN_BY[kind].format(quote(name))}")
 
 
 def suites() -> dict[str, Suite]:

@@ -50,7 +50,7 @@ def _options(
     pass
 
 
-class Command(TyperCommand):
+class _Command(TyperCommand):
     """A command whose help shows arguments by their names: without braces, which would look like a
     choice, and without types of Python."""
 
@@ -81,7 +81,7 @@ COMMANDS = (
 """The commands in the order of the help, each with the arguments of its example."""
 for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
-    app.command(name=name, cls=Command, epilog=f"Example: coartic {name} {example}")(command)
+    app.command(name=name, cls=_Command, epilog=f"Example: coartic {name} {example}")(command)
 
 
 def main() -> None:

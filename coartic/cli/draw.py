@@ -81,9 +81,9 @@ def animate(
         )
     movements = []
     for run_id in (run,) if other is None else (run, other):
-        place, found = find_run(run_id, folder)
-        movement, number = trajectory_of(place, found), found.number
-        title = f"{movement.task.label}\n{title_of(found.cell.method.name)}, run {number}"
+        found = find_run(run_id, folder)
+        movement = trajectory_of(found)
+        title = f"{movement.task.label}\n{title_of(found.cell.method.name)}, run {found.number}"
         movements.append((title, movement))
     if initial:
         on = movements[0][1].task

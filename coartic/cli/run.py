@@ -255,7 +255,7 @@ def reproduce(
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
 
-    _, run = find_run(run_id, folder)
+    run = find_run(run_id, folder)
     cell, registered = run.cell, registry(method_file or [])
     name, outcome, solution = cell.method.name, run.outcome, run.solution
     if name not in registered:

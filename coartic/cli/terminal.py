@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from coartic.benchmarks.runner import Progress
     from coartic.runs.plan import Cell
 
-READABLE = 24  # least width of a column of text, characters
+_READABLE = 24  # least width of a column of text, characters
 _ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\u202f": " ", "\xa0": " "}
 
 
-def replaced(error: UnicodeError) -> tuple[str, int]:
+def _replaced(error: UnicodeError) -> tuple[str, int]:
     """Return characters of ASCII for what a terminal lacks: - for a minus sign, ? for others."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
@@ -28,12 +28,12 @@ def replaced(error: UnicodeError) -> tuple[str, int]:
     return "".join(_ASCII.get(c, "?") for c in lacking), error.end
 
 
-codecs.register_error("replaced", replaced)
+codecs.register_error("replaced", _replaced)
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print lines; characters that do not print, such as line breaks in names, are replaced, and
-    those that the terminal lacks (:func:`replaced`)."""
+    those that the terminal lacks (:func:`_replaced`)."""
     stream = stream or sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
     text = "\n".join(map(one_line, lines)).encode(encoding, "replaced").decode(encoding)
@@ -52,7 +52,7 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
     """Print pairs of a word and a text, a pair a line; long texts are wrapped."""
     kept = list(pairs)
     indent = max((len(word) for word, _ in kept), default=0) + 2
-    width = max(shutil.get_terminal_size().columns, indent + READABLE)
+    width = max(shutil.get_terminal_size().columns, indent + _READABLE)
     for word, text in kept:
         together = text.replace(" %", "\xa0%")  # a number and its % stay on one line
         lines = textwrap.wrap(together, width - indent, break_on_hyphens=False) or [""]

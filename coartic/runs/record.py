@@ -32,7 +32,7 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """Prefixes of columns by the part of a run that they score: the solution, the first trial of a
 learner, and one noiseless greedy trial after learning."""
 PARTS = tuple(PREFIXES)
-MOST_MOVEMENTS = 10_000
+_MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
 MOST_STEPS = 1_000_000
 """Most movement steps of a solution through its targets in order; solutions of the paper's tasks
@@ -395,8 +395,8 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     """Return the error of a solution that would take too long to execute; None for a solution
     within the limits."""
-    if len(solution) > MOST_MOVEMENTS:
-        return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
+    if len(solution) > _MOST_MOVEMENTS:
+        return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
     corners = [task.q0]
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)

@@ -30,12 +30,9 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
         raise CoarticError(f"{path} cannot be read: install coartic again ({error})") from None
     if suite not in hashes:
         raise CoarticError(f"no results of suite {suite!r} are shipped, but of {', '.join(hashes)}")
-    try:
-        if hashlib.sha256(content).hexdigest() != hashes[suite]:
-            raise ValueError
-        return open_content(lzma.decompress(content), SHIPPED)
-    except (ValueError, lzma.LZMAError):
-        raise CoarticError(f"{path} is not as it was shipped: install coartic again") from None
+    if hashlib.sha256(content).hexdigest() != hashes[suite]:
+        raise CoarticError(f"{path} is not as it was shipped: install coartic again")
+    return open_content(lzma.decompress(content), SHIPPED)
 
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:

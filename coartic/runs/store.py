@@ -218,7 +218,7 @@ class Store:
             yield
             self._wait_for("COMMIT")
         except sqlite3.DatabaseError as error:
-            raise CoarticError(explain(self.folder / RUNS_FILE, error)) from None
+            raise CoarticError(_explain(self.folder / RUNS_FILE, error)) from None
         finally:
             if self._db.in_transaction:
                 self._db.rollback()
@@ -471,14 +471,14 @@ def open_store(folder: Path) -> Iterator[Store]:
             what = what if os.path.lexists(folder) else f"there is no folder {folder}"
             raise CoarticError(f"{what}{hint}") from None
         _check_files(folder)
-        opened = connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)
+        opened = _connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)
     with closing(opened) as connection:
         with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
             connection.execute("BEGIN")  # all reads of this block see one state
             if not _has_tables(connection):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
-            with lock(folder, shared=True):  # refused while a process writes
+            with _lock(folder, shared=True):  # refused while a process writes
                 pass
         yield Store(folder, connection)
 
@@ -486,7 +486,7 @@ def open_store(folder: Path) -> Iterator[Store]:
 @contextmanager
 def open_content(content: bytes, name: str) -> Iterator[Store]:
     """Open the content of a ``runs.sqlite`` in memory for reading; messages call it ``name``."""
-    with closing(connect(":memory:", WAIT_S)) as connection:
+    with closing(_connect(":memory:", WAIT_S)) as connection:
         connection.deserialize(content)
         yield Store(Path(name), connection)
 
@@ -505,10 +505,10 @@ def writing(folder: Path) -> Iterator[Store]:
                 f"{folder} is not empty and holds no results of coartic. Choose another folder."
             )
         make_folder(folder)
-    with lock(folder):
+    with _lock(folder):
         with explain_errors(folder):
             _check_files(folder)
-            opened = connect(str(folder / RUNS_FILE), WAIT_S)
+            opened = _connect(str(folder / RUNS_FILE), WAIT_S)
         with closing(opened) as connection:
             with explain_errors(folder):
                 is_there = _has_tables(connection)  # raises before anything is written
@@ -523,7 +523,7 @@ def writing(folder: Path) -> Iterator[Store]:
 
 
 @contextmanager
-def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
+def _lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
     """Lock a folder for this process, or share the lock with other readers. Systems and disks
     without such locks are left as they are.
 
@@ -556,7 +556,7 @@ def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
         os.close(opened)
 
 
-def connect(where: str, timeout_s: float) -> sqlite3.Connection:
+def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
     """Return a connection to a path or a ``file:`` address that waits ``timeout_s`` for a lock."""
     connection = sqlite3.connect(
         where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
@@ -616,7 +616,7 @@ def _has_tables(connection: sqlite3.Connection) -> bool:
     return True
 
 
-UNREADABLE = (
+_UNREADABLE = (
     *(OSError, sqlite3.DatabaseError, zlib.error),
     *(ValueError, LookupError, TypeError, OverflowError, RecursionError),
 )
@@ -629,8 +629,8 @@ def explain_errors(folder: Path) -> Iterator[None]:
     of the content of the file."""
     try:
         yield
-    except (CoarticError, *UNREADABLE) as error:
-        raise CoarticError(explain(folder / RUNS_FILE, error)) from None
+    except (CoarticError, *_UNREADABLE) as error:
+        raise CoarticError(_explain(folder / RUNS_FILE, error)) from None
 
 
 _BUSY = "another program has it open: close it there, or wait for it"
@@ -651,7 +651,7 @@ _SENTENCES = {
 """Sentences by SQLite's names of errors, or by the first two words of the names."""
 
 
-def explain(path: Path, error: Exception) -> str:
+def _explain(path: Path, error: Exception) -> str:
     """Return a sentence on a file that cannot be used."""
     said = plain(str(error), 200) or type(error).__name__
     if isinstance(error, CoarticError):
