@@ -170,10 +170,9 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    An interruption keeps finished runs; the next call performs the missing runs, also those that
-    waited without computing, of which it warns. Of each method of
-    a file, a run is made again after a run with another seed; if the results differ, or targets
-    may be meant in degrees, it warns.
+    An interruption keeps finished runs; the next call performs the missing runs, also runs that
+    waited without computing, of which it warns. One run of each method of a file is made again
+    after a run with another seed; it warns if the results differ, or if targets may be in degrees.
 
     Parameters
     ----------
