@@ -11,12 +11,7 @@ if TYPE_CHECKING:
     from coartic.benchmarks.planning import plan_suite
     from coartic.benchmarks.runner import Progress, perform, run_suite
 
-_MODULES = {
-    "Progress": "coartic.benchmarks.runner",
-    "perform": "coartic.benchmarks.runner",
-    "plan_suite": "coartic.benchmarks.planning",
-    "run_suite": "coartic.benchmarks.runner",
-}
 __all__ = ["Progress", "perform", "plan_suite", "run_suite"]
 
-__getattr__, __dir__ = lazy(__name__, _MODULES)
+_RUNNER = dict.fromkeys(("Progress", "perform", "run_suite"), "coartic.benchmarks.runner")
+__getattr__, __dir__ = lazy(__name__, _RUNNER | {"plan_suite": "coartic.benchmarks.planning"})
