@@ -29,7 +29,7 @@ import sys
 import zlib
 from collections.abc import Iterator
 from contextlib import closing
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -261,8 +261,7 @@ def _check_all(db: sqlite3.Connection) -> Report:
             task = tasks.get(row["cell"], "its cell is not there")
             need(not isinstance(task, str), task)
             _check_identity(row)
-            stored = _read_movements(db, row["number"])
-            parts = {part: [*map(_move_row, count(), stored[part])] for part in STATED}
+            parts, stored = _read_movements(db, row["number"])
             need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
             spent += sum(move.ticks for moves in parts.values() for move in moves)
             spent += row["trials"] or 0
@@ -274,7 +273,7 @@ def _check_all(db: sqlite3.Connection) -> Report:
                     close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
                     need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
             where = f"Run {run}"
-            content = json.dumps([row["status"], *chain(*stored.values())])
+            content = json.dumps([row["status"], *stored])
             result = hashlib.sha256(content.encode() + _check_rewards(row)).hexdigest()[:16]
             need(row["result"] == result, "a joint or a trial was changed")
         except Exception as problem:  # whatever keeps a run from being executed
@@ -373,27 +372,23 @@ def _check_rewards(row: Any) -> bytes:
     return content
 
 
-def _read_movements(db: sqlite3.Connection, run: int) -> dict[str, list[Any]]:
-    """The movements of a run as they are stored, by the solution that they belong to."""
-    parts: dict[str, list[Any]] = {part: [] for part in STATED}
+def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
+    """The movements of a run by the solution that they belong to, and all as they are stored."""
+    parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
+    stored: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
         WHERE result_id = ? ORDER BY "order\""""
-    for part, order, *facts in db.execute(query, [run]):
+    for part, order, goal, hand, kind, ticks, text in db.execute(query, [run]):
         need(order == len(parts[part]), f"movement {len(parts[part])} is missing")
-        parts[part].append([part, *facts])
-    return parts
-
-
-def _move_row(order: int, stored: list[Any]) -> MoveRow:
-    """A movement from its place in a solution and from what is stored of it."""
-    _, goal, hand, kind, ticks, text = stored
-    is_count = type(ticks) is int and 0 <= ticks <= MOST_TICKS
-    need(is_count, f"movement {order} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
-    need(len(text) <= LONGEST_PATH, f"movement {order} is too long")
-    points = np.array(json.loads(text), dtype=np.float64)
-    is_place = points.ndim == 1 + (kind == "path") and len(points)
-    need(is_place, f"movement {order}: {kind} has no such points")
-    return MoveRow(order, goal, hand, kind, ticks, np.atleast_2d(points))
+        which, is_count = f"movement {order}", type(ticks) is int and 0 <= ticks <= MOST_TICKS
+        need(is_count, f"{which} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
+        need(len(text) <= LONGEST_PATH, f"{which} is too long")
+        points = np.array(json.loads(text), dtype=np.float64)
+        is_place = points.ndim == 1 + (kind == "path") and len(points)
+        need(is_place, f"{which}: {kind} has no such points")
+        parts[part].append(MoveRow(order, goal, hand, kind, ticks, np.atleast_2d(points)))
+        stored[part].append([part, goal, hand, kind, ticks, text])
+    return parts, [*chain(*stored.values())]
 
 
 def main() -> int:

@@ -13,12 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Progress", "perform", "plan_suite", "run_suite"]
 
+_RUNNER = dict.fromkeys(("Progress", "perform", "run_suite"), "coartic.benchmarks.runner")
 __getattr__, __dir__ = import_lazily(
-    __name__,
-    {
-        "Progress": "coartic.benchmarks.runner",
-        "perform": "coartic.benchmarks.runner",
-        "plan_suite": "coartic.benchmarks.planning",
-        "run_suite": "coartic.benchmarks.runner",
-    },
+    __name__, _RUNNER | {"plan_suite": "coartic.benchmarks.planning"}
 )

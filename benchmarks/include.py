@@ -57,21 +57,23 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
             if name == SHIPPED:
                 sources[name] = stack.enter_context(open_shipped(plan[0].suite))
                 continue
-            if folder_named(name).resolve() == out.resolve():
+            folder = folder_named(name)
+            if folder.resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot include itself: choose another --out")
-            if not os.path.lexists(folder_named(name)):
-                message = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
-                raise CoarticError(message)
-            sources[name] = stack.enter_context(open_store(folder_named(name)))
+            if not os.path.lexists(folder):
+                raise CoarticError(
+                    f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
+                )
+            sources[name] = stack.enter_context(open_store(folder))
         joined = _join(plan, sources)
         target = stack.enter_context(writing(out))
-        begun = SHIPPED in sources and target.begin_as(sources[SHIPPED])
+        if SHIPPED in sources and target.begin_as(sources[SHIPPED]):
+            del sources[SHIPPED]  # all its runs are there
         with target.transaction():
             target.replace_plan(joined, made_with())
             origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
-                if not (begun and name == SHIPPED):  # it is a copy of them
-                    _copy_runs(name, source, target, origin)
+                _copy_runs(name, source, target, origin)
     return joined
 
 

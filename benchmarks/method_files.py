@@ -13,7 +13,7 @@ import json
 import multiprocessing
 import re
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
@@ -40,7 +40,7 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """
     try:
         pipe, theirs = multiprocessing.Pipe()
-        answers = theirs, str(path), shown
+        answers = theirs, path, shown
         process = CONTEXT.Process(target=_answer_questions, args=answers, daemon=True)
         start_process(process)
     except (OSError, EOFError) as error:  # EOFError: its server was killed
@@ -76,7 +76,7 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     return ask
 
 
-def _answer_questions(pipe: Any, path: str, shown: str) -> None:
+def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
     """Answer questions until the pipe is closed."""
     begin_worker()
     methods: dict[str, type[Method]] = {}
@@ -89,7 +89,7 @@ def _answer_questions(pipe: Any, path: str, shown: str) -> None:
             content: Any
             if question == "methods":
                 try:
-                    module = load_file(Path(path))
+                    module = load_file(path)
                 except BaseException as error:
                     why = f"{shown}: cannot be imported: {error_line(error)}"
                     raise CoarticError(why) from None
@@ -107,17 +107,14 @@ def _answer_questions(pipe: Any, path: str, shown: str) -> None:
 
 
 def _methods_of_module(
-    module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
+    module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
     """Yield the infos of a module's methods, with their code. Raises CoarticError if the module
     defines no method."""
-    methods = list(methods)
     for method in methods:
         check_declaration(method, origin)
-        file = Path(inspect.getfile(module))
-        data = tuple(file.parent / name for name in method.files)
         try:
-            code = code_of(file, data)
+            code = code_of(file, tuple(file.parent / name for name in method.files))
         except OSError as error:
             raise CoarticError(
                 f"{origin}: method {method.name!r} declares a file that cannot be read: "
@@ -127,7 +124,7 @@ def _methods_of_module(
             raise CoarticError(
                 f"{origin}: it imports what is no Python: {error_line(error)}"
             ) from None
-        yield method_info(method, origin, where, code)
+        yield method_info(method, origin, str(file), code)
     if not methods:
         unfinished = [
             f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from itertools import groupby
 from typing import Any
 
 
@@ -50,14 +51,13 @@ def _fields_of(node: ast.AST) -> dict[str, Any]:
     return fields
 
 
-def _joined(parts: list[ast.expr]) -> list[ast.expr]:
+def _joined(parts: list[Any]) -> list[ast.expr]:
     """Return the parts of an f-string with neighbouring texts as one text: Python divides them
     differently since version 3.12."""
     together: list[ast.expr] = []
-    for part in parts:
-        last = together[-1] if together else None
-        if isinstance(part, ast.Constant) and isinstance(last, ast.Constant):
-            together[-1] = ast.Constant(str(last.value) + str(part.value))
-        elif not isinstance(part, ast.Constant) or part.value:
-            together.append(part)
+    for is_text, some in groupby(parts, lambda part: isinstance(part, ast.Constant)):
+        if not is_text:
+            together += some
+        elif text := "".join(str(part.value) for part in some):
+            together.append(ast.Constant(text))
     return together
