@@ -23,7 +23,13 @@ from coartic.benchmarks.suites import (
     load_suite,
     tasks_of,
 )
-from coartic.internal.limits import MOST_CELLS, MOST_SEED, MOST_TRIALS, number_or_range
+from coartic.internal.limits import (
+    MOST_CELLS,
+    MOST_RUNS,
+    MOST_SEED,
+    MOST_TRIALS,
+    check_limits,
+)
 from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain_inline, sentence_error
 from coartic.runs.method_info import MethodInfo
@@ -41,11 +47,16 @@ def _task_or_name(value: Any) -> Task | str:
 
 def _runs_asked(value: Any) -> int | range | None:
     """Return a number of runs, a range of runs, or None."""
+    is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
+    first, last = (value.start, value.stop) if is_range else (0, value)
     try:
-        example = "range(50, 100), or 50..99 in a command"
-        return None if value is None else number_or_range("runs", value, example)
+        if value is not None:
+            check_limits("runs", last, 1, MOST_RUNS)
+            check_limits("its first run", first, 0, MOST_RUNS)
     except ValueError as error:
-        raise sentence_error(str(error)) from None
+        example = "range(50, 100), or 50..99 in a command"
+        raise sentence_error(f"{error}, or a range, such as {example}") from None
+    return value if is_range or value is None else int(value)
 
 
 _Tasks = tuple[Annotated[Any, PlainValidator(_task_or_name)], ...]

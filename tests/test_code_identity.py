@@ -78,7 +78,7 @@ def test_a_number_counts_where_it_is_executed(after, place, methods):
 
 
 def test_words_for_readers_and_type_checkers_do_not_count(after):
-    assert not after("motion/trial.py", b"Arguments are not checked.", b"No check is made.")
+    assert not after("motion/trial.py", b"Let N arms reach", b"Have N arms reach")
     type_checking, imports = b"if TYPE_CHECKING:\n", b"if TYPE_CHECKING:\n    import this\n"
     assert not after("learner/conditions.py", type_checking, imports)
 

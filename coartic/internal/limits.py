@@ -42,19 +42,6 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
         )
 
 
-def number_or_range(name: str, value: Any, example: str) -> int | range:
-    """Return a number of runs, or a range of runs. Raises ValueError, with the ``example`` of a
-    range, for anything else."""
-    is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
-    first, last = (value.start, value.stop) if is_range else (0, value)
-    try:
-        check_limits(name, last, 1, MOST_RUNS)
-        check_limits("its first run", first, 0, MOST_RUNS)
-    except ValueError as error:
-        raise ValueError(f"{error}, or a range, such as {example}") from None
-    return value if is_range else int(value)
-
-
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
     """Numbers as an array of the shape that they have. Raises ValueError for anything else, and
     for masked entries, under which an array holds numbers that do not count."""

@@ -147,7 +147,8 @@ def trials_in_c(task: Task, hands: str, targets: Array) -> dict[str, Callable[[]
     def make(bounds: bool) -> Array:
         pointers = [ctypes.c_void_p(each.ctypes.data) for each in arrays]
         ctypes.CDLL(str(library)).trials(
-            *map(ctypes.c_long, targets.shape), *pointers, in_c, ctypes.byref(constants), bounds, ctypes.c_void_p(ticks.ctypes.data),
+            *map(ctypes.c_long, targets.shape), *pointers, in_c,
+            ctypes.byref(constants), bounds, ctypes.c_void_p(ticks.ctypes.data),
         )  # fmt: skip
         return ticks
 
