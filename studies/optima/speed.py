@@ -21,10 +21,9 @@ def fastest_hand(task, hand):
     """Return the largest norm of the hand's Jacobian: its path per joint-space path, length unit.
 
     The column of a joint is at right angles to its lever, which is no longer than the links beyond
-    it; a base that moves has the unit vectors as its columns. The square of the norm is the largest
-    eigenvalue of J Jᵀ, a sum of the columns' dyads, and so at most 1, where the base moves at all,
-    plus the sum of the squared levers. A straight arm at right angles to a free axis has just that.
-    Source: Craig (2004), the Jacobian of a planar chain.
+    it (Craig 2004); a base that moves has unit vectors as its columns. The square of the norm is
+    the largest eigenvalue of J Jᵀ, and so at most 1, where the base moves at all, plus the sum of
+    the squared levers, which a straight arm at right angles to a free axis has.
     """
     levers = np.cumsum(task.robot.arm(hand).links[::-1])
     return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
