@@ -3,9 +3,8 @@
     coartic run studies/human/suite.toml
     python studies/human/study.py results/human
 
-writes results.csv, effects.csv, figure.svg and the page, README.md; without a folder figure and
-page, of the stored tables. human.toml has the findings, the models and how verdicts are made,
-models.py the runs of each model, measures.py what is measured. The findings are in place of claims.
+human.toml has the findings, in place of claims, the models and how verdicts are made; models.py the
+runs of each model, measures.py what is measured.
 """
 
 import sys
