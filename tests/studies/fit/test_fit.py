@@ -15,9 +15,8 @@ from tests.support.processes import program
 from tests.support.strategies import metres_task
 
 FOLDER = Path(__file__).parents[3] / "studies" / "fit"
-PROTOCOLS, FIT, STUDY, FOREIGN, PLAIN = (
-    program(FOLDER / f"{name}.py")
-    for name in ("protocols", "fit", "study", "foreign", "plain_person")
+PROTOCOLS, FIT, STUDY, PLAIN = (
+    program(FOLDER / f"{name}.py") for name in ("protocols", "fit", "study", "plain_person")
 )
 TASK = load_task("two-armed-1")
 
@@ -137,7 +136,7 @@ def test_an_arm_without_a_null_space_is_refused_before_any_fit():
     ("model", "noise"), [("averages", 0.0), ("recent", 0.02), ("by goal", 0.0), ("decays", 0.02)]
 )
 def test_people_of_other_models_are_none_of_the_six(model, noise):
-    people = FOREIGN.simulate_foreign(TASK, model, 0.04, 0.3, seed=1, trials=100)
+    people = PROTOCOLS.simulate(TASK, model, 0.04, 0.3, seeds=[1], trials=100)
     joints = [*TASK.robot.joint_names]
     people[joints] += noise * np.random.default_rng(1).standard_normal((len(people), len(joints)))
     fitted = FIT.fit(people, TASK, noise=noise).iloc[0]
@@ -185,5 +184,5 @@ def test_tables_count_whom_the_fit_recovers():
     answers = STUDY.answer(hundred)
     assert answers.to_numpy().sum() == len(people) == 22
     assert answers.none.sum() == (people.misfit.fillna("") != "").sum() >= 4
-    assert answers[~answers.index.str.contains("|".join(FOREIGN.FOREIGN))].none.sum() <= 1
+    assert answers[~answers.index.str.contains("|".join(PROTOCOLS.FOREIGN))].none.sum() <= 1
     assert STUDY.outliers(hundred).people.tolist() == [6]
