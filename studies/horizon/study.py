@@ -3,14 +3,10 @@
     coartic run studies/horizon/suite.toml
     python studies/horizon/study.py results/horizon
 
-writes results.csv, signatures.csv, gains.csv, movements.csv, claims.csv, repeats.csv, figure.svg
-and the page, README.md; without a folder figure and page, of the stored tables.
-
-Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims are
-judged by the mean over the repeats of a task, and again without the task that speaks most for them;
-tables and figure are of these means, and repeats.csv judges each repeat alone. The rule was written
-before the repeats were run, with what we expect: no verdict changes, and the fourth goal's gain
-stays undecided.
+Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims,
+tables and figure are of the mean over the repeats of a task; repeats.csv judges each repeat alone.
+The rule was written before the repeats were run, with what we expect: no verdict changes, and the
+fourth goal's gain stays undecided.
 """
 
 import sys

@@ -46,14 +46,9 @@ def soonest(task, hands, last, cost):
     """Return when the last of these goals is hit at the soonest.
 
     A goal is hit no earlier than the goal before it, nor than ``cost(hand, last, goal)`` after the
-    goal that the same hand hit last.
-
-    Parameters
-    ----------
-    hands : list of tuple
-        Goal (0-based) and its hand, None if it is undecided; in the order of goals.
-    last : dict
-        Goal that each hand of the task hit last: -1 at the start, None if it may be anywhere.
+    goal that the same hand hit last. ``hands``: goals with their hand, None if it is undecided;
+    ``last``: the goal that each hand of the task hit last, -1 at the start, None if it may be
+    anywhere.
     """
     # When each hand hit its last goal, of all that may be the soonest in the end.
     times = {tuple(last.values()): {(0.0,) * len(last)}}
@@ -95,17 +90,11 @@ def least_ticks(task, hands=None):
 
 
 def spans_of(task, hands):
-    """Return spans of goals, and the least path within each.
+    """Return spans of goals, shape ``(spans, G)``, 1 within and else 0, and the least path within
+    each, length unit.
 
     A span ends at a decided goal and begins after the goal that its hand hit before. Spans of the
     undecided goals at the end begin after the last decided goal, where the other hand is anywhere.
-
-    Returns
-    -------
-    spans : array, shape ``(spans, G)``
-        1 for each goal of a span, else 0.
-    paths : array, shape ``(spans,)``
-        Length unit.
     """
     goals, last = len(hands), dict.fromkeys(task.hands, -1)
     spans = []  # first and last goal, least path

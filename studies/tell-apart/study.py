@@ -1,13 +1,7 @@
 """Measure which experiment would distinguish trial and error from planning.
 
-    python studies/tell-apart/protocols.py results/tell-apart
-    python studies/tell-apart/study.py results/tell-apart
-
-writes the protocols' rows (changes.csv, starts.csv, steps.csv), results.csv, power.csv, claims.csv,
-figure.svg and the page, README.md; without a folder figure and page, of the stored tables.
-
-All predictions with their rules are in :func:`judge_claims`, committed before the test instances
-were run.
+python studies/tell-apart/protocols.py results/tell-apart
+python studies/tell-apart/study.py results/tell-apart
 """
 
 import sys
@@ -41,6 +35,11 @@ def share_by_task(changes):
     )  # fmt: skip
 
 
+def with_ratio(starts):
+    """Add the logarithm of the distance between groups over that within."""
+    return starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
+
+
 def tabulate(changes, starts, steps):
     """Means over tasks with intervals, a row for each measure of a model.
 
@@ -61,8 +60,7 @@ def tabulate(changes, starts, steps):
     })  # fmt: skip
     tables = [means(shares, ["distance", "model"], columns)
               .merge(more, left_on=["distance", "model"], right_index=True)]  # fmt: skip
-    starts = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
-    tables.append(means(starts, ["model", "trials"], ["ratio"]))
+    tables.append(means(with_ratio(starts), ["model", "trials"], ["ratio"]))
     tables.append(means(steps.groupby(["model", "task"], sort=False).mean(numeric_only=True)
                         .reset_index(), ["model"], ["same", "kept", "records"]))  # fmt: skip
     names = "change {0.distance:g} {0.model}", "start {0.model} {0.trials}", "step {0.model}"
@@ -72,15 +70,12 @@ def tabulate(changes, starts, steps):
 
 
 def judge_claims(changes, starts, steps):
-    """The predictions, each with its rule, judged on random tasks: the paper's were seen before.
-
-    A mean on the other side of its bound counts against a prediction.
-    """
+    """Judge the predictions, committed before any test instance was run, on random tasks: those of
+    the paper were seen before."""
     changes, starts, steps = (raw[raw.task.str.contains("/")] for raw in (changes, starts, steps))
     shares = share_by_task(changes)
     shares = shares[shares.distance == 0.5].pivot(index="task", columns="model")  # noqa: PD010
-    ratio = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
-    ratio = ratio.pivot_table("ratio", "task", ["model", "trials"])
+    ratio = with_ratio(starts).pivot_table("ratio", "task", ["model", "trials"])
     same, kept = (steps.pivot_table(name, "task", "model") for name in ("same", "kept"))
     rule = "one-tailed bootstrap test over test tasks, goals moved by half a link: "
     return judge({
