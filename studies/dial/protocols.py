@@ -17,14 +17,7 @@ import numpy as np
 from settings import AFTER, FAMILIES, FEW, LONG, RUNS, SETTINGS, TRIALS, base_of
 from shifts import SHIFT_COLUMNS, SHIFT_TASKS, run_shifts
 
-from coartic import (
-    MethodError,
-    corrective_trial,
-    execute,
-    learn_many,
-    load_task,
-    objective,
-)
+from coartic import MethodError, corrective_trial, execute, learn_many, load_task, objective
 from coartic.baselines.cma_es import CMAES
 from coartic.baselines.posture_based import TwoGoals
 from coartic.baselines.trajectory_optimisation import PathLength

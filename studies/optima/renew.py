@@ -44,8 +44,8 @@ def take_over(study, known):
     for key, group in runs.groupby(["task", "base", "other_arm"]):
         name, base, other_arm = map(str, key)
         before, best = known.get((name, base, other_arm), {}), group.loc[group.reward.idxmax()]
-        is_no_better = before.get("reward") is not None and before["reward"] >= best.reward
-        if is_no_better or not ships(study.tasks[name], (base, other_arm)):
+        is_better = before.get("reward") is None or best.reward > before["reward"]
+        if not is_better or not ships(study.tasks[name], (base, other_arm)):
             continue
         task, made_with = load_task(name), study.made_with
         known[name, base, other_arm] = {

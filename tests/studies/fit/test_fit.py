@@ -104,24 +104,24 @@ def test_lost_trials_and_hits_are_counted(people):
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
     fitted = FIT.fit(kept, TASK).iloc[0]
     assert (fitted.trials, fitted.lost, fitted.missing) == (60, 2, 2)
-    with pytest.warns(UserWarning, match="subject 0 is left out: .* two trials"):
-        assert not len(FIT.fit(first[first.trial == 1], TASK))
     with pytest.raises(CoarticError, match="EC1 does not use the left hand"):
         FIT.fit(first, TASK, condition=CONDITIONS["EC1"])
 
 
-@pytest.mark.parametrize("why", ["two trials", "postures are equal", "take 400 ticks, as by a met"])
+DEGENERATE = {
+    "two trials": lambda hits: hits[hits.trial == 1],
+    "postures are equal": lambda hits: pd.concat(
+        [hits[hits.trial == 1].assign(trial=n) for n in range(1, 31)], ignore_index=True
+    ),
+    "take 400 ticks, as by a met": lambda hits: hits.assign(ticks=100),
+}
+
+
+@pytest.mark.parametrize("why", DEGENERATE)
 def test_degenerate_trials_are_left_out_with_the_reason(people, why):
-    first = people[people.subject == 0]
-    if why == "two trials":
-        frame = first[first.trial == 1]
-    elif why == "postures are equal":
-        same = [first[first.trial == 1].assign(trial=n) for n in range(1, 31)]
-        frame = pd.concat(same, ignore_index=True)
-    else:
-        frame = first.assign(ticks=100)
+    hits = DEGENERATE[why](people[people.subject == 0])
     with pytest.warns(UserWarning, match=f"subject 0 is left out: .*{why}"):
-        assert not len(FIT.fit(frame, TASK))
+        assert not len(FIT.fit(hits, TASK))
 
 
 def test_an_arm_without_a_null_space_is_refused_before_any_fit():
