@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import CONDITIONS, execute
+from coartic.analysis.signatures.two_contexts import movable
 from coartic.baselines.posture_based import TwoGoals
 from coartic.method import run_method
 from coartic.motion.trial import reach_goals
@@ -49,9 +50,8 @@ def condition_for(task):
 def explored_by(task, condition):
     """Return the joints that the condition explores, bool, shape ``(2, dof)``, by chosen hand."""
     masks = np.zeros((2, task.robot.dof), bool)
-    masks[:, :2] = condition.modify_chosen & np.array([k not in task.locked_base for k in "xy"])
     for chosen, hand in enumerate(HANDS):
-        masks[chosen, task.robot.joints(hand)] = condition.modify_chosen
+        masks[chosen, movable(task, hand)] = condition.modify_chosen
         masks[chosen, task.robot.joints(HANDS[1 - chosen])] = condition.modify_other
     return masks
 

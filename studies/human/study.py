@@ -20,6 +20,7 @@ from measures import MEASURES
 
 from coartic import trajectory
 from coartic.analysis import figures, load, write_study
+from coartic.estimates import Estimate
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
@@ -111,31 +112,27 @@ def judge_test(measured, model, test, level, silent):
     name, (side, word) = test["measure"], (1, "above") if "above" in test else (-1, "below")
     bound, statistic = test[word], MEASURES[name][1]
     values = pd.Series() if silent else measured(name, model)
-    value, low, high, tasks = bootstrap([values], statistic, level)
-    near, far = sorted([side * low, side * high])
+    seen, over = bootstrap([values], statistic, level), Estimate(np.nan)
+    near, far = sorted([side * seen.low, side * seen.high])
     agrees, disagrees = near > side * bound, far < side * test.get("disagree", bound)
-    verdict, because, over = "undecided", silent, [np.nan] * 3
+    verdict, because, tasks = "undecided", silent, seen.n[0]
     if not tasks:
         verdict = "silent" if silent else "no cases"
     elif tasks >= FEWEST_TASKS and agrees != disagrees:
         verdict = "agrees" if agrees else "disagrees"
     if tasks and model in GROUPS["picked from trials"]:
-        both = [values, measured(name, "random search")]
-        *over, common = bootstrap(both, statistic, level)
-        exceeds = min(side * over[1], side * over[2]) > 0 and common >= FEWEST_TASKS
+        over = bootstrap([values, measured(name, "random search")], statistic, level)
+        exceeds = min(side * over.low, side * over.high) > 0 and over.n[0] >= FEWEST_TASKS
         if verdict == "agrees" and not exceeds:
             verdict, because = "undecided", "it is not shown to exceed random search"
     return {
-        "measure": name, "bound": f"{word} {bound:g}",
-        "value": value, "value_low": low, "value_high": high, "tasks": tasks,
-        "over_random_search": over[0],
-        "over_random_search_low": over[1], "over_random_search_high": over[2],
-        "of_test": verdict, "because": because,
+        "measure": name, "bound": f"{word} {bound:g}", **seen.columns("value"), "tasks": tasks,
+        **over.columns("over_random_search"), "of_test": verdict, "because": because,
     }  # fmt: skip
 
 
 def bootstrap(sides, statistic, level):
-    """A statistic of all tasks, the ends of its interval over tasks, and their number.
+    """Return a statistic of all tasks with its interval over tasks, and their number.
 
     ``sides``: values by task; of two, the statistic of the first less that of the second, on the
     tasks that both have. Percentiles, wider by √(k / (k − 1)) for k tasks, by which resamples fall
@@ -151,12 +148,12 @@ def bootstrap(sides, statistic, level):
 
     value = difference(range(count)) if count else np.nan
     if count < 2:
-        return value, np.nan, np.nan, count
+        return Estimate(value, n=(count,))
     drawn = np.random.default_rng(0).integers(count, size=(RESAMPLES, count))
     different, which = np.unique(drawn, axis=0, return_inverse=True)
     values = np.array([*map(difference, different)])[which.ravel()]
     away = (values - value) * np.sqrt(count / (count - 1))
-    return value, *(value + np.quantile(away, [level / 2, 1 - level / 2])), count
+    return Estimate(value, *(value + np.quantile(away, [level / 2, 1 - level / 2])), n=(count,))
 
 
 def verdict_of(tests):
