@@ -78,8 +78,8 @@ def tabulate(study, runs):
 
 def tabulate_posture_difference(study, runs):
     """Tabulate the posture difference (length unit and rad mixed) at the goal that two tasks of the
-    paper share, by γ, with p of the permutation test that there is none, and p of the test that it
-    is no larger than in random search (``beyond_p``)."""
+    paper share, by γ, with p of a permutation test against no difference, and of a test against
+    the difference of random search (``beyond_p``)."""
     rows = {}
     first = runs[runs.task == SHARED[0]].groupby("kind").first()
     labels = (first.method + " " + first.setting).str.strip()

@@ -1,4 +1,4 @@
-"""What a model aims at before each hit, given the trials before it, and where the movement lands.
+"""Find what a model aims at before each hit, given earlier trials, and where the movement lands.
 
 Rewards and postures determine the learner's tables Q and q*, hence the hand of highest value and
 the target t + κ N(t) (p − t), which lands in a posture L(κ): the package's kernel finds it, because

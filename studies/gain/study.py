@@ -1,4 +1,4 @@
-"""How much coarticulation belongs to a gain, and does it matter who gains?
+"""Measure how much coarticulation belongs to a gain, and whether it matters who gains.
 
     coartic run studies/gain/suite.toml --out results/gain
     python studies/gain/study.py results/gain

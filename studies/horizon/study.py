@@ -78,8 +78,8 @@ def tabulate(study, plans):
 
 
 def tabulate_movements(gains):
-    """What the last goal in view gains, in per cent of a movement that has it ahead, as in study
-    fourteen: all tasks that have it, by number of goals, and tasks with five goals or more."""
+    """Tabulate the gain of the last goal in view, in per cent of a movement that has it ahead, over
+    all tasks that have it, by number of goals, and over tasks with five goals or more."""
     h = gains.h[(gains.h > 0) & (gains.h <= 4)]
     gains = gains.loc[h.index].assign(gain=100 * gains.gain * gains.goals / (gains.goals - h))
     count = gains.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")

@@ -29,7 +29,7 @@ TENTHS = 10
 
 
 def no_trial_fails(read, cells):
-    """Count the trials of the learner that miss a goal; the claim is that there are none."""
+    """Count the trials of the learner that miss a goal; the claim is that no trial does."""
     trials = failed = 0
     for task, label in cells:
         runs = read.runs(task, label)

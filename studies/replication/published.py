@@ -55,7 +55,7 @@ def published_cell(task, condition):
     """Return the published rewards of a cell by hand sequence, and of all runs under ``""``.
 
     The paper has rewards by hand sequence for some cells, and hands alone for one. None for a cell
-    of which it says nothing.
+    that it does not mention.
     """
     entries = {
         (entry["kind"], entry.get("hands", "")): entry

@@ -1,4 +1,4 @@
-"""What of Shah, Barto & Fagg (2013) comes out again?
+"""Judge what of Shah, Barto & Fagg (2013) replicates.
 
     coartic run comparison --out results/comparison
     python studies/replication/study.py results/comparison [FOLDER ...] [--out FOLDER]
