@@ -17,14 +17,7 @@ import numpy as np
 from settings import AFTER, FAMILIES, FEW, LONG, RUNS, SETTINGS, TRIALS, base_of
 from shifts import SHIFT_COLUMNS, SHIFT_TASKS, run_shifts
 
-from coartic import (
-    MethodError,
-    corrective_trial,
-    execute,
-    learn_many,
-    load_task,
-    objective,
-)
+from coartic import MethodError, corrective_trial, execute, learn_many, load_task, objective
 from coartic.baselines.cma_es import CMAES
 from coartic.baselines.posture_based import TwoGoals
 from coartic.baselines.trajectory_optimisation import PathLength
@@ -36,6 +29,8 @@ COLUMNS = [
     "task", "family", "setting", "run", "corrective_best", "best_known",
     *(f"reward_{trials}" for trials in AFTER), "quarter", "half", "first", "hands",
 ]  # fmt: skip
+MISSED = -(10**9)
+"""Reward of a trial that misses a goal: less than any other."""
 OTHERS = {
     "CMA-ES": (CMAES, RUNS),
     "posture planning": (TwoGoals, 1),
@@ -47,29 +42,36 @@ OTHERS = {
 def run_task(name):
     """Run every setting on a task; rows of :data:`COLUMNS`."""
     task, rows = load_task(name), []
-    one_armed, base = len(task.hands) == 1, base_of(task)
-    start, best_known = span_of(task)
     for setting, fields in SETTINGS.items():
-        if one_armed and setting in ("hands", "all"):
+        if len(task.hands) == 1:
             fields = {key: value for key, value in fields.items() if key != "hand_exploration"}
+        condition = replace(base_of(task), **fields)
         trials = TRIALS if setting in LONG else FEW
-        runs = learn_many(task, replace(base, **fields), seeds=range(RUNS), trials=trials, jobs=1)
+        runs = learn_many(task, condition, seeds=range(RUNS), trials=trials, jobs=1)
         for number, run in enumerate(runs):
-            best = np.maximum.accumulate(run.rewards.filled(-(10**9)))
-            reached = trials_to_shares(best, start, best_known)
-            reached[reached > trials] = np.inf if trials == TRIALS else np.nan
-            done = run.execute()
+            done, first = run.execute(), np.nan
             alone = corrective_trial(task, done.hands)
-            first = np.nan
             if alone.completed:
                 first = done.ticks_by_goal()[0] - alone.ticks_by_goal()[0]
-            after = [int(best[n - 1]) if n <= trials else "" for n in AFTER]
-            family = name.partition("/")[0]
-            rows.append([
-                name, family, setting, number, start, best_known, *after, *reached, first,
-                done.hands,
-            ])  # fmt: skip
+            rewards = run.rewards.filled(MISSED)
+            rows.append(row_of(task, setting, number, rewards, first, done.hands))
     return rows
+
+
+def row_of(task, setting, number, rewards, first, hands):
+    """Return a row of :data:`COLUMNS`.
+
+    ``quarter`` and ``half``: trials until the best reward so far is this share of the way from the
+    corrective process alone to the best known reward; infinite if it never is in all trials.
+    """
+    start, best_known = span_of(task)
+    best, trials = np.maximum.accumulate(rewards), len(rewards)
+    targets = [np.ceil(start + share * (best_known - start)) for share in (0.25, 0.5)]
+    reached = np.searchsorted(best, targets) + 1.0
+    reached[reached > trials] = np.inf if trials == TRIALS else np.nan
+    after = [int(best[n - 1]) if n <= trials else "" for n in AFTER]
+    family = task.name.partition("/")[0]
+    return [task.name, family, setting, number, start, best_known, *after, *reached, first, hands]
 
 
 def span_of(task):
@@ -79,37 +81,23 @@ def span_of(task):
     return -int(problem.best_cost), -problem.best_known
 
 
-def trials_to_shares(best, start, best_known):
-    """Return the trials until the best reward so far is a quarter and half of the way from a first
-    reward to the best known, one more than all where it never is."""
-    targets = [np.ceil(start + share * (best_known - start)) for share in (0.25, 0.5)]
-    return np.searchsorted(best, targets) + 1.0
-
-
 def run_others(name):
     """Run the other methods on a task; rows of :data:`COLUMNS`.
 
     A planner makes no trial: its plan is executed once. A method that fails gains nothing.
     """
     task, rows = load_task(name), []
-    start, best_known = span_of(task)
     for setting, (method, runs) in OTHERS.items():
         for number in range(runs):
             try:
                 result, session = run_method(method(), task, number)
                 done = execute(task, result.solution)
-                rewards, hands = session.rewards or [done.reward] * TRIALS, done.hands
+                rewards, hands = session.rewards or [done.reward], done.hands
             except MethodError:
-                rewards, hands = [start] * TRIALS, ""
-            best = np.maximum.accumulate([-(10**9) if r is None else r for r in rewards])
-            best = np.append(best, [best[-1]] * (TRIALS - len(best)))
-            reached = trials_to_shares(best, start, best_known)
-            reached[reached > TRIALS] = np.inf
-            after = [int(best[n - 1]) for n in AFTER]
-            family = name.partition("/")[0]
-            rows.append([
-                name, family, setting, number, start, best_known, *after, *reached, np.nan, hands
-            ])  # fmt: skip
+                rewards, hands = [span_of(task)[0]], ""
+            every = np.full(TRIALS, MISSED)
+            every[: len(rewards)] = [MISSED if reward is None else reward for reward in rewards]
+            rows.append(row_of(task, setting, number, every, np.nan, hands))
     return rows
 
 

@@ -3,9 +3,6 @@
     python studies/dial/protocols.py results/dial
     python studies/dial/study.py results/dial
 
-writes results.csv, claims.csv, shifts.csv, shift_claims.csv, figure.svg and the page, README.md;
-without a folder figure and page, of the stored tables.
-
 The *gain* of a run is the share of the way from the corrective process alone, with its best hands,
 to the best known reward.
 """
@@ -73,9 +70,8 @@ def judge_claims(runs):
         return rows.groupby("task")[column].mean().dropna()
 
     def in_each(sentence, compare, bound=0.0, families=FAMILIES):
-        return all_of(
-            *(mean_beyond(f"{family}: {sentence}", compare(family), bound) for family in families)
-        )
+        return all_of(*(mean_beyond(f"{family}: {sentence}", compare(family), bound)
+                        for family in families))  # fmt: skip
 
     def more(first, second, column="gain_100"):
         return lambda family: of(first, column, family) - of(second, column, family)
@@ -106,8 +102,7 @@ def judge_claims(runs):
             f"{how}after 100 trials: what κ = 0.3 adds is more than twice what β = 0.05 adds"
             "; refuted where it brings more than half",
             in_each("{} points more than twice the pull's", lambda family:
-                    of(INFORMED, "gain_100", family) - of(PAPER, "gain_100", family)
-                    - 2 * (of("correction", "gain_100", family) - of(PAPER, "gain_100", family))),
+                    more(INFORMED, PAPER)(family) - 2 * more("correction", PAPER)(family)),
         ),
         "planning-alone-is-short-sighted": (
             "κ = 1 gains more in the end with noise of 0.01 than without noise, in every family.",
@@ -202,16 +197,11 @@ def measure(folder):
     is_first = ~others.family.isin(FAMILIES) | (others.task.str[-3:] < "010")
     runs = measure_runs(pd.concat([runs, others[is_first]], ignore_index=True))
     shifts = measure_shifts(pd.read_csv(Path(folder) / "shifts.csv"))
+    by_task = runs.groupby(["task", "setting"], sort=False)
+    numbers = [f"{name}_{n}" for name in ("reward", "gain") for n in AFTER]
     return {
         "results": tabulate(runs),
-        "by_task": runs.groupby(["task", "setting"], sort=False)[
-            [
-                *(f"reward_{n}" for n in AFTER),
-                *(f"gain_{n}" for n in AFTER),
-            ]
-        ]
-        .mean()
-        .join(runs.groupby(["task", "setting"]).size().rename("n")),
+        "by_task": by_task[numbers].mean().join(by_task.size().rename("n")),
         "claims": judge_claims(runs),
         "shifts": tabulate_shifts(shifts),
         "shift_claims": judge_shifts(shifts),

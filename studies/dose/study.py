@@ -1,10 +1,7 @@
 """Measure how much of the reward for the whole task coarticulation needs.
 
-    coartic run studies/dose/suite.toml
-    python studies/dose/study.py results/dose
-
-writes results.csv, claims.csv, figure.svg and the page, README.md; without a folder figure and
-page, of the stored tables.
+coartic run studies/dose/suite.toml
+python studies/dose/study.py results/dose
 """
 
 import sys
@@ -26,7 +23,6 @@ from coartic.analysis import (
 )  # fmt: skip
 
 RANDOM_SEARCH = "random-search"
-"""The best of random targets, which selects its solution and learns nothing."""
 KEYS = ["group", "counted", "dose"]
 MEASURES = {
     "nearer": "next goal nearer (ticks)",
@@ -43,22 +39,23 @@ GAIN = 1.0
 
 
 def measure_runs(study):
-    """Solved runs with what they learned, a row a run; that of random search with what they
-    selected.
+    """Return the solved runs with what their noiseless replays show, or the solution that random
+    search selected.
 
     ``group``: the family, or the task of the paper. ``counted``: the movements whose rewards count.
-    ``dose``: the factor γ. ``kind``: both in words. What was learned is judged by the noiseless
-    replay.
+    ``dose``: the factor γ. ``kind``: both in words.
     """
-    random_search = study.runs.method == RANDOM_SEARCH
+    learns = study.runs.method != RANDOM_SEARCH
+    nearer, first = (
+        study.signature(name, replay=True).where(learns, study.signature(name))
+        for name in ("arm", "first")
+    )
     runs = study.runs.assign(
         group=study.runs.family.str.partition("/")[0].fillna(study.runs.task),
         counted=study.runs.counted.fillna("random search"),
-        dose=study.runs.discount,
-        nearer=study.signature("arm", replay=True).where(~random_search, study.signature("arm")),
-        first=study.signature("first", replay=True).where(~random_search, study.signature("first")),
-    )
-    reward = runs.replay_reward.where(~random_search, runs.reward)
+        dose=study.runs.discount, nearer=nearer, first=first,
+    )  # fmt: skip
+    reward = runs.replay_reward.where(learns, runs.reward)
     initial = runs.groupby("task").initial_reward.transform("first")  # random search has none
     runs["saved"] = (100 * (initial - reward) / initial).astype("Float64")
     of_dose = runs.dose.map(lambda dose: "" if np.isnan(dose) else f" {dose:g}")
@@ -67,8 +64,7 @@ def measure_runs(study):
 
 
 def tabulate(study, runs):
-    """Tabulate the gains of learning by γ: means over random tasks, or over the runs on a task of
-    the paper."""
+    """Tabulate means by γ over random tasks, or over the runs on a task of the paper."""
     every = pd.concat([runs[runs.family.notna()].assign(group="random"), runs])
     every["row"] = every.group + " " + every.kind
     unit = every.run.where(every.family.isna(), 0)  # random tasks count alike, whatever their runs
@@ -81,27 +77,22 @@ def tabulate(study, runs):
 
 
 def tabulate_posture_difference(study, runs):
-    """Posture difference at the goal that two tasks of the paper share, by γ.
-
-    ``posture_difference``: length unit and rad mixed. ``posture_difference_p``: p of the
-    permutation test that there is no difference. ``beyond_p``: p of the test that the difference is
-    no larger than in random search.
-    """
+    """Tabulate the posture difference (length unit and rad mixed) at the goal that two tasks of the
+    paper share, by γ, with p of a permutation test against no difference, and of a test against
+    the difference of random search (``beyond_p``)."""
     rows = {}
     first = runs[runs.task == SHARED[0]].groupby("kind").first()
     labels = (first.method + " " + first.setting).str.strip()
     for kind, label in labels.items():
         replay = label != RANDOM_SEARCH
-        runs_on_both = [study.executed(task, label, replay=replay) for task in SHARED]
-        ours = TwoContexts(*runs_on_both, 1, "right")
+        both = (study.executed(task, label, replay=replay) for task in SHARED)
+        ours = TwoContexts(*both, 1, "right")
         control = contexts_of_control(study, ours)
-        beyond = np.nan if control is None else ours.p_beyond(control)
-        posture_difference = {
+        rows[f"{SHARED[0]} {kind}"] = {
             "posture_difference": ours.posture_difference,
             "posture_difference_p": ours.p,
-            "beyond_p": beyond,
+            "beyond_p": np.nan if control is None else ours.p_beyond(control),
         }
-        rows[f"{SHARED[0]} {kind}"] = posture_difference
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
@@ -196,12 +187,8 @@ def draw(table):
     """The measures by γ on random tasks, and the posture difference on the paper's."""
     figure, panels = figures.panels((2, 2), (figures.TWO, 4.6))
     for axes, name in zip(panels, [*MEASURES, "posture_difference"], strict=True):
-        rows = table[
-            table.posture_difference.notna()
-            if name == "posture_difference"
-            else table.group == "random"
-        ]
-        for counted, of_kind in rows.groupby("counted", sort=False):
+        is_shown = table[name].notna() if name not in MEASURES else table.group == "random"
+        for counted, of_kind in table[is_shown].groupby("counted", sort=False):
             if counted == "random search":
                 axes.axhline(of_kind[name].iloc[0], **LOOKS[counted])
             else:

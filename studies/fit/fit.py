@@ -97,8 +97,7 @@ def with_intervals(evidence, noise, log_sigma, kappa):
 def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True):
     """Fit all models to the trials of a subject; a dictionary of numbers.
 
-    ``sigma``, ``epsilon`` and ``kappa`` are of *keep the best, informed*, with ``_low`` and
-    ``_high``; ``bic_`` and the name of a model.
+    ``sigma``, ``epsilon`` and ``kappa`` are of *keep the best, informed*; ``bic_`` of each model.
     """
     row, plan, fitted = {}, plan or plan_for(task), {}
     for model in MODELS:
@@ -159,24 +158,11 @@ def judge(row):
 def fit(frame, task, *, condition=None, noise=0.0):
     """Fit all models to the trials of all subjects.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        Rows of :func:`coartic.analysis.read_hits`.
-    task : Task
-        The task that was practised.
-    condition : ExplorationCondition, optional
-        Hands and explored joints; by default EC1 with one hand, EC4 with two.
-    noise : float
-        SD of the motor noise in recorded postures, length unit and rad.
-
-    Returns
-    -------
-    DataFrame
-        A row for each subject with a hit after a complete trial, others are warned of: numbers of
-        :func:`fit_subject`; ``trials``, ``lost`` trials and
-        ``missing`` hits of the others; ``improved``, the number of trials after the first that were
-        better than all before; ``model`` and ``others`` (:func:`judge`).
+    ``frame``: rows of :func:`coartic.analysis.read_hits`; ``noise``: SD of the motor noise in
+    recorded postures, length unit and rad. Returns a row for each subject that can be fitted, with
+    numbers of :func:`fit_subject`, ``trials``, ``lost`` trials, ``missing`` hits of the others,
+    ``improved``, the number of trials after the first that were better than all before, and
+    ``model`` and ``others`` (:func:`judge`).
     """
     condition, rows = condition or condition_for(task), []
     refuse_without_null_space(task, condition)

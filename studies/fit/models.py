@@ -1,4 +1,4 @@
-"""Aim of a model before each hit, given the trials before it, and the posture where it lands.
+"""Find what a model aims at before each hit, given earlier trials, and where the movement lands.
 
 Rewards and postures determine the learner's tables Q and q*, hence the hand of highest value and
 the target t + κ N(t) (p − t), which lands in a posture L(κ): the package's kernel finds it, because
@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import CONDITIONS, execute
+from coartic.analysis.signatures.two_contexts import movable
 from coartic.baselines.posture_based import TwoGoals
 from coartic.method import run_method
 from coartic.motion.trial import reach_goals
@@ -49,9 +50,8 @@ def condition_for(task):
 def explored_by(task, condition):
     """Return the joints that the condition explores, bool, shape ``(2, dof)``, by chosen hand."""
     masks = np.zeros((2, task.robot.dof), bool)
-    masks[:, :2] = condition.modify_chosen & np.array([k not in task.locked_base for k in "xy"])
     for chosen, hand in enumerate(HANDS):
-        masks[chosen, task.robot.joints(hand)] = condition.modify_chosen
+        masks[chosen, movable(task, hand)] = condition.modify_chosen
         masks[chosen, task.robot.joints(HANDS[1 - chosen])] = condition.modify_other
     return masks
 

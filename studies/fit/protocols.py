@@ -4,11 +4,6 @@
 
 writes ``recovery.csv``, a row for each simulated person. A cell is done at a time; what is done is
 not done again. It takes about two hours of one core.
-
-Aims, set before the runs: with 100 complete trials on one of the tasks, r ≥ 0.95 of σ, ε and κ, and
-the right model of six in 95 % of the people. Expected to fail: 30 trials; and ascending and
-descending, where a learner often finds nothing better than its first trial and looks as if it had
-no memory.
 """
 
 import os
@@ -23,9 +18,8 @@ import numpy as np
 import pandas as pd
 from check import STATISTICS
 from fit import MODELS, fit_subject
-from foreign import FOREIGN, simulate_foreign
 from models import condition_for, plan_for, tables_before, trials_of
-from simulate import simulate
+from simulate import FOREIGN, simulate
 
 from coartic import load_task
 
@@ -77,12 +71,8 @@ def recover(cell):
         sigma = np.exp(rng.uniform(np.log(0.01), np.log(0.1)))
         epsilon = rng.uniform(0.05, 0.5)
         kappa = rng.uniform(0.0, 1.0) if model == "informed" else 0.0
-        if model in FOREIGN:
-            frame = simulate_foreign(task, model, sigma, epsilon, seed=[seed, person, 1],
-                                     trials=trials)  # fmt: skip
-        else:
-            frame = simulate(task, model, sigma, epsilon, kappa, seeds=[[seed, person, 1]],
-                             trials=trials, plan=plan)  # fmt: skip
+        frame = simulate(task, model, sigma, epsilon, kappa, seeds=[[seed, person, 1]],
+                         trials=trials, plan=plan)  # fmt: skip
         joints = [*task.robot.joint_names]
         motor = noise * rng.standard_normal((len(frame), len(joints)))
         if data == "lapses":

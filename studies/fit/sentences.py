@@ -23,18 +23,17 @@ CLEAR = 6.0
 def sentence(row):
     """Return what a row of :func:`fit` says, in words."""
     alike = [row.model, *row.others.split()]
-    if row.misfit:
-        return (
-            f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
-            f"{row.missing}): none of the six models explains these trials ({row.misfit}). The "
-            f"nearest is {MODELS[row.model]}. No parameters are given."
-            + f" Outliers ({100 * row.check_lapses:.0f} % of hits) can cause this: look at them."
-            * bool(row.check_lapses > OUTLIERS[1])
-        )
     text = (
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
         f"{row.missing}): "
     )
+    if row.misfit:
+        return (
+            f"{text}none of the six models explains these trials ({row.misfit}). The "
+            f"nearest is {MODELS[row.model]}. No parameters are given."
+            + f" Outliers ({100 * row.check_lapses:.0f} % of hits) can cause this: look at them."
+            * bool(row.check_lapses > OUTLIERS[1])
+        )
     if {*alike} <= {*LEARNERS} or len(alike) == 1:
         behind = min(row[f"bic_{name}"] for name in MODELS if name not in alike)
         text += (

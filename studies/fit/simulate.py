@@ -1,4 +1,10 @@
-"""People who practise a task by one of six models, simulated."""
+"""People who practise a task by one of six models, or by one of four others, simulated.
+
+The others, on whom the absolute check is tried, learn as *keep the best* does, except that tables
+move half the way to each better trial (``averages``), forget trials before the last ten
+(``recent``), keep the best posture of each goal by its own ticks (``by goal``), or that noise falls
+to a tenth in the end (``decays``).
+"""
 
 import numpy as np
 import pandas as pd
@@ -8,35 +14,29 @@ from models import HANDS, condition_for, explored_by, plan_for, projection
 from coartic import initial_hands
 from coartic.motion.trial import reach_goals
 
+FOREIGN = ("averages", "recent", "by goal", "decays")
+FIRST = ("memoryless", "planner")
+"""Models that keep the first posture."""
+RECENT = 10
+"""Trials that ``recent`` remembers."""
+
 
 def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, plan=None,
              first=None):  # fmt: skip
-    """Return the hits of N simulated people, as :func:`coartic.analysis.read_hits` does.
+    """Return the hits of simulated people, one for each seed, as
+    :func:`coartic.analysis.read_hits` does.
 
     Parameters
     ----------
-    task : Task
-        The task.
     model : str
-        One of :data:`fit.MODELS`.
-    sigma, epsilon, kappa : float or array_like, shape (N,)
+        One of :data:`fit.MODELS` or :data:`FOREIGN`.
+    sigma, epsilon, kappa : float or array_like, shape (people,)
         SD of exploration (length unit and rad), exploration rate of hands, drift.
-    seeds : sequence of int
-        A seed for each person.
-    trials : int
-        Number of trials of a person.
-    condition : ExplorationCondition, optional
-        The condition: its hands and its explored joints.
     plan : tuple of ndarray, optional
         Hands and postures of the planner; by default those of :func:`models.plan_for`.
     first : tuple of ndarray, optional
         Hands and postures that all but planners aim at in trial 1; by default they have the task's
         initial hands and correct.
-
-    Returns
-    -------
-    DataFrame
-        A row for each hit.
     """
     condition = condition or condition_for(task)
     people, goals, dof, robot = len(seeds), len(task.goals), task.robot.dof, task.robot
@@ -49,8 +49,11 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
     value = np.full((people, goals, 3, 2), -np.inf)
     stored = np.full((people, goals, 3, 2, dof), np.nan)
     plan = (plan or plan_for(task)) if model == "planner" else None
-    rows = []
+    rows, past = [], {}
     for trial in range(trials):
+        for entry, kept in past.items():
+            last = [visit for visit in kept if trial - visit[0] <= RECENT] or kept[-1:]
+            _, value[entry], stored[entry] = max(last, key=lambda visit: visit[1])
         q, before = np.tile(task.q0, (people, 1)), np.full(people, 2)
         going, total = np.ones(people, bool), np.zeros(people, int)
         drift = np.array(kappa, dtype=float)
@@ -84,7 +87,8 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
                         p = np.where(masks[best], middle, p)
                     targets[n], ways[n], explores[n] = target, p - target, True
                     noises[n, masks[hand]] = rng.standard_normal(int(masks[hand].sum()))
-            moves = sigma[:, None] * noises
+            fading = 0.1 ** (trial / max(trials - 1, 1)) if model == "decays" else 1.0
+            moves = (sigma * fading)[:, None] * noises
             if drift.any() and explores.any():
                 each = [robot.jacobian(targets[explores], hand) for hand in HANDS]
                 own = np.where((hands[explores] == 0)[:, None, None], *each)
@@ -98,19 +102,22 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
                                   targets, locked_base=task.locked_base)  # fmt: skip
             going &= reached.hit
             total += reached.ticks
-            visits.append((before, hands, reached.q))
+            visits.append((before, hands, reached.ticks, reached.q))
             for n in np.flatnonzero(going):
                 rows.append([n, trial + 1, goal + 1, HANDS[hands[n]], reached.ticks[n],
                              *reached.q[n]])  # fmt: skip
             q, before = reached.q, hands
-        for goal, (state, hands, postures) in enumerate(visits):
+        for goal, (state, hands, ticks, postures) in enumerate(visits):
             for n in np.flatnonzero(going):
-                entry = n, goal, state[n], hands[n]
-                better = -total[n] > value[entry]
-                if better or model == "walk":
-                    if model in ("memoryless", "planner") and np.isfinite(value[entry]):
-                        continue
-                    value[entry], stored[entry] = -total[n], postures[n]
+                entry, posture = (n, goal, state[n], hands[n]), postures[n]
+                reward = -(ticks if model == "by goal" else total)[n]
+                is_empty, is_better = np.isneginf(value[entry]), reward > value[entry]
+                if model == "recent":
+                    past.setdefault(entry, []).append((trial, reward, posture))
+                elif model == "walk" or is_empty or (is_better and model not in FIRST):
+                    if model == "averages" and not is_empty:
+                        posture = (stored[entry] + posture) / 2
+                    value[entry], stored[entry] = reward, posture
     columns = ["subject", "trial", "goal", "hand", "ticks", *robot.joint_names]
     frame = pd.DataFrame(rows, columns=columns)
     return frame.sort_values(["subject", "trial", "goal"], ignore_index=True)

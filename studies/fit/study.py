@@ -1,10 +1,7 @@
 """Measure how well parameters and models of simulated people are recovered.
 
-    python studies/fit/protocols.py results/fit
-    python studies/fit/study.py results/fit
-
-writes results.csv, confusion.csv, people.csv, figure.svg and the page, README.md; without a folder
-figure and page, of the stored tables.
+python studies/fit/protocols.py results/fit
+python studies/fit/study.py results/fit
 """
 
 import sys
@@ -24,9 +21,8 @@ NOISE = 0.02
 
 
 def measure_people(raw):
-    """Add what the fit says of each simulated person: ``model``, the model of least BIC,
-    ``others``, the models that are not clearly worse, and ``answer``, the model or ``none``;
-    ``group``, the task or the family."""
+    """Add ``model`` and ``others`` of :func:`fit.judge` to each simulated person, ``answer``, the
+    model or ``none``, and ``group``, the task or the family."""
     judged = [judge(row) for _, row in raw.iterrows()]
     return raw.assign(
         model=[model for model, _ in judged],

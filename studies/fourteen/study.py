@@ -6,11 +6,6 @@ r"""Is a planner's horizon a number of goals, or a share of those left?
         --family-file studies/fourteen/seven-one.v1.toml \
         --family-file studies/fourteen/seven-two.v1.toml
     python studies/fourteen/study.py results/fourteen
-
-With two arms the fourth goal ahead is judged by the rule for repeats in README.md.
-
-Writes results.csv, gains.csv, repeats.csv, fourth.csv, claims.csv, figure.svg and the page,
-README.md; without a folder figure and page, of the stored tables.
 """
 
 import sys
@@ -47,14 +42,12 @@ counts as equivalent to a published reward."""
 
 
 def measure_plans(study):
-    """First plans, a row for each task and horizon, with what their goals ahead gain.
+    """Return first plans, a row for each task and horizon, with what their goals ahead gain.
 
-    With h goals ahead the planner sees more than with h - 1 at n - h movements of n alone; from
-    then on both see all that is left. So the difference of their ticks, of the whole task, is due
-    to those movements, and what the postures after them are worth is counted. ``gain`` is that
-    difference for each of those movements, as a share of a mean movement of the best known
-    solution; where no run has the horizon before, of each goal since the last that was run, alike.
-    ``together``: the gains of all goals ahead up to this one.
+    With h goals ahead the planner sees more than with h - 1 at n - h movements of n alone. ``gain``
+    is the difference of their ticks for each of those movements, as a share of a mean movement of
+    the best known solution; where no run has the horizon before, of each goal since the last that
+    was run, alike. ``together``: the gains of all goals ahead up to this one.
     """
     plans = study.runs[(study.runs.method == PLANNER) & study.runs.gap.notna()]
     first = plans[plans.horizon == 0]  # later ones repeat them, or are of more tasks
@@ -73,11 +66,8 @@ def measure_plans(study):
 
 
 def measure_repeats(study):
-    """Every pair of plans with three and four goals ahead with two arms, also of more tasks.
-
-    ``gain`` of the fourth goal: the difference of their ticks for each movement that has it ahead,
-    as a share of a mean movement of the best known solution.
-    """
+    """Return every pair of plans with three and four goals ahead with two arms, also of more tasks,
+    and the ``gain`` of the fourth goal, as in :func:`measure_plans`."""
     plans = study.runs[(study.runs.method == PLANNER) & (study.runs.family == MANY[1])]
     plans = plans.astype({"reward": float, "best_known": float, "nodes": int})
     ticks = -plans.pivot_table("reward", ["task", "nodes", "best_known", "goals"], "horizon")
@@ -107,10 +97,8 @@ def tabulate_others(study):
     for method in OTHERS:
         for family, of_family in runs[runs.method == method].groupby("family"):
             gaps = [of_task.gap.to_numpy() for _, of_task in of_family.groupby("task")]
-            gap = other_tasks({family: gaps})
             row = {"family": family, "method": method, "tasks": len(gaps)}
-            row |= {"gap": gap.value, "gap_low": gap.low, "gap_high": gap.high}
-            rows[f"{family} {method}"] = row
+            rows[f"{family} {method}"] = row | other_tasks({family: gaps}).columns("gap")
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
@@ -146,9 +134,8 @@ def signed_rank(gains, than):
 
 def tabulate_fourth(repeats):
     """Tabulate the gain of the fourth goal ahead with two arms, with p of the test that it exceeds
-    1 %: over all tasks, over the first tasks (i000 to i027), over the tasks added later, and by
-    repeat.
-    """
+    1 %, over all tasks, without the greatest gains, over the first tasks, over the tasks added
+    later, and by repeat."""
     repeats = repeats.assign(gain=100 * repeats.gain)
     gains = repeats.groupby("task").gain.mean()
     first = gains.index.str[-3:].astype(int) < FIRST
@@ -166,10 +153,9 @@ def tabulate_fourth(repeats):
         if part.empty:
             continue
         alone = judge({"more": fourth_gains("two arms", "more", part)})
-        seen = mean(part)
         rows[name] = {
             "tasks": len(part), "losing": (part < 0).sum(), "median": part.median(),
-            "gain": seen.value, "gain_low": seen.low, "gain_high": seen.high,
+            **mean(part).columns("gain"),
             "p": alone.p_holm["more"], "signed_rank_p": signed_rank(part, "more"),
         }  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")

@@ -1,10 +1,7 @@
-"""Coarticulation that belongs to a gain: how much is it, and does it matter who gains?
+"""Measure how much coarticulation belongs to a gain, and whether it matters who gains.
 
     coartic run studies/gain/suite.toml --out results/gain
     python studies/gain/study.py results/gain
-
-writes results.csv (method means by family), equal.csv (differences to the learner at equal gain),
-cells.csv (means over runs), claims.csv, the figure and the page; without a folder figure and page.
 
 The *gain* of a run is the number of ticks by which it is faster than the corrective process alone
 with its best hands. At equal gain: on each task a method's signature, less the learner's signature
@@ -18,7 +15,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import all_of, figures, judge, load, mean_beyond, means, write_study
+from coartic.analysis import all_of, figures, judge, load, mean, mean_beyond, means, write_study
 from coartic.analysis.judging import Finding
 
 SIGNATURES = {"arm": "next goal nearer", "other arm": "idle hand nearer", "first": "first slower"}
@@ -60,7 +57,7 @@ def at_equal_gain(cells, how="linear"):
     """Return differences to the learner at equal gain, a row for each method, setting and task.
 
     ``how``: ``linear`` between numbers of trials, with 0 at gain 0; ``nearest`` number of trials;
-    or ``same hands``, linear with another zero: the corrective process with each run's own hands.
+    or ``same hands``, linear, from the corrective process with each run's own hands.
     """
     gain = "whole" if how == "same hands" else "gain"
     rows = []
@@ -158,10 +155,8 @@ def tabulate_equal(equal, how):
             for column in SIGNATURES:
                 values = by_task(of_method, name, column)
                 if len(values):
-                    mean = means(values.to_frame().assign(all=0), ["all"], [column]).iloc[0]
                     row |= {f"{column}_tasks": len(values), f"{column}_median": values.median()}
-                    ends = ("", "_low", "_high")
-                    row |= {f"{column}{end}": mean[f"{column}{end}"] for end in ends}
+                    row |= mean(values).columns(column)
             rows[f"{group} {name} {how}"] = row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 

@@ -3,14 +3,10 @@
     coartic run studies/horizon/suite.toml
     python studies/horizon/study.py results/horizon
 
-writes results.csv, signatures.csv, gains.csv, movements.csv, claims.csv, repeats.csv, figure.svg
-and the page, README.md; without a folder figure and page, of the stored tables.
-
-Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims are
-judged by the mean over the repeats of a task, and again without the task that speaks most for them;
-tables and figure are of these means, and repeats.csv judges each repeat alone. The rule was written
-before the repeats were run, with what we expect: no verdict changes, and the fourth goal's gain
-stays undecided.
+Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims,
+tables and figure are of the mean over the repeats of a task; repeats.csv judges each repeat alone.
+The rule was written before the repeats were run, with what we expect: no verdict changes, and the
+fourth goal's gain stays undecided.
 """
 
 import sys
@@ -82,8 +78,8 @@ def tabulate(study, plans):
 
 
 def tabulate_movements(gains):
-    """Gain by the last goal in view, in per cent of a movement that has it ahead, as in study
-    fourteen: all tasks that have it, by number of goals, and tasks with five goals or more."""
+    """Tabulate the gain of the last goal in view, in per cent of a movement that has it ahead, over
+    all tasks that have it, by number of goals, and over tasks with five goals or more."""
     h = gains.h[(gains.h > 0) & (gains.h <= 4)]
     gains = gains.loc[h.index].assign(gain=100 * gains.gain * gains.goals / (gains.goals - h))
     count = gains.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")

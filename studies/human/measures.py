@@ -1,6 +1,6 @@
 """Measures by which models are compared with the findings of human.toml, a function each.
 
-A measure takes the runs of all models (:func:`models.tidy`) and the name of one, and returns its
+A measure takes the runs of all models (:func:`study.tidy`) and the name of one, and returns its
 values by task, as a Series or, of several numbers, a frame; tasks can have several rows. A
 statistic is made of the rows of all tasks, shape ``(n, k)``.
 """

@@ -3,11 +3,12 @@
     coartic run studies/human/suite.toml
     python studies/human/study.py results/human
 
-writes results.csv, effects.csv, figure.svg and the page, README.md; without a folder figure and
-page, of the stored tables. human.toml has the findings, the models and how verdicts are made,
-models.py the runs of each model, measures.py what is measured. The findings are in place of claims.
+human.toml has the findings, in place of claims, the models and how verdicts are made; measures.py
+what is measured.
 """
 
+import json
+import re
 import sys
 import tomllib
 from functools import cache
@@ -16,20 +17,63 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from measures import MEASURES
-from models import MODELS, tidy
 
+from coartic import trajectory
 from coartic.analysis import figures, load, write_study
+from coartic.estimates import Estimate
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
-GROUPS, _ = FINDINGS.pop("groups"), FINDINGS.pop("models")
-"""The findings by id, in the order of the table, and groups of models by name."""
+GROUPS, MODELS = FINDINGS.pop("groups"), FINDINGS.pop("models")
+"""The findings by id, in the order of the table; groups of models by name; models that are compared
+with people, by name: methods with their parameters."""
+FURTHER = {
+    "learner, begun": MODELS["learner"] | {"parameters": {"trials": 100}},
+    "learner, replayed, begun": MODELS["learner, replayed"] | {"parameters": {"trials": 100}},
+    "least acceleration, stopping": MODELS["least acceleration"] | {"parameters": {"stop": 1}},
+    "least jerk, stopping": MODELS["least jerk"] | {"parameters": {"stop": 1}},
+    "any goals ahead": {"method": "receding-horizon"},
+}
+"""Further models that some measures need: the learner after a hundredth of its practice, plans that
+stop at each goal, all points of the planner's curve."""
 LEVEL, RESAMPLES = 0.05, 9_999
 FEWEST_TASKS = 10
 MARKS = {
     "agrees": ("+", figures.PALETTE[0]), "disagrees": ("−", figures.PALETTE[3]),
     "undecided": ("?", figures.GREY), "silent": ("·", figures.GREY), "no cases": ("", figures.GREY),
 }  # fmt: skip
+
+
+def tidy(study):
+    """The solved runs of all models, a row each, in the order of the suite.
+
+    ``model``; ``task`` with its ``arms`` and ``goals`` (their numbers) and its ``best`` reward of
+    any run; ``moved``, the number of the goal that was moved, to ``place`` (its y, length unit) in
+    the task ``origin``, or 0; the planner's ``horizon``; ``path``, the movement tick by tick.
+    """
+    solved = study.runs[study.runs.status == "ok"]
+    best = solved.groupby("task").reward.max()
+    rows = []
+    for cell in solved.drop_duplicates(["task", "method", "setting"]).itertuples():
+        task, parameters = study.tasks[cell.task], json.loads(cell.parameters)
+        learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
+        origin, moved = re.fullmatch(r"(.+?)(?:\.goal(\d+)_.+)?", cell.task).groups()
+        place = task.goals[int(moved) - 1][1] if moved else np.nan
+        facts = {
+            "task": cell.task, "arms": len(task.hands), "goals": cell.goals,
+            "best": best[cell.task], "origin": origin, "moved": int(moved or 0), "place": place,
+            "horizon": parameters.get("horizon"),
+        }  # fmt: skip
+        for name, model in (MODELS | FURTHER).items():
+            wanted = model.get("parameters", {}).items()
+            if (model["method"] or learner) == cell.method and wanted <= parameters.items():
+                replay = model.get("replayed", False)
+                for run in study.executed(
+                    cell.task, f"{cell.method} {cell.setting}".strip(), replay=replay
+                ).runs:
+                    path = trajectory(task, run.movements)
+                    rows.append({"model": name, **facts, "path": path})
+    return pd.DataFrame(rows)
 
 
 def measure_effects(study):
@@ -68,31 +112,27 @@ def judge_test(measured, model, test, level, silent):
     name, (side, word) = test["measure"], (1, "above") if "above" in test else (-1, "below")
     bound, statistic = test[word], MEASURES[name][1]
     values = pd.Series() if silent else measured(name, model)
-    value, low, high, tasks = bootstrap([values], statistic, level)
-    near, far = sorted([side * low, side * high])
+    seen, over = bootstrap([values], statistic, level), Estimate(np.nan)
+    near, far = sorted([side * seen.low, side * seen.high])
     agrees, disagrees = near > side * bound, far < side * test.get("disagree", bound)
-    verdict, because, over = "undecided", silent, [np.nan] * 3
+    verdict, because, tasks = "undecided", silent, seen.n[0]
     if not tasks:
         verdict = "silent" if silent else "no cases"
     elif tasks >= FEWEST_TASKS and agrees != disagrees:
         verdict = "agrees" if agrees else "disagrees"
     if tasks and model in GROUPS["picked from trials"]:
-        both = [values, measured(name, "random search")]
-        *over, common = bootstrap(both, statistic, level)
-        exceeds = min(side * over[1], side * over[2]) > 0 and common >= FEWEST_TASKS
+        over = bootstrap([values, measured(name, "random search")], statistic, level)
+        exceeds = min(side * over.low, side * over.high) > 0 and over.n[0] >= FEWEST_TASKS
         if verdict == "agrees" and not exceeds:
             verdict, because = "undecided", "it is not shown to exceed random search"
     return {
-        "measure": name, "bound": f"{word} {bound:g}",
-        "value": value, "value_low": low, "value_high": high, "tasks": tasks,
-        "over_random_search": over[0],
-        "over_random_search_low": over[1], "over_random_search_high": over[2],
-        "of_test": verdict, "because": because,
+        "measure": name, "bound": f"{word} {bound:g}", **seen.columns("value"), "tasks": tasks,
+        **over.columns("over_random_search"), "of_test": verdict, "because": because,
     }  # fmt: skip
 
 
 def bootstrap(sides, statistic, level):
-    """A statistic of all tasks, the ends of its interval over tasks, and their number.
+    """Return a statistic of all tasks with its interval over tasks, and their number.
 
     ``sides``: values by task; of two, the statistic of the first less that of the second, on the
     tasks that both have. Percentiles, wider by √(k / (k − 1)) for k tasks, by which resamples fall
@@ -108,12 +148,12 @@ def bootstrap(sides, statistic, level):
 
     value = difference(range(count)) if count else np.nan
     if count < 2:
-        return value, np.nan, np.nan, count
+        return Estimate(value, n=(count,))
     drawn = np.random.default_rng(0).integers(count, size=(RESAMPLES, count))
     different, which = np.unique(drawn, axis=0, return_inverse=True)
     values = np.array([*map(difference, different)])[which.ravel()]
     away = (values - value) * np.sqrt(count / (count - 1))
-    return value, *(value + np.quantile(away, [level / 2, 1 - level / 2])), count
+    return Estimate(value, *(value + np.quantile(away, [level / 2, 1 - level / 2])), n=(count,))
 
 
 def verdict_of(tests):

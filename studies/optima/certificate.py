@@ -6,22 +6,18 @@ are at least
 
     (shortest path through such configurations) / m + (goals that are moved for).
 
-The path is bounded from below within boxes of link angles by :mod:`relaxation`; the narrower the
-intervals, the tighter the bound. Three things are split, until every subproblem is bounded above
-the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
+The path is bounded from below within boxes of link angles by :mod:`relaxation`. Split are, until
+every subproblem is bounded above the ticks that are to be beaten:
 
 - an interval of a link angle, in two;
-- a goal whose hand is undecided, into one subproblem for each hand. With five goals and more the
-  search begins with all of them undecided, so that a bound for the hands of some goals serves every
-  sequence with these hands; a hand is decided where that matters more than the angles do, first
-  where it is most wrong (hands from the first goal on proved no more, see the study's page);
+- a goal whose hand is undecided, into one subproblem for each hand, where that matters more than
+  the angles do, first where it is most wrong;
 - goals that may be hit without a movement, if only their ticks are still missing: into one
-  subproblem for each, in which it is the first such goal. The subproblem without such goals is
-  bounded already.
+  subproblem for each, in which it is the first such goal.
 
-Each of these leaves no solution out. The subproblem with the least bound is next, so that the
-search can end at any time. The proven bound is then the least bound of the open subproblems or the
-bound from the speed of the hands (:func:`least_ticks`), whichever is more.
+The subproblem with the least bound is next, so that the search can end at any time. The proven
+bound is then the least bound of the open subproblems or :func:`speed.least_ticks`, whichever is
+more.
 """
 
 import heapq
@@ -50,15 +46,11 @@ def mergeable(task, hands):
     """
     first = [hand for hand in task.hands if hands[0] in (hand, None)]
     starts = [task.robot.forward_kinematics(task.q0, hand) for hand in first]
-    able = [0] if min(math.dist(q, task.goals[0]) for q in starts) <= task.radius else []
-    able += [
-        g
-        for g in range(1, len(hands))
-        if hands[g] is None
-        or hands[g] != hands[g - 1]
-        or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
-    ]
-    return tuple(able)
+    able = [min(math.dist(q, task.goals[0]) for q in starts) <= task.radius]
+    for g in range(1, len(hands)):
+        overlap = math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
+        able.append(hands[g] is None or hands[g] != hands[g - 1] or overlap)
+    return tuple(np.flatnonzero(able).tolist())
 
 
 class Subproblem(NamedTuple):
@@ -93,11 +85,10 @@ class Node(NamedTuple):
 
 
 def certify(task, ticks, most_nodes=math.inf, most_seconds=math.inf, *, still=False):
-    """Prove that no solution takes fewer than ``ticks``, or as much as can be proven.
+    """Prove that no solution takes fewer than ``ticks``, or as much as can be proven with so many
+    cone programmes or seconds of CPU time; return the :class:`ProofSearch`.
 
-    Returns the :class:`ProofSearch`, which has the proven ticks. It ends when all is proven, after
-    so many cone programmes or so many seconds of CPU time. ``still`` holds the arm that is not
-    chosen.
+    ``still`` holds the arm that is not chosen.
     """
     begin, search = time.process_time(), ProofSearch(task, ticks, still)
     while search.ticks < ticks and search.nodes < most_nodes and search.seconds < most_seconds:
@@ -150,22 +141,13 @@ class ProofSearch:
         moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
         bounded = node.length > self.longest(moves) or moves >= self._claim
-        # How far the nearer hand is from its goal, where the hand is undecided.
-        far = {
-            g: min(
-                math.dist(self._task.robot.forward_kinematics(q[g], hand), self._task.goals[g])
-                for hand in self._hands
-            )
-            for g, decided in enumerate(problem.hands)
-            if decided is None
-        }
+        far = {g: self.miss(q[g], g) for g, hand in enumerate(problem.hands) if hand is None}
         goal = max(far, key=lambda g: far[g], default=None)
         wrong = node.relaxed.wrong.max(initial=0.0)
         if goal is not None and (
             bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3)
         ):
-            # One subproblem for each hand, the new angles anywhere on a path of interest.
-            for hand in self._hands:
+            for hand in self._hands:  # the new angles are anywhere on a path of interest
                 hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
                 root = self.relaxation(hands, problem.merged)
                 of_goal = root.goal_of == goal
@@ -184,6 +166,11 @@ class ProofSearch:
                 # The parent's Lagrangian may rule a half out, without a programme.
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
+
+    def miss(self, q, goal):
+        """Return how far the nearer hand is from a goal."""
+        places = (self._task.robot.forward_kinematics(q, hand) for hand in self._hands)
+        return min(math.dist(place, self._task.goals[goal]) for place in places)
 
     def add(self, problem, parent):
         """Bound a subproblem; add it to the open ones if its bound is too low."""

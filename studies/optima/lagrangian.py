@@ -5,13 +5,9 @@ path obeys
 
     ‖Δq_g‖ >= p_g · Δq_g   and   0 >= λ_g · (hand_g − goal_g) − radius ‖λ_g‖,
 
-so that it is at least as long as the least value of the sum of the right sides. The sum is
-separable: a linear term of each joint, and for each link ``slope φ + l λ · (cos φ, sin φ)``, whose
-least value over an interval has a closed form. Joints that no link angle stands for change by no
-more than the path is long.
-
-The same sum narrows intervals. If its least value is short of the longest path of interest by
-``slack``, an angle at which the term of a link exceeds its least value by more is on no such path.
+so that it is at least as long as the least value of the sum of the right sides: a linear term of
+each joint, and for each link ``slope φ + l λ · (cos φ, sin φ)``, whose least value over an interval
+has a closed form. Joints that no link angle stands for change by no more than the path is long.
 """
 
 import math
@@ -46,7 +42,8 @@ class Lagrangian(NamedTuple):
         return self.constant + float(least(*self[1:], *box.T).sum())
 
     def within(self, box, slack):
-        """Return the part of a box in which no term exceeds its least value by more than ``slack``.
+        """Return the part of a box in which no term exceeds its least value by more than ``slack``:
+        other angles are on no path of interest, if the bound is short of the longest by that.
 
         An end moves inwards while a parabola below the term is above that; a term bends by no more
         than its size. A low end above the high one says that nothing is left.

@@ -20,9 +20,8 @@ _SETTINGS = {
 class Programme:
     """Canonical data of a problem of CVXPY with one parameter, in a solver.
 
-    The constraints of the problem are equations, then inequalities, then second-order cones, which
-    is the order of the canonical data. Each number of the parameter is planted as a number of its
-    own, which shows its places in the data.
+    Constraints have the order of the canonical data: equations, inequalities, second-order cones.
+    Each number of the parameter is planted as a number of its own, which shows its places.
     """
 
     def __init__(self, problem, parameter, variables, values):

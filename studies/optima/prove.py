@@ -3,11 +3,9 @@
     python studies/optima/prove.py two-armed/v1/i000..i039 two-armed-1 --processes 2
     python studies/optima/prove.py shelf.toml --seconds 20
 
-Tasks are the names of shipped tasks, ranges of instances, or files; of a file that does not ship a
-good reward is searched first (``optimum/search``). Tasks that are nearest to a proof are first.
-Each proof is appended to the log as it ends, with a solution if a better one was found on the way.
-The same command goes on where it was stopped: it leaves out what is proven, and what the log has
-with as many seconds. ``renew.py`` takes the log over into the shipped data.
+Tasks are the names of shipped tasks, ranges of instances, or files. Each proof is appended to the
+log as it ends, with a solution if a better one was found on the way. The same command goes on where
+it was stopped: it leaves out what is proven, and what the log has with as many seconds.
 """
 
 import argparse
@@ -35,10 +33,8 @@ CHAINS = 20
 
 
 def entries_of(name, known):
-    """Return the entries of a task that have a reward: one for each restriction.
-
-    Of a task that does not ship the entry of the best solution that a search finds.
-    """
+    """Return the entries of a task that have a reward, one for each restriction; of a task that
+    does not ship, the entry of the best solution that a search finds."""
     task = load_task(name)
     same = essence(task)
     entries = [each for each in known.values() if each["essence"] == same and "reward" in each]
@@ -85,20 +81,15 @@ def polished(task, chains, still):
 
 def in_words(row):
     """Return a sentence about a row of the log."""
-    proof = f"no solution exceeds {row['bound']}"
-    proof = "proven optimal" if row["bound"] == row["reward"] else proof
-    which = "{task} (base {base}, other arm {other_arm})".format(**row)
-    better = ", a better solution" if "solution" in row else ""
-    return (
-        f"{which}: {row['reward']}, {proof}, {row['nodes']} programmes, {row['seconds']} s{better}"
-    )
+    is_proven, more = row["bound"] == row["reward"], ", a better solution" * ("solution" in row)
+    proof = "proven optimal" if is_proven else f"no solution exceeds {row['bound']}"
+    words = "{task} (base {base}, other arm {other_arm}): {reward}, {proof}, {nodes} programmes, "
+    return f"{words}{{seconds}} s{more}".format(**row, proof=proof)
 
 
-def proofs(names, seconds, folder, processes):
-    """Prove bounds for tasks and log them; yield a sentence for each.
-
-    Raises CoarticError for a task that cannot be used.
-    """
+def prove_all(names, seconds, folder, processes):
+    """Prove bounds for tasks, those nearest to a proof first, log them, and print a sentence for
+    each."""
     known, done = shipped.read(), set()
     for row in shipped.read_log(folder):
         shipped.take_proof(known, row)
@@ -114,7 +105,7 @@ def proofs(names, seconds, folder, processes):
         for task in as_completed(tasks):
             file.write(f"\n{json.dumps(task.result())}\n")  # a line may have been cut off
             file.flush()
-            yield in_words(task.result())
+            print(in_words(task.result()), flush=True)
 
 
 def main():
@@ -126,8 +117,7 @@ def main():
     parser.add_argument("--processes", type=int, default=1, help="tasks at the same time")
     asked = parser.parse_args()
     try:
-        for sentence in proofs(asked.tasks, asked.seconds, asked.out, asked.processes):
-            print(sentence, flush=True)
+        prove_all(asked.tasks, asked.seconds, asked.out, asked.processes)
     except CoarticError as error:
         sys.exit(str(error))
 

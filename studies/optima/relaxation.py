@@ -9,19 +9,10 @@ at each goal, the direction u_gk = (c, s) of every link::
           Σ_(g in span) d_g >= the path on which a hand covers its distance in this span
 
 The only part that is not convex, u = (cos φ, sin φ), is replaced by half-spaces that hold all
-points (cos φ, sin φ, φ) with φ in its interval; their offsets are exact maxima. A goal whose angles
-are not narrowed adds nothing by itself, but the spans of :mod:`speed` do.
-
-CVXPY states the programme once; nodes change the half-spaces in its canonical data, which the
-solver Clarabel has (a third of the time that CVXPY took for each node). The solver's dual point
-gives good multipliers; the bound is :mod:`lagrangian`'s, which holds for any multipliers. In a box
-without a path they are a ray along which the bound grows.
-
-The hand of a goal may be undecided. Either hand is then within a disc around the middle of the
-shoulders, whatever the arms do, and both arms may move: a relaxation of either choice.
-
-Not worth it: a second cone for each movement, by which a chord is no longer than its turn, raises
-bounds at equal nodes and makes a node 1.5 to 2.4 times as slow.
+points (cos φ, sin φ, φ) with φ in its interval; their offsets are exact maxima. The solver's
+multipliers give the bound of :mod:`lagrangian`, which holds for any multipliers; in a box without a
+path they are a ray along which the bound grows. Where the hand of a goal is undecided, either hand
+is within a disc around the middle of the shoulders, and both arms may move.
 """
 
 import math
@@ -68,9 +59,8 @@ class Relaxed(NamedTuple):
 class Relaxation:
     """Cone programme of one hand sequence; its parameters are the half-spaces of a box.
 
-    ``merged`` are the goals (0-based) that are hit without a movement; their hands are all decided.
-    ``still`` holds the arm that is not chosen. A box has the intervals of the absolute link angles,
-    shape ``(links, 2)``, rad, of the chosen arms at the goals whose hand is decided, goal by goal.
+    ``merged`` are the goals that are hit without a movement; their hands are all decided. A box has
+    the absolute link angles of the chosen arms at the goals whose hand is decided, goal by goal.
     """
 
     def __init__(self, task, hands, merged, still):
@@ -138,11 +128,7 @@ class Relaxation:
         return Relaxed(q, angles, wrong, (pulls, forces, speeds))
 
     def lagrangian(self, multipliers, longest):
-        """Return the Lagrangian of multipliers, for paths that are no longer than ``longest``.
-
-        Multipliers of any values serve: those that are no numbers count as zero, and all others are
-        scaled until they are valid.
-        """
+        """Return the Lagrangian of any multipliers, for paths no longer than ``longest``."""
         pulls, forces, speeds = map(finite, multipliers)
         size = min(1.0, LARGEST / max(np.abs(m).max(initial=1.0) for m in (pulls, forces, speeds)))
         pulls, forces, speeds = size * pulls, size * forces, size * np.maximum(speeds, 0.0)
@@ -186,13 +172,9 @@ def disc_of(task, hand):
 
 
 def split(box, relaxed):
-    """Return two halves, across the angle whose direction the relaxation has most wrong.
-
-    Weighting the errors by the forces, or by their cost in the Lagrangian, took up to fifty times
-    as many nodes.
-    """
+    """Return two halves, across the angle whose direction the relaxation has most wrong; if it has
+    all of them right, across the widest interval."""
     wrong, width = relaxed.wrong, box[:, 1] - box[:, 0]
-    # Where all agree, the widest one: the bound is then as good as it gets here.
     link = int(np.argmax(wrong if wrong.max() > 1e-7 else width))
     low, high = box[link]
     middle, angle = 0.5 * (low + high), np.clip(relaxed.angles[link], low, high)
@@ -205,8 +187,7 @@ def half_spaces(box):
     """Return coefficients of c, s and φ, and the most of their sum, ``(4, HALF_SPACES, links)``.
 
     They hold (c, s, φ) of every link in its interval: its ends; the chord; tangents to cosine and
-    sine; the chord of the sine. Any normal is valid: the offsets make it so. More of them bound no
-    better in the same time.
+    sine; the chord of the sine. Any normal is valid: the offsets make it so.
     """
     middle, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
     # In the interval's own frame, where its middle is the angle zero, and from there.

@@ -2,13 +2,11 @@
 
     python studies/optima/renew.py results/families results/optima
 
-A folder of ``prove.py`` has proofs, any other one runs.
-A task of the paper, or one of the first 40 test instances of a shipped family, gets the reward and
-the solution of the best run of any method, if the reward is better than the shipped one. Tasks of
-the paper have an entry for each restriction of the search (``base``, ``other_arm``).
+A folder of ``prove.py`` has proofs, any other one runs. Rewards ship of the paper's tasks, under
+each restriction of the search (``base``, ``other_arm``), and of the first 40 test instances of each
+shipped family.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -46,9 +44,8 @@ def take_over(study, known):
     for key, group in runs.groupby(["task", "base", "other_arm"]):
         name, base, other_arm = map(str, key)
         before, best = known.get((name, base, other_arm), {}), group.loc[group.reward.idxmax()]
-        if not ships(study.tasks[name], (base, other_arm)):
-            continue
-        if before.get("reward") is not None and before["reward"] >= best.reward:
+        is_better = before.get("reward") is None or best.reward > before["reward"]
+        if not is_better or not ships(study.tasks[name], (base, other_arm)):
             continue
         task, made_with = load_task(name), study.made_with
         known[name, base, other_arm] = {
@@ -69,13 +66,11 @@ def take_over(study, known):
     return changed
 
 
-def main():
-    """Take over what the folders of the command line improve."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("folders", nargs="+", metavar="FOLDER", help="results folder")
+def main(folders):
+    """Take over what the folders improve."""
     known = shipped.read()
     try:
-        for folder in parser.parse_args().folders:
+        for folder in folders:
             if rows := shipped.read_log(Path(folder)):
                 changed = sum(shipped.take_proof(known, row) for row in rows)
                 print(f"{folder}: {changed} proofs that say more")
@@ -87,4 +82,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

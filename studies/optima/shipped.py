@@ -6,7 +6,6 @@ of families, whose solutions are in ``solutions.json.xz`` here.
 
 import contextlib
 import csv
-import io
 import json
 import lzma
 from pathlib import Path
@@ -21,7 +20,8 @@ FREE = (BASE, "free")
 """Restriction of entries without restriction: base and other arm."""
 OUT, LOG = Path("results", "optima"), "proofs.jsonl"
 """Folder of the log of proofs unless stated otherwise; name of the log."""
-_COLUMNS = ("instance", "reward", "bound", "nodes", "hands", "essence")
+_NUMBERS = ("reward", "bound", "nodes")
+_COLUMNS = ("instance", *_NUMBERS, "hands", "essence")
 _DIGITS = 5  # of joints, where this does not change the reward
 
 
@@ -32,12 +32,9 @@ def read():
     with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
         for row in csv.DictReader(lines):
             name = row["instance"]
-            numbers = {
-                column: int(row[column]) if row[column] else None
-                for column in ("reward", "bound", "nodes")
-            }
-            entry = {"task": name, "base": BASE, "other_arm": "free", "solution": solutions[name]}
-            known.append(row | numbers | entry)
+            row |= {key: int(row[key]) if row[key] else None for key in _NUMBERS}
+            row |= {"task": name, "base": BASE, "other_arm": "free", "solution": solutions[name]}
+            known.append(row)
     return {key_of(entry): entry for entry in known}
 
 
@@ -56,10 +53,11 @@ def read_log(folder):
 
 
 def take_proof(known, row):
-    """Take over a better solution of a logged proof, and its bound if it is sharper.
+    """Take over a better solution of a logged proof, and its bound if it is sharper; return whether
+    a shipped entry changed.
 
-    Returns whether a shipped entry changed. Raises CoarticError for a solution that does not give
-    its reward, and for a bound below a reward: one of both must be wrong.
+    Raises CoarticError for a solution that does not give its reward, and for a bound below a
+    reward: one of both must be wrong.
     """
     entry = known.get(key_of(row), {})
     before = entry.get("reward"), entry.get("bound")
@@ -83,21 +81,14 @@ def write(known):
     """Write all entries into the files that they are from."""
     ranked = [known[key] for key in sorted(known)]
     rows = [entry | {"instance": entry["task"]} for entry in ranked if "/" in entry["task"]]
-    table = io.StringIO()
-    writer = csv.DictWriter(table, _COLUMNS, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
+    with BEST_KNOWN.open("w", encoding="ascii", newline="") as file:
+        writer = csv.DictWriter(file, _COLUMNS, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
     solutions = json.dumps({row["task"]: row["solution"] for row in rows}).encode()
+    SOLUTIONS.write_bytes(lzma.compress(solutions, preset=9))
     optima = {"optima": [entry for entry in ranked if "/" not in entry["task"]]}
-    text = f"{json.dumps(optima, indent=1, ensure_ascii=False)}\n"
-    for path, content in (
-        (BEST_KNOWN, table.getvalue().encode("ascii")),
-        (SOLUTIONS, lzma.compress(solutions, preset=9)),
-        (DATA, text.encode()),
-    ):
-        unfinished = path.with_name(f"{path.name}.new")
-        unfinished.write_bytes(content)
-        unfinished.replace(path)
+    DATA.write_text(f"{json.dumps(optima, indent=1, ensure_ascii=False)}\n", encoding="utf-8")
 
 
 def solution_in_short(task, movements, reward):
@@ -106,14 +97,11 @@ def solution_in_short(task, movements, reward):
     Raises CoarticError if its execution does not give the reward.
     """
     for digits in (_DIGITS, 17):
-
-        def short(joints, digits=digits):
-            return None if joints is None else np.round(joints, digits).tolist()
-
-        content = [
-            [each.goal, each.hand, each.kind, short(each.target), short(each.waypoints)]
-            for each in movements
-        ]
+        content = []
+        for each in movements:
+            joints = (each.target, each.waypoints)
+            short = [None if q is None else np.round(q, digits).tolist() for q in joints]
+            content.append([each.goal, each.hand, each.kind, *short])
         if execute(task, movements_of(content)).reward == reward:
             return content
     raise CoarticError(f"{task.name}: the solution does not come to {reward}")
@@ -121,11 +109,8 @@ def solution_in_short(task, movements, reward):
 
 def movements_of(content):
     """Return the movements of :func:`solution_in_short`."""
-
-    def long(joints):
-        return None if joints is None else np.array(joints, dtype=np.float64)
-
-    return tuple(
-        Movement(goal, hand, kind, long(target), waypoints=long(waypoints))
-        for goal, hand, kind, target, waypoints in content
-    )
+    movements = []
+    for *which, target, waypoints in content:
+        q, path = (None if each is None else np.array(each, float) for each in (target, waypoints))
+        movements.append(Movement(*which, q, waypoints=path))
+    return tuple(movements)

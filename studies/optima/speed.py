@@ -21,10 +21,9 @@ def fastest_hand(task, hand):
     """Return the largest norm of the hand's Jacobian: its path per joint-space path, length unit.
 
     The column of a joint is at right angles to its lever, which is no longer than the links beyond
-    it; a base that moves has the unit vectors as its columns. The square of the norm is the largest
-    eigenvalue of J Jᵀ, a sum of the columns' dyads, and so at most 1, where the base moves at all,
-    plus the sum of the squared levers. A straight arm at right angles to a free axis has just that.
-    Source: Craig (2004), the Jacobian of a planar chain.
+    it (Craig 2004); a base that moves has unit vectors as its columns. The square of the norm is
+    the largest eigenvalue of J Jᵀ, and so at most 1, where the base moves at all, plus the sum of
+    the squared levers, which a straight arm at right angles to a free axis has.
     """
     levers = np.cumsum(task.robot.arm(hand).links[::-1])
     return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
@@ -47,14 +46,9 @@ def soonest(task, hands, last, cost):
     """Return when the last of these goals is hit at the soonest.
 
     A goal is hit no earlier than the goal before it, nor than ``cost(hand, last, goal)`` after the
-    goal that the same hand hit last.
-
-    Parameters
-    ----------
-    hands : list of tuple
-        Goal (0-based) and its hand, None if it is undecided; in the order of goals.
-    last : dict
-        Goal that each hand of the task hit last: -1 at the start, None if it may be anywhere.
+    goal that the same hand hit last. ``hands``: goals with their hand, None if it is undecided;
+    ``last``: the goal that each hand of the task hit last, -1 at the start, None if it may be
+    anywhere.
     """
     # When each hand hit its last goal, of all that may be the soonest in the end.
     times = {tuple(last.values()): {(0.0,) * len(last)}}
@@ -96,17 +90,11 @@ def least_ticks(task, hands=None):
 
 
 def spans_of(task, hands):
-    """Return spans of goals, and the least path within each.
+    """Return spans of goals, shape ``(spans, G)``, 1 within and else 0, and the least path within
+    each, length unit.
 
     A span ends at a decided goal and begins after the goal that its hand hit before. Spans of the
     undecided goals at the end begin after the last decided goal, where the other hand is anywhere.
-
-    Returns
-    -------
-    spans : array, shape ``(spans, G)``
-        1 for each goal of a span, else 0.
-    paths : array, shape ``(spans,)``
-        Length unit.
     """
     goals, last = len(hands), dict.fromkeys(task.hands, -1)
     spans = []  # first and last goal, least path

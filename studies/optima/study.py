@@ -2,8 +2,7 @@
 
     python studies/optima/study.py results/optima
 
-Writes results.csv, open.csv, figure.svg and the pages README.md and open.md, of the shipped data
-and of the effort that the log of ``prove.py`` has; without a folder figure and pages alone.
+Tables are of the shipped data and of the effort that the log of ``prove.py`` in the folder has.
 """
 
 import sys
@@ -12,9 +11,8 @@ from pathlib import Path
 import pandas as pd
 import shipped
 
-from coartic.analysis import figures, fill_page, write_study
+from coartic.analysis import figures, write_study
 
-FOLDER = Path(__file__).parent
 BOUNDS = {
     "proven": "proven optimal", "within_1": "bound within 1 %", "within_5": "within 5 %",
     "within_20": "within 20 %", "instances": "farther",
@@ -23,18 +21,22 @@ BOUNDS = {
 EFFORT = ["seconds", "nodes"]
 
 
-def distances():
-    """Return the distance of each bound from the best known reward, per cent of it, by task."""
+def distances(folder):
+    """Return the distance of each bound from the best known reward, per cent of it, by task, with
+    the effort that a folder has on it."""
     entries = [entry for key, entry in shipped.read().items() if key[1:] == shipped.FREE]
     known = pd.DataFrame(entries).set_index("task")[["hands", "reward", "bound"]]
     known["distance"] = 100 * (known.bound - known.reward) / -known.reward
     known["family"] = known.index.str.extract("(.*)/", expand=False)
-    return known.assign(goals=known.hands.str.len())
+    log = pd.DataFrame(shipped.read_log(folder), columns=["task", *EFFORT, "base", "other_arm"])
+    log = log.query("base == 'task' and other_arm == 'free'")
+    effort = log.groupby("task")[EFFORT].sum()
+    return known.assign(goals=known.pop("hands").str.len()).join(effort)
 
 
 def count(known):
-    """Return how many bounds are at each distance: of the paper's tasks, of each family and number
-    of goals, and of all families."""
+    """Return how many bounds are at each distance, and the effort on them: of the paper's tasks, of
+    each family and number of goals, and of all families."""
     drawn = known[known.family.notna()]
     groups = {"the paper's tasks": known[known.family.isna()]}
     for (family, goals), group in drawn.groupby(["family", "goals"]):
@@ -45,21 +47,16 @@ def count(known):
         "proven": (group.distance == 0).sum(),
         **{f"within_{most}": (group.distance <= most).sum() for most in (1, 5, 20)},
         "median": group.distance.median(),
+        "seconds": group.seconds.sum(),
+        "per_second": group.nodes.sum() / max(group.seconds.sum(), 1.0),
     }) for name, group in groups.items()}).T  # fmt: skip
-    return table.rename_axis("row"), groups
+    return table.rename_axis("row")
 
 
 def tabulate(folder):
-    """Return the tables: counts with the effort of a folder, and the tasks that are open."""
-    known = distances()
-    table, groups = count(known)
-    log = pd.DataFrame(shipped.read_log(folder), columns=["task", *EFFORT, "base", "other_arm"])
-    log = log.query("base == 'task' and other_arm == 'free'")
-    effort = log.groupby("task")[EFFORT].sum()
-    for name, group in groups.items():
-        seconds, nodes = effort.reindex(group.index).sum()
-        table.loc[name, ["seconds", "per_second"]] = seconds, nodes / max(seconds, 1.0)
-    return {"results": table, "open": known[~(known.distance <= 5)].drop(columns="hands")}
+    """Return the tables: counts, and the tasks that are open."""
+    known = distances(folder)
+    return {"results": count(known), "open": known[~(known.distance <= 5)].drop(columns=EFFORT)}
 
 
 @figures.styled
@@ -77,8 +74,5 @@ def draw(table):
 
 
 if __name__ == "__main__":
-    write_study(FOLDER, tabulate(Path(sys.argv[1])) if sys.argv[1:] else {}, draw)
-    stored = {
-        name: pd.read_csv(FOLDER / f"{name}.csv", index_col=0) for name in ("results", "open")
-    }
-    (FOLDER / "open.md").write_text(fill_page(FOLDER / "open.md.jinja", **stored), encoding="utf-8")
+    tables = tabulate(Path(sys.argv[1])) if sys.argv[1:] else {}
+    write_study(Path(__file__).parent, tables, draw)

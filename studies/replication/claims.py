@@ -49,14 +49,12 @@ COLUMNS = [
 
 
 def judge_claims(study, names):
-    """Judge claims by a folder: whether each *replicates*, and is *more than selection*.
+    """Judge claims by a folder: whether each *replicates*, and is *more than selection* (empty for
+    claims that need no comparison with random search).
 
-    Returns a row for each claim: ``replicates``, the verdict on what the paper measured, and
-    ``more_than_selection``, the verdict on the comparison with random search, empty for claims that
-    need none, each with evidence, test and p-values, which are corrected over the claims of its
-    group among ``names``; ``sets``, the number of sets of goals that support and refute the claim;
-    ``place`` and ``quote`` of the paper; ``suite``, empty for a claim for which the folder lacks
-    runs or tasks; ``run_ids`` of the runs that both verdicts read.
+    P-values are corrected over the claims of a group among ``names``. ``sets``: the number of sets
+    of goals that support and refute the claim; ``suite``: empty for a claim for which the folder
+    lacks runs or tasks; ``run_ids`` of the runs that both verdicts read.
     """
     names, claims = [*names], CLAIMS.loc[[*names]]
     judged, read = judge_rules(study, names, RULES, claims.test)

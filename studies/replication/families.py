@@ -7,16 +7,7 @@ from statistics import median
 
 from comparisons import Higher, all_positive, listed, written
 from performance import no_trial_fails
-from reader import (
-    CONDITIONS,
-    EC1,
-    EC2,
-    EC3,
-    EC4,
-    LEARNER,
-    MARGINS,
-    MissingError,
-)
+from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
 from coartic.analysis import all_of, mean, mean_beyond, number
 from coartic.analysis.judging import Finding

@@ -30,8 +30,8 @@ def slower_hands_are_chosen(read):
         slower = chosen_slower(cell, read.initial_execution(TASK_1).hands)
         does = slower > 0
         count, total = int(does.sum()), len(does)
-        tests.append(share_test(count, total, MARGINS.few, "greater"))
-        against.append(share_test(count, total, MARGINS.few, "less"))
+        for which, side in ((tests, "greater"), (against, "less")):
+            which.append(share_test(count, total, MARGINS.few, side))
         parts.append(f"{read.title(TASK_1)} {read.who(label)}: {count} of {total} runs")
         if count:
             parts[-1] += f", slower for these goals by {number(slower[does].mean(), 0)} ticks"
@@ -49,21 +49,21 @@ def more_slower_hands_than_random_search(read):
     tests, against, parts = [], [], []
     for label in (EC2, EC3):
         does = chosen_slower(read.cell(TASK_1, label), initial) > 0
-        table = [[each.sum(), (~each).sum()] for each in (does, control)]
-        more, less = (
-            Estimate(
-                sign * (does.mean() - control.mean()),
-                n=(len(does), len(control)),
-                p=float(scipy.stats.fisher_exact(table, alternative=side).pvalue),
-            )
-            for sign, side in ((1, "greater"), (-1, "less"))
-        )
-        tests.append(more)
-        against.append(less)
+        counts = does.sum(), len(does), control.sum(), len(control)
+        tests.append(fisher_test(*counts, "greater"))
+        less = fisher_test(*counts, "less")
+        against.append(replace(less, value=-less.value))
         who = f"{read.title(TASK_1)} {read.who(label)}"
         parts.append(f"{who}: {does.sum()} of {len(does)} runs")
     parts.append(f"{read.who(RANDOM_HANDS)}: {control.sum()} of {len(control)} runs")
     return under_one_condition(tests, against, parts)
+
+
+def fisher_test(count, total, other, of_other, side="two-sided"):
+    """Compare two shares of runs by Fisher's exact test."""
+    table = [[count, total - count], [other, of_other - other]]
+    p = float(scipy.stats.fisher_exact(table, alternative=side).pvalue)
+    return Estimate(count / total - other / of_other, n=(total, of_other), p=p)
 
 
 def under_one_condition(tests, against, parts):
@@ -76,11 +76,8 @@ def under_one_condition(tests, against, parts):
 
 
 def chosen_slower(cell, initial):
-    """Return the ticks by which chosen hands are slower for their goals alone, shape ``(runs,)``.
-
-    The sum over the goals, without the last, that are hit with another hand than in the initial
-    solution.
-    """
+    """Return the ticks by which chosen hands are slower for their goals alone, shape ``(runs,)``: a
+    sum over goals, without the last, that are hit with another hand than initially."""
     changed = [[one != other for one, other in zip(run.hands, initial, strict=True)]
                for run in cell.runs]  # fmt: skip
     return np.where(changed, ticks_slower(cell), 0.0)[:, :-1].sum(axis=1)
@@ -89,16 +86,14 @@ def chosen_slower(cell, initial):
 def most_do(words, does, *, claimed=True):
     """Test that more than three quarters of the runs do something; or fewer, if not ``claimed``."""
     count, total = sum(does), len(does)
-    more = share_test(count, total, MARGINS.most, "greater")
-    fewer = share_test(count, total, MARGINS.most, "less")
-    side = "greater" if claimed else "less"
+    side, other = ("greater", "less") if claimed else ("less", "greater")
+    test, contrary = (share_test(count, total, MARGINS.most, which) for which in (side, other))
     limits = scipy.stats.binomtest(count, total, alternative=side).proportion_ci()
     limit = f"at least {limits.low:.0%}" if claimed else f"at most {limits.high:.0%}"
     if limits.low > 0 or limits.high < 1:
         words += f", {limit} of all (95 %)"
-    if claimed:
-        return Finding(more.value > 0, words, (more,), (fewer,))
-    return Finding(fewer.value < 0, words, (fewer,), (more,))
+    holds = test.value > 0 if claimed else test.value < 0
+    return Finding(holds, words, (test,), (contrary,))
 
 
 def runs_that(read, task, label, what, does):
@@ -121,12 +116,7 @@ def half_find(read, task, label, hands):
     fewer = share_test(count, total, MARGINS.most, "less")
     inside = min(share - MARGINS.few, MARGINS.most - share)
     within = Estimate(inside, n=(total,), p=max(more.p, fewer.p))
-    table = [[count, total - count], [published.runs, of_published - published.runs]]
-    unlike = Estimate(
-        share - published.runs / of_published,
-        n=(total, of_published),
-        p=float(scipy.stats.fisher_exact(table).pvalue),
-    )
+    unlike = fisher_test(count, total, published.runs, of_published)
     words = runs_that(read, task, label, hands, does)
     return Finding(
         MARGINS.few < share < MARGINS.most,

@@ -9,16 +9,7 @@ from operator import itemgetter
 import numpy as np
 import scipy
 from comparisons import Higher, Measurement, all_higher, all_positive
-from reader import (
-    CELLS_OF_ONE_ARM,
-    CELLS_OF_TWO_ARMS,
-    EC1,
-    EC3,
-    EC4,
-    MARGINS,
-    ONE_ARMED,
-    TWO_ARMED,
-)
+from reader import CELLS_OF_ONE_ARM, CELLS_OF_TWO_ARMS, EC1, EC3, EC4, MARGINS, ONE_ARMED, TWO_ARMED
 
 from coartic.analysis import number
 from coartic.analysis.judging import Finding

@@ -26,15 +26,12 @@ MARKS = {"equivalent": "o", "different": "D", "undecided": "s"}
 def compare_rewards(study):
     """Compare the cells that the paper has too, and their hand sequences, in the order of the plan.
 
-    Sequences follow their cell where the paper or our runs distinguish several: those that the
-    paper publishes come first, then ours by their number of runs. Columns: ``hands`` (empty for the
-    whole cell), ``published`` mean and its ``published_sd``, ``published_runs`` (of hands 0 only
-    where all others are published), ``pooled`` (True if the published mean is one over several hand
-    sequences), ``several`` (True if the paper has rewards of several), ``ours``, ``ours_sd`` and
-    ``runs`` of our runs with a solution, ``of_runs`` of the cell, the ``difference``, ours less
-    published, with its interval, the ``margin`` of equivalence and the ``verdict``, if our runs
-    have as many trials as the paper's, and p-values of the published spread as a standard
-    deviation (``p_sd``) and as a standard error (``p_se``).
+    Sequences follow their cell where the paper or our runs distinguish several: published ones come
+    first, then ours by their number of runs. Columns: ``hands`` (empty for the whole cell),
+    ``published_runs`` (0 only where all others are published), ``pooled`` (the published mean is
+    one over several hand sequences), ``several`` (the paper has rewards of several), ``runs`` with
+    a solution ``of_runs``, ``verdict`` if our runs have as many trials as the paper's, and p-values
+    of the published spread as a standard deviation (``p_sd``) and a standard error (``p_se``).
     """
     rows = {}
     for (task, label), every in study.cells.items():
@@ -87,11 +84,7 @@ def compare_rewards(study):
 
 def difference_to_published(ours, published, sd, runs):
     """Return our mean less the published mean, with Welch's interval from the published SD and
-    number of runs.
-
-    Without a published SD (None) the published mean counts as exact, and the interval is Student's.
-    No interval for a single run; an interval of no length without spread in any sample.
-    """
+    number of runs; Student's without a published SD (None), none for a single run."""
     n, value = len(ours), float(np.mean(ours)) - published
     if n < 2:
         return Estimate(value, n=(n,))
@@ -111,8 +104,7 @@ def equivalence(difference, margin):
     """Compare the interval of a difference with ±margin: two one-sided tests at level 2.5 %
     (TOST; D. J. Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15).
 
-    Equivalent if the interval lies within the margin, different if it lies outside, or else
-    undecided.
+    Equivalent if it lies within the margin, different if it lies outside, or else undecided.
     """
     if -margin <= difference.low and difference.high <= margin:
         return "equivalent"
@@ -124,9 +116,9 @@ def equivalence(difference, margin):
 def spread_p(values, published, runs, *, of_mean=False):
     """Test whether ``runs`` runs like ours could have a published spread, two-tailed.
 
-    Samples of so many of our ``values``, shape ``(n,)``, are drawn with replacement, and p is twice
-    the share whose standard deviation, or standard error of the mean with ``of_mean``, is at least
-    as far on the side of the published spread. NaN with fewer than ten values.
+    Samples of so many of our ``values`` are drawn with replacement, and p is twice the share whose
+    standard deviation, or standard error with ``of_mean``, is at least as far on the side of the
+    published spread. NaN with fewer than ten values.
     """
     if len(values) < 10:
         return math.nan
@@ -138,10 +130,7 @@ def spread_p(values, published, runs, *, of_mean=False):
 
 @figures.styled
 def draw_rewards(rewards):
-    """Draw the differences of mean rewards to published rewards, with intervals and margins.
-
-    ``rewards``: as :func:`compare_rewards` returns it.
-    """
+    """Draw the differences of :func:`compare_rewards`, with intervals and margins."""
     shown = rewards[rewards.published.notna() & (rewards.several | rewards.hands.isna())]
     figure, (axes,) = figures.panels((1, 1), (figures.ONE, 0.85 + 0.185 * len(shown)))
     names = []

@@ -53,10 +53,7 @@ def measure_solutions(study):
 
 @figures.styled
 def draw_solutions(solutions):
-    """Draw the posture that hits each goal and the posture before, a row of panels for each run.
-
-    ``solutions``: as :func:`measure_solutions` returns it.
-    """
+    """Draw the posture that hits each goal and the posture before, a row of panels for each run."""
     runs = solutions.groupby(["task", "condition"], sort=False)
     most = solutions.goal.max()
     size = figures.TWO, min(TALLEST, 0.82 * runs.ngroups)

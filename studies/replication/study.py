@@ -1,14 +1,12 @@
-"""Replication: what of Shah, Barto & Fagg (2013) comes out again?
+"""Judge what of Shah, Barto & Fagg (2013) replicates.
 
     coartic run comparison --out results/comparison
     python studies/replication/study.py results/comparison [FOLDER ...] [--out FOLDER]
 
-judges the paper's claims and compares its rewards and hands with ours. The folder of suite
-``comparison`` comes first; claims for which it has no runs are judged by the folders that follow,
-of suites ``ablations`` and ``families``. Writes claims.csv, rewards.csv, solutions.csv,
-rewards.svg, solutions.svg and page.html into the folder ``--out``; without it, the tables without
-ids of runs, the figures and README.md into this folder. Without folders: figures and page, of the
-stored tables.
+The folder of suite ``comparison`` comes first; claims for which it has no runs are judged by the
+folders that follow, of suites ``ablations`` and ``families``. Writes tables, figures and page.html
+into the folder ``--out``; without it, the tables without ids of runs, the figures and README.md
+into this folder. Without folders: figures and page, of the stored tables.
 """
 
 import argparse
@@ -26,10 +24,7 @@ HERE = Path(__file__).parent
 
 
 def measure(folders):
-    """Measure results folders: tables ``claims``, ``rewards`` and ``solutions``.
-
-    Column ``suite`` of the claims is the suite whose runs judge the claim; empty without runs.
-    """
+    """Return the tables of results folders by name."""
     studies = [load(folder) for folder in folders]
     return {
         "claims": judge_by_first(studies),
@@ -55,8 +50,8 @@ def with_stored(claims):
 
 
 def write(out):
-    """Draw the figures and fill in the page, from the tables in a folder; as HTML, with the
-    evidence of each claim, in another folder than this."""
+    """Draw the figures and fill in the page from the tables in a folder: README.md here, page.html
+    with the evidence of each claim elsewhere."""
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in out.glob("*.csv")}
     for name, draw in (("rewards", draw_rewards), ("solutions", draw_solutions)):
         (out / f"{name}.svg").write_bytes(figures.picture(draw(stored[name]), ".svg"))

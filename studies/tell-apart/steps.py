@@ -1,8 +1,11 @@
 """The third contrast, steps from trial to trial: is the best trial kept?"""
 
+from itertools import product
+
 import numpy as np
 from people import NOISE, PEOPLE, plan
 
+from coartic.analysis.signatures.two_contexts import movable
 from coartic.baselines.posture_based import TwoGoals
 from coartic.method import Information, Session
 
@@ -22,7 +25,7 @@ def series(task, model, seed):
     targets = np.full((1, len(task.goals), len(task.q0)), np.nan)
     if model == "planner":
         targets[0] = plan(task, TwoGoals, seed)[0]
-    free, postures, rewards = moving(task), [], []
+    free, postures, rewards = movable(task, "right"), [], []
     for trial in range(BLOCK.stop):
         tried = targets.copy()
         if trial or model == "planner":
@@ -36,13 +39,6 @@ def series(task, model, seed):
     return np.array(postures), np.array(rewards)
 
 
-def moving(task):
-    """Indices of the joints that the right hand moves with."""
-    arm = task.robot.joints("right")
-    base = [k for k, axis in enumerate("xy") if axis not in task.locked_base]
-    return [*base, *range(arm.start, arm.stop)]
-
-
 def steps(task, seed):
     """Rows of a task: a model and person each.
 
@@ -50,15 +46,15 @@ def steps(task, seed):
     deviation from the ten trials before that the next trial keeps, if it was the best so far, less
     that if it was not.
     """
-    for model, person in ((m, p) for m in ("learner", "fixed", "walk", "planner")
-                          for p in range(PEOPLE)):  # fmt: skip
+    free = movable(task, "right")
+    for model, person in product(("learner", "fixed", "walk", "planner"), range(PEOPLE)):
         postures, rewards = series(task, model, 1000 * seed + person)
         records = np.flatnonzero(rewards[1:] > np.maximum.accumulate(rewards)[:-1]) + 1
         same, sums = [], np.zeros((2, 2))
         for g in range(len(task.goals)):
-            q = postures[:, g, moving(task)]
+            q = postures[:, g, free]
             jacobian = task.robot.jacobian(postures[BLOCK, g].mean(axis=0), "right")
-            z = q @ np.linalg.svd(jacobian[:, moving(task)])[2][2:].T  # the hand does not move
+            z = q @ np.linalg.svd(jacobian[:, free])[2][2:].T  # the hand does not move
             step = np.diff(z[BLOCK], axis=0)
             same.append(np.mean(step[1:] * step[:-1] > 0))
             for t in range(11, len(z) - 1):

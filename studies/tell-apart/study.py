@@ -1,13 +1,7 @@
 """Measure which experiment would distinguish trial and error from planning.
 
-    python studies/tell-apart/protocols.py results/tell-apart
-    python studies/tell-apart/study.py results/tell-apart
-
-writes the protocols' rows (changes.csv, starts.csv, steps.csv), results.csv, power.csv, claims.csv,
-figure.svg and the page, README.md; without a folder figure and page, of the stored tables.
-
-All predictions with their rules are in :func:`judge_claims`, committed before the test instances
-were run.
+python studies/tell-apart/protocols.py results/tell-apart
+python studies/tell-apart/study.py results/tell-apart
 """
 
 import sys
@@ -41,14 +35,13 @@ def share_by_task(changes):
     )  # fmt: skip
 
 
-def tabulate(changes, starts, steps):
+def tabulate(shares, starts, steps):
     """Means over tasks with intervals, a row for each measure of a model.
 
     Shares vary between tasks, so that ``share_1`` has its median and its ``pooled`` value, sums
     over tasks, as well, and the trials to half their quartiles. ``unlike``: tasks on which two
     learners of the changed task differ by more than the learner shifts.
     """
-    shares = share_by_task(changes)
     columns = [*(f"share_{n}" for n in AFTER), "shift", "half", "drift", "from_anew", "gap"]
     by = shares.assign(unlike=shares.among > shares.square).groupby(
         ["distance", "model"], sort=False
@@ -61,7 +54,6 @@ def tabulate(changes, starts, steps):
     })  # fmt: skip
     tables = [means(shares, ["distance", "model"], columns)
               .merge(more, left_on=["distance", "model"], right_index=True)]  # fmt: skip
-    starts = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
     tables.append(means(starts, ["model", "trials"], ["ratio"]))
     tables.append(means(steps.groupby(["model", "task"], sort=False).mean(numeric_only=True)
                         .reset_index(), ["model"], ["same", "kept", "records"]))  # fmt: skip
@@ -71,16 +63,12 @@ def tabulate(changes, starts, steps):
     return pd.concat(tables).rename(columns={"rows": "tasks"}).rename_axis("row")
 
 
-def judge_claims(changes, starts, steps):
-    """The predictions, each with its rule, judged on random tasks: the paper's were seen before.
-
-    A mean on the other side of its bound counts against a prediction.
-    """
-    changes, starts, steps = (raw[raw.task.str.contains("/")] for raw in (changes, starts, steps))
-    shares = share_by_task(changes)
+def judge_claims(shares, starts, steps):
+    """Judge the predictions, committed before any test instance was run, on random tasks: those of
+    the paper were seen before."""
+    shares, starts, steps = (raw[raw.task.str.contains("/")] for raw in (shares, starts, steps))
     shares = shares[shares.distance == 0.5].pivot(index="task", columns="model")  # noqa: PD010
-    ratio = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
-    ratio = ratio.pivot_table("ratio", "task", ["model", "trials"])
+    ratio = starts.pivot_table("ratio", "task", ["model", "trials"])
     same, kept = (steps.pivot_table(name, "task", "model") for name in ("same", "kept"))
     rule = "one-tailed bootstrap test over test tasks, goals moved by half a link: "
     return judge({
@@ -172,7 +160,7 @@ def people_needed(learner, planner, noise, items, planned, rng):
     return np.nan
 
 
-def find_power(changes, starts, steps):
+def find_power(shares, starts, steps):
     """People needed for each contrast, by what they are.
 
     Noise: in the first contrast ``NOISE`` in each joint of one trial, as a share of the planner's
@@ -180,7 +168,7 @@ def find_power(changes, starts, steps):
     the spread of runs, as a share of the distance of the groups, whose middle is 0; in the third
     the spread of persons.
     """
-    shares, rng = share_by_task(changes), np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     ratio = starts[(starts.model == "learner") & (starts.trials == 1)]
     apart = np.sqrt(np.median(ratio.between / ratio.within) - 1)  # of groups, in RMS within pairs
     person = steps.groupby("model")[["same", "kept"]].agg(["mean", "std"])
@@ -235,8 +223,10 @@ def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
     rows = {name: pd.read_csv(Path(folder) / f"{name}.csv")
             for name in ("changes", "starts", "steps")}  # fmt: skip
-    makers = {"results": tabulate, "claims": judge_claims, "power": find_power}
-    tables = {name: make(**rows) for name, make in makers.items()}
+    shares, starts = share_by_task(rows["changes"]), rows["starts"]
+    ratio = np.log10(starts.between / starts.within) / 2  # logarithm of a ratio of distances
+    seen = shares, starts.assign(ratio=ratio), rows["steps"]
+    tables = {"results": tabulate(*seen), "claims": judge_claims(*seen), "power": find_power(*seen)}
     return tables | {name: table.set_index("task") for name, table in rows.items()}
 
 

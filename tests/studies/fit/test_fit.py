@@ -15,9 +15,8 @@ from tests.support.processes import program
 from tests.support.strategies import metres_task
 
 FOLDER = Path(__file__).parents[3] / "studies" / "fit"
-PROTOCOLS, FIT, STUDY, FOREIGN, PLAIN = (
-    program(FOLDER / f"{name}.py")
-    for name in ("protocols", "fit", "study", "foreign", "plain_person")
+PROTOCOLS, FIT, STUDY, PLAIN = (
+    program(FOLDER / f"{name}.py") for name in ("protocols", "fit", "study", "plain_person")
 )
 TASK = load_task("two-armed-1")
 
@@ -105,24 +104,24 @@ def test_lost_trials_and_hits_are_counted(people):
     kept = first[~first.trial.isin([10, 20]) & ~((first.trial == 30) & (first.goal > 2))]
     fitted = FIT.fit(kept, TASK).iloc[0]
     assert (fitted.trials, fitted.lost, fitted.missing) == (60, 2, 2)
-    with pytest.warns(UserWarning, match="subject 0 is left out: .* two trials"):
-        assert not len(FIT.fit(first[first.trial == 1], TASK))
     with pytest.raises(CoarticError, match="EC1 does not use the left hand"):
         FIT.fit(first, TASK, condition=CONDITIONS["EC1"])
 
 
-@pytest.mark.parametrize("why", ["two trials", "postures are equal", "take 400 ticks, as by a met"])
+DEGENERATE = {
+    "two trials": lambda hits: hits[hits.trial == 1],
+    "postures are equal": lambda hits: pd.concat(
+        [hits[hits.trial == 1].assign(trial=n) for n in range(1, 31)], ignore_index=True
+    ),
+    "take 400 ticks, as by a met": lambda hits: hits.assign(ticks=100),
+}
+
+
+@pytest.mark.parametrize("why", DEGENERATE)
 def test_degenerate_trials_are_left_out_with_the_reason(people, why):
-    first = people[people.subject == 0]
-    if why == "two trials":
-        frame = first[first.trial == 1]
-    elif why == "postures are equal":
-        same = [first[first.trial == 1].assign(trial=n) for n in range(1, 31)]
-        frame = pd.concat(same, ignore_index=True)
-    else:
-        frame = first.assign(ticks=100)
+    hits = DEGENERATE[why](people[people.subject == 0])
     with pytest.warns(UserWarning, match=f"subject 0 is left out: .*{why}"):
-        assert not len(FIT.fit(frame, TASK))
+        assert not len(FIT.fit(hits, TASK))
 
 
 def test_an_arm_without_a_null_space_is_refused_before_any_fit():
@@ -137,7 +136,7 @@ def test_an_arm_without_a_null_space_is_refused_before_any_fit():
     ("model", "noise"), [("averages", 0.0), ("recent", 0.02), ("by goal", 0.0), ("decays", 0.02)]
 )
 def test_people_of_other_models_are_none_of_the_six(model, noise):
-    people = FOREIGN.simulate_foreign(TASK, model, 0.04, 0.3, seed=1, trials=100)
+    people = PROTOCOLS.simulate(TASK, model, 0.04, 0.3, seeds=[1], trials=100)
     joints = [*TASK.robot.joint_names]
     people[joints] += noise * np.random.default_rng(1).standard_normal((len(people), len(joints)))
     fitted = FIT.fit(people, TASK, noise=noise).iloc[0]
@@ -185,5 +184,5 @@ def test_tables_count_whom_the_fit_recovers():
     answers = STUDY.answer(hundred)
     assert answers.to_numpy().sum() == len(people) == 22
     assert answers.none.sum() == (people.misfit.fillna("") != "").sum() >= 4
-    assert answers[~answers.index.str.contains("|".join(FOREIGN.FOREIGN))].none.sum() <= 1
+    assert answers[~answers.index.str.contains("|".join(PROTOCOLS.FOREIGN))].none.sum() <= 1
     assert STUDY.outliers(hundred).people.tolist() == [6]
