@@ -72,12 +72,14 @@ styled = style.context(["default", RC])
 
 
 Look = dict[str, Any]
-"""Look of a method's lines: ``color`` and ``linestyle``."""
+"""Look of a method's lines and marks: ``color``, ``linestyle``, ``linewidth``, ``markersize``."""
 
 
-def look_of(color: str, dash: str) -> Look:
-    """Return the look of lines by the names of a colour and a dash."""
-    return {"color": _COLORS[color], "linestyle": _DASHES[dash]}
+def look_of(names: tuple[str, str], bold: bool) -> Look:
+    """Return the look of lines and marks by the names of a colour and a dash."""
+    color, dash = names
+    sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
+    return {"color": _COLORS[color], "linestyle": _DASHES[dash], **sizes}
 
 
 def grid(panels: int) -> tuple[int, int]:

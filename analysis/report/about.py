@@ -17,6 +17,7 @@ from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.standings import common_tasks, reference
 from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.table import is_setting
 from coartic.analysis.words import NO_BREAK, interval, listed, marked, number, p_value, tally
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
@@ -62,9 +63,7 @@ def finding(study: Study, section: Section) -> list[str]:
     """Return the lines of a section's sentence; none without rows in its first table."""
     frame = section.tables[0](study)
     label = frame.method if "method" in frame else frame.index.to_series()
-    under = frame.attrs["under"]
-    main = ~label.map(lambda method: under.get(method) in {*label}).astype(bool)
-    rows = frame.assign(title=label.map(study.methods.title))[main]
+    rows = frame.assign(title=label.map(study.methods.title))[~is_setting(frame)]
     if not section.sentence or not len(rows):
         return []
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)

@@ -194,11 +194,11 @@ def draw_coarticulation(study: Study) -> Parts | None:
     lasts = data.sort_values("trials").drop_duplicates("base", keep="last").sort_index()
     looks: Any = looks_in(study, lasts.method)
     for look, mark in zip(looks.values(), itertools.cycle("osD^v<>pPX*"), strict=False):
-        look |= {"marker": mark, "markersize": 4}
+        look["marker"] = mark
     for axes, name in zip(panels, shown, strict=True):
         for _, rows in data.dropna(subset=name).sort_values("trials").groupby("base"):
             last: Any = rows.iloc[-1]
-            axes.plot(rows.gain, rows[name], linewidth=0.8, **looks[last.method])
+            axes.plot(rows.gain, rows[name], **looks[last.method])
             title = study.methods.title[last.method]
             style.tip(axes.lines[-1], f"{title}: gain {last.gain:.1f}, {last[name]:.2f}")
         axes.axhline(0, color=style.GREY, linewidth=0.5)

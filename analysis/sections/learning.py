@@ -82,7 +82,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
             look = looks[str(label)]
             band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
             axes.fill_between(curve.trial, curve.best_low, curve.best_high, **band)
-            axes.plot(curve.trial, curve.best, linewidth=1.3, **look)
+            axes.plot(curve.trial, curve.best, **look)
         floor, top = of_task.best.min(), of_task.best_high.max()
         zero, optimum = study.corrective_best[task.name], study.optima.get(task.name)
         if not math.isnan(zero):
@@ -100,8 +100,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.legend_line(study.methods.title[label], linewidth=1.3, **look)
-        for label, look in looks.items()
+        style.legend_line(study.methods.title[label], **look) for label, look in looks.items()
     ]
     handles += [style.legend_line("corrective process alone, best hands", **style.INITIAL)]
     if known := [task.name for task in tasks if task.name in study.optima]:

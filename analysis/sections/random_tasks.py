@@ -92,13 +92,18 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         for label, rows in data[data.family == family].groupby("method"):
             place = order.index(label)
             heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
-            dot: Any = {"color": looks[label]["color"], "markersize": 2.5, "markeredgewidth": 0}
+            size = looks[label]["markersize"]
+            dot: Any = {
+                "color": looks[label]["color"],
+                "markersize": size / 2,
+                "markeredgewidth": 0,
+            }
             gaps = rows.gap.clip(upper=1.0)
             axes.plot(gaps, heights, "o", linestyle="", alpha=0.5, **dot)
             mean = rows.iloc[0]
             ends = [mean.mean_low, mean.mean_high]
             axes.plot(ends, [-place, -place], color=style.INK, linewidth=1)
-            diamond: Any = {"markersize": 4, "markerfacecolor": style.BACKGROUND, "zorder": 4}
+            diamond: Any = {"markersize": size, "markerfacecolor": style.BACKGROUND, "zorder": 4}
             axes.plot(mean["mean"], -place, "D", color=style.INK, **diamond)
         axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
         axes.set_xlim(-0.004, 1.15)
@@ -106,6 +111,8 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])
     style.name_rows(panels[0], [*methods.title[order]])
+    for label, method in zip(panels[0].get_yticklabels(), order, strict=True):
+        label.set_fontweight("normal" if methods.built_in[method] else "bold")
     panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
     first = data.drop_duplicates(["method", "family"]).join(methods.title, on="method")

@@ -162,7 +162,7 @@ def ranked(study: Study) -> list[str]:
     "proven, to the best of this folder where none is known. Means over all tasks where there are "
     "several. The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
     "have none. n: runs. Diamonds: the paper's learner. Bold names: the learner and methods from "
-    "files.",
+    "files, whose marks are larger.",
 )
 def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of every method, a mean over tasks, with its name."""
@@ -203,10 +203,11 @@ def draw_ranking(study: Study) -> Parts | None:
             label.set_color(style.GREY)
             continue
         learner, y = row["is_learner"], -place
+        size = looks[row["method"]]["markersize"] + learner  # a diamond of equal width is smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
-        axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=4, alpha=0.5, **look)
+        axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
         mark = "D" if learner else "o"
-        (dot,) = axes.plot(row["gap"], y, mark, markersize=2.6, markeredgewidth=0, **look)
+        (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = shown_name(study, row["method"])
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
