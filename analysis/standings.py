@@ -32,6 +32,7 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs of every compared method, by the label of its row in :attr:`.Study.methods`,
     on tasks with a best known reward."""
     runs = study.runs[study.runs.best_known.notna()]
+    runs.attrs = {}  # which pandas copies with every selection
     by_row = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
     rows = study.methods.index[~study.methods.is_search]
     return {method: by_row[method] for method in rows if method in by_row}

@@ -31,7 +31,7 @@ IN_LATEX = {
     "contexts": "place, method, runs, distance, p_holm, control, p_random_search",
     "ranking": "method, gap, share, on *",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
-    "learning": "task, method, runs, after_*, trials_to_half_gain",
+    "learning": "task, method, runs, after_*",
     "signatures": "task, method, hands, runs, first, first_control, first_p, arm, arm_p",
     "family-gaps": "method, gap, in *",
     "tasks": "task, arms, base, initial, optimum, bound",

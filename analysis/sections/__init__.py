@@ -121,7 +121,8 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
         (costs.list_runtimes, learning.list_learning),
         (costs.draw_runtimes, learning.draw_learning_curves),
         sentence="""\
-Reward targets reached, and trials to half of them: \
+Targets reached (rewards from the corrective process alone to the optimum, evenly spaced), and \
+trials to half of the targets: \
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
 {{ row.title }} {{ (100 * row.reached) | number(0) }} % \

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
@@ -297,9 +298,9 @@ def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     parts = []
     for place, (task, runs) in enumerate(zip(shared.tasks, shared.configurations, strict=True)):
         color, following = (style.BLUE, style.VERMILLION)[place], goals[place].tolist()
-        faint: Any = {"linewidth": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
-        for q in runs:
-            axes.plot(*robot.joint_positions(q, shared.hand).T, color=color, **faint, zorder=1)
+        faint: Any = {"linewidths": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
+        arms = [robot.joint_positions(q, shared.hand) for q in runs]
+        axes.add_collection(LineCollection(arms, colors=color, **faint, zorder=1), autolim=False)
         base: Any = {"facecolor": color, "alpha": 0.12, "edgecolor": color, "linewidth": 0.8}
         axes.fill(*outlines[place].T, **base)
         around = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]

@@ -28,7 +28,7 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "task; method; runs; corrective_best: corrective process, best hands .1; "
     "after_100: after 100 trials .1; "
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1; "
-    "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]",
+    "trials_to_half_gain[]: -",
 )
 def list_learning(study: Study) -> Rows:
     """List the best reward after some numbers of trials (mean over runs), and the trial at which a
