@@ -84,12 +84,12 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float], str]:
     """Return the labels of random search on a task by the hands of its runs, empty for random
     search with every hand sequence, and the number of its trials."""
     labels = dict[tuple[str, float], str]()
-    for label, base in study.methods.base[study.methods.algorithm == "random search"].items():
+    of_search = study.methods[study.methods.algorithm == "random search"]
+    for label in map(str, of_search.index):
         hands = {*solved(study.cells.get((task, label), study.runs[:0])).hands}
-        if base == RANDOM_SEARCH and len(hands) == 1:
-            labels.setdefault((*hands, _most_trials(study, task, label)), label)
-        elif base == f"{RANDOM_SEARCH}/hands" and hands:
-            labels.setdefault(("", _most_trials(study, task, label)), label)
+        every = {""} if of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
+        if hands and len(every) == 1:
+            labels.setdefault((every.pop(), _most_trials(study, task, label)), label)
     return labels
 
 

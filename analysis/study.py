@@ -425,7 +425,7 @@ class Study:
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
         """Return a signature of the runs of a method on a task that have it, shape ``(n,)``."""
-        values = self._signature_of_each(name, task, method, replay=replay)
+        values: Array = self._signature_of_each(name, task, method, replay=replay)
         return values[np.isfinite(values)]
 
     @cached
