@@ -174,8 +174,8 @@ class Study:
         CoarticError
             The folder has no such method or task, or no run of them.
         """
-        jobs, known = list(self.plan), {*self.methods.index, *self.methods.base}
-        for kind, names, there in (("method", methods, known), ("task", tasks, {*self.tasks})):
+        jobs, labels = list(self.plan), {*self.methods.index, *self.methods.base}
+        for kind, names, there in (("method", methods, labels), ("task", tasks, {*self.tasks})):
             for name in names or ():
                 if name not in there:
                     raise CoarticError(unknown(kind, name, sorted(there)))
@@ -218,12 +218,12 @@ class Study:
 
         Where the corrective process alone with its best hands exceeds all runs, its reward.
         """
-        known = best_known(self.stored, self.tasks.values())
-        for name, best in known.items():
+        rewards = best_known(self.stored, self.tasks.values())
+        for name, best in rewards.items():
             if (alone := self.corrective_best[name]) > best.reward:
                 source = "corrective process alone"
-                known[name] = replace(best, reward=int(alone), source=source, run_id="")
-        return known
+                rewards[name] = replace(best, reward=int(alone), source=source, run_id="")
+        return rewards
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:

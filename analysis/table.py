@@ -127,8 +127,8 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table.
 
     ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
-    and ablation, by label; ``own``: labels of methods from files; ``known``: True if a best known
-    reward does not come from this folder alone.
+    and ablation, by label; ``own``: labels of methods from files; ``best_known``: True if a best
+    known reward does not come from this folder alone.
     """
     methods, tasks = study.methods, study.tasks
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
@@ -137,7 +137,7 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
         "titles": {**families, **marks, **methods.title},
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
-        "known": any(not best.only_here for best in study.optima.values()),
+        "best_known": any(not best.only_here for best in study.optima.values()),
     }
 
 

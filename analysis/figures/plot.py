@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import pandas as pd
 from matplotlib import rc_context
@@ -58,34 +58,16 @@ class Plot:
         words = html.escape(one_line(f"{self.title}. {self.caption}"))
         return f"<figure>{for_page(self)}<figcaption>{words}</figcaption></figure>"
 
-    def _repr_png_(self) -> bytes:
-        """Return the picture that programs show that show no HTML."""
-        return picture(self.figure, ".png")
-
 
 Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 """Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and its tasks."""
+DrawsFigure = Callable[..., Plot | None]
+"""A figure of the report, as a function of a study; None if the folder has no runs for it.
 
-
-class DrawsFigure(Protocol):
-    """A figure of the report, as a function of a study."""
-
-    def __call__(
-        self,
-        study: Study,
-        /,
-        *,
-        width: float | None = None,
-        methods: Sequence[str] | None = None,
-        tasks: Sequence[str] | None = None,
-        style: Any = (),
-    ) -> Plot | None:
-        """Draw the figure, or return None if the folder has no runs for it.
-
-        ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks`` as
-        :meth:`.Study.only` takes them; ``style``: settings of Matplotlib that count more than the
-        project's, as ``matplotlib.style.use`` takes them.
-        """
+Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks`` as
+:meth:`.Study.only` takes them; ``style``: settings of Matplotlib that count more than the
+project's, as ``matplotlib.style.use`` takes them.
+"""
 
 
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:

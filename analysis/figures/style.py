@@ -63,9 +63,8 @@ _DASHES: dict[str, Any] = {
     "dash-dotted": (0, (5, 1.2, 1, 1.2)),
     "long-dashed": (0, (9, 1.5)),
 }
-SOLID, DASHED, DOTTED, DASH_DOTTED, _ = _DASHES.values()
-OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": DOTTED}
-INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": DASH_DOTTED}
+OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": _DASHES["dotted"]}
+INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": _DASHES["dash-dotted"]}
 """Lines at the rewards of the optimum and of the initial solution."""
 styled = style.context(["default", RC])
 """Decorator that draws in this style on Matplotlib's defaults, without the user's settings."""

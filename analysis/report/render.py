@@ -66,7 +66,7 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
             continue
         what = name.removeprefix(column.name)
         header = column.header.replace("{}", titles.get(what, what))
-        if header == "gap (%)" and not frame.attrs.get("known", True):
+        if header == "gap (%)" and not frame.attrs.get("best_known", True):
             header = "gap to the best of this folder (%)"
         if f"{name}_sd" in frame:
             header += " ± SD"

@@ -89,8 +89,8 @@ def list_contexts(study: Study) -> Rows:
                 "distance": shared.posture_difference,
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
-                **beside_control(study, shared),
-                "verdict": verdict_of(study, shared),
+                **(control := beside_control(study, shared)),
+                "verdict": verdict_of(study, shared, control),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **run_ids(*(study.cells[task.name, label] for task in shared.tasks)),
@@ -212,10 +212,11 @@ def draw_coarticulation(study: Study) -> Parts | None:
     return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
 
 
-def verdict_of(study: Study, shared: TwoContexts) -> str:
+def verdict_of(study: Study, shared: TwoContexts, control: Row | None = None) -> str:
     """Return in words whether the posture at a shared goal depends on the next goal.
 
     Stochastic methods need a test; methods that select from trials need random search, too.
+    ``control``: :func:`beside_control` if it is there already.
     """
     method: Any = study.methods.loc[shared.method]
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
@@ -227,7 +228,8 @@ def verdict_of(study: Study, shared: TwoContexts) -> str:
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"
-    beyond = beside_control(study, shared).get("p_random_search", math.nan)
+    control = beside_control(study, shared) if control is None else control
+    beyond = control.get("p_random_search", math.nan)
     if math.isnan(beyond):
         return "undecided: too few runs of random search"
     return "different postures" if beyond < LEVEL else "no more than random search"

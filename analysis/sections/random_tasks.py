@@ -10,7 +10,7 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.standings import best_of_instances, compared
+from coartic.analysis.standings import compared
 from coartic.analysis.statistics.instances import Scores, other_tasks
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
@@ -20,10 +20,10 @@ from coartic.analysis.table import Row, Rows, run_ids, table
 def on_instances(study: Study) -> pd.DataFrame:
     """Return the solved runs of compared methods on instances of families, with the label of the
     row of the method in column ``method``."""
-    names = [*best_of_instances(study)]
     parts = [solved(runs).assign(method=method) for method, runs in compared(study).items()]
     every = pd.concat([*parts, study.runs[:0]], ignore_index=True)
-    place = every.task.map({name: number for number, name in enumerate(names)})
+    instances = [name for name in study.optima if study.tasks[name].family is not None]
+    place = every.task.map({name: number for number, name in enumerate(instances)})
     return every[place.notna()].assign(place=place).sort_values("place", kind="stable")
 
 

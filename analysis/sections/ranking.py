@@ -19,7 +19,6 @@ from coartic.analysis.standings import (
     common_runs,
     common_tasks,
     compared,
-    gap_of,
     reference,
     shown_name,
 )
@@ -119,11 +118,11 @@ def list_ranking(study: Study) -> Rows:
     single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
     for method in ranked(study):
         of_method = compared(study)[method]
-        by_task = dict([*of_method.groupby("task", sort=False)])
+        gaps = {task: solved(runs).gap.mean() for task, runs in of_method.groupby("task")}
         row: Row = {"method": method, "information": study.methods.information[method]}
-        row |= {f"on {t}": gap_of(by_task[t]) if t in by_task else math.nan for t in single}
+        row |= {f"on {task}": gaps.get(task, math.nan) for task in single}
         row |= {"runs": len(of_method), "failed": len(of_method) - len(solved(of_method))}
-        row |= {"missing": sum(task not in by_task for task in common_tasks(study))}
+        row |= {"missing": sum(task not in gaps for task in common_tasks(study))}
         row |= over.get(method, {})
         pairs = {f"{task} {label}" for task, label in of_method[["task", "label"]].to_numpy()}
         tests = tested[tested.index.isin(pairs)]
@@ -136,19 +135,12 @@ def list_ranking(study: Study) -> Rows:
 
 
 def ranked(study: Study) -> list[str]:
-    """Return the methods of the ranking in their order.
+    """Return the methods of the ranking by mean gap, then those without one as in lists.
 
-    By mean gap; then methods without a mean gap, by the gap on the first task that they solved.
     Methods from files come first, and settings after their method.
     """
-    over, rest = [*board(study).index], list[tuple[float, float, str]]()
-    for method, runs in compared(study).items():
-        if method not in over and len(study.methods.parts[method]) == 1:
-            gaps = solved(runs).groupby("task", sort=False).gap.mean()
-            places = [place for place, task in enumerate(study.tasks) if task in gaps.index]
-            gap = gaps[[*study.tasks][places[0]]] if places else math.inf
-            rest.append((places[0] if places else math.inf, gap, method))
-    names = [*over, *(method for *_, method in sorted(rest, key=lambda each: each[:2]))]
+    single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
+    names = [*dict.fromkeys((*board(study).index, *single))]
     names.sort(key=lambda method: bool(study.methods.built_in[method]))
     under = study.methods.under
     of_method = {first: [m for m in names if under[m] == first] for first in names}

@@ -143,11 +143,6 @@ class Signature:
     """Function of solutions that returns the signature of each run, shape ``(n,)``, or NaN."""
     words: str
 
-    def of(self, runs: Solutions) -> Array:
-        """Return the signature of the k runs that have it, shape ``(k,)``."""
-        values = self.each(runs)
-        return values[np.isfinite(values)]
-
 
 def hand(runs: Solutions) -> Array:
     """Return, for each run, the share of goals before the last whose hand is not the fastest for
