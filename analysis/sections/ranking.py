@@ -88,9 +88,7 @@ def after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     "Gap and share of the possible gain, over all tasks, and gap on each",
     "method; gap[]: gap (%) .1; share[]: share of the gain (%) .0; information: use of the reward; "
     "better: better than the learner on (tasks); worse: worse on (tasks); "
-    "share_early[]: -; gap_early: -; "
-    "share_one_armed[]: -; gap_one_armed: -; share_two_armed[]: -; gap_two_armed: -; "
-    "on *: {} (%) .1; tasks; missing: -; without_gain: -; "
+    "gap_early: -; on *: {} (%) .1; tasks; missing: -; without_gain: -; "
     "forward_kinematics: -; cpu_s: -; runs; failed: -",
 )
 def list_ranking(study: Study) -> Rows:
@@ -98,21 +96,13 @@ def list_ranking(study: Study) -> Rows:
     after their method.
 
     ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
-    them, over the ``tasks`` that it solved. Also by arms, and after a thousand trials; and means of
-    what a run costs.
+    them, over the ``tasks`` that it solved. Also the gap after a thousand trials, and means of what
+    a run costs.
     """
     tested, runs = list_against_learner(study), common_runs(study)
-    subsets = {
-        "_one_armed": runs[runs.arms == 1],
-        "_two_armed": runs[runs.arms == 2],
-        "_early": after(study, runs, EARLY),
-    }
     wide = board(study).reindex(columns=[*SCORE_COLUMNS, "tasks", "missing", "without_gain"])
-    for name, frame in subsets.items():
-        if len(frame):
-            ends = [score.partition("_") for score in SCORE_COLUMNS]
-            names = [score + name + line + end for score, line, end in ends]
-            wide = wide.join(ranking(frame).reindex(columns=SCORE_COLUMNS).set_axis(names, axis=1))
+    if len(runs):
+        wide["gap_early"] = ranking(after(study, runs, EARLY)).gap
     wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
     over: dict[Any, Any] = wide.to_dict("index")
     single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
