@@ -114,8 +114,10 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     return {label: style.look_of(rows.look[label], own[label]) for label in rows.index}
 
 
-def spoken(rows: pd.DataFrame, template: str) -> str:
-    """Return each row in words, for an alternative text: names in ``{}`` are columns."""
+def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
+    """Return each row in words, for an alternative text: names in ``{}`` are columns, ``{title}``
+    is the name of the method."""
+    rows = rows.assign(title=rows.method.map(study.methods.title))
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 

@@ -208,7 +208,7 @@ def draw_coarticulation(study: Study) -> Parts | None:
     style.letters(panels)
     handles = [style.legend_line(study.methods.title[each], **looks[each]) for each in looks]
     style.legend(drawing, handles, 3)
-    words = spoken(lasts.join(study.methods.title, on="method"), "{title}: gain {gain:.0f}")
+    words = spoken(study, lasts, "{title}: gain {gain:.0f}")
     return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
 
 

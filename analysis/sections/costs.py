@@ -298,6 +298,6 @@ def draw_runtimes(study: Study) -> Parts | None:
             textcoords="offset points", annotation_clip=False,
             weight="normal" if study.methods.built_in[end["method"]] else "bold",
         )  # fmt: skip
-    shares = spoken(ends.join(study.methods.title, on="method"), "{title} {share:.0f} %")
+    shares = spoken(study, ends, "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()

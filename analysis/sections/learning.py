@@ -95,7 +95,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
         handles.append(style.legend_line(standings.reference(study, known), **style.OPTIMUM))
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
-    words = spoken(ends.join(study.methods.title, on="method"), "{task}, {title}: {best:.0f}")
+    words = spoken(study, ends, "{task}, {title}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."
     return drawing, data, alt, tasks
 

@@ -115,6 +115,6 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         label.set_fontweight("normal" if methods.built_in[method] else "bold")
     panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
-    first = data.drop_duplicates(["method", "family"]).join(methods.title, on="method")
-    means = spoken(first, "{title}, {family}: {mean:.1%}")
+    first = data.drop_duplicates(["method", "family"])
+    means = spoken(study, first, "{title}, {family}: {mean:.1%}")
     return drawing, data, f"Gaps of instances by method and family. {means}.", ()

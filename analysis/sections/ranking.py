@@ -200,7 +200,7 @@ def draw_ranking(study: Study) -> Parts | None:
     where = "" if len(tasks) > 1 else f"{study.tasks[tasks[0]].label}: "
     short = to.removesuffix(" reward").replace("this ", "").replace("optimum", "the optimum")
     axes.set_xlabel(f"{where}gap to {short} (%)")
-    alt = f"Gap to the {to} by method: {spoken(shown, '{title} {gap:.1f} %')}."
+    alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
 
 
