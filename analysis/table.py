@@ -100,7 +100,8 @@ class TableFrame(pd.DataFrame):
         return TableFrame
 
     def __repr__(self) -> str:
-        return repr(pd.DataFrame(self).drop(columns="run_ids", errors="ignore"))
+        with pd.option_context("display.max_columns", 14, "display.precision", 3):
+            return repr(pd.DataFrame(self).drop(columns="run_ids", errors="ignore"))
 
     def _repr_html_(self) -> str:
         return self.drop(columns="run_ids", errors="ignore").to_html(max_rows=20)

@@ -38,9 +38,9 @@ SAME = 1e-9
 
 def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
     """Yield each first goal that two tasks share, for each hand that hit this goal in both."""
-    for first, second, shared in context_pairs(study.tasks):
+    for first, second, shared in context_pairs(one_by_one(study)):
         keys = (first, label), (second, label)
-        if {first, second} <= one_by_one(study).keys() and study.cells.keys() >= {*keys}:
+        if study.cells.keys() >= {*keys}:
             runs = study.executed(first, label), study.executed(second, label)
             for goal in range(1, shared + 1):
                 for hand in HANDS:

@@ -84,7 +84,7 @@ def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     unlike = [f"{what['few']} runs, not {RUNS}"] * bool(what["few"])
     unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
     if unlike:
-        pairs.append(("Unlike the paper", ", ".join(unlike)))
+        pairs.append(("Unlike the paper", "; ".join(unlike)))
     if what["failed"]:
         failed = f"{what['failed']} of {counted(what['runs'], 'run')}: {'; '.join(what['reasons'])}"
         pairs.append(("Failed", failed))
