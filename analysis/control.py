@@ -22,8 +22,9 @@ from typing import Annotated
 import numpy as np
 
 from coartic.analysis.method_frame import BY_TRIAL
+from coartic.analysis.methods import RANDOM_SEARCH
 from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.study import Study, solved
+from coartic.analysis.study import Study, cached, solved
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
@@ -75,17 +76,24 @@ def with_control(
 def _control_of(study: Study, task: str, label: str, hands: str) -> str:
     """Return the label of random search with these hands and as many trials as a method on a task;
     ``hands`` empty: with every hand sequence. Empty without such runs."""
-    method = "random-search" if hands else "random-search/hands"
-    trials = _most_trials(study, task, label)
-    for other in study.methods.index[study.methods.base == method]:
-        runs = solved(study.cells.get((task, other), study.runs[:0]))
-        if not len(runs) or _most_trials(study, task, other) != trials:
-            continue
-        if not hands or {*runs.hands} == {hands}:
-            return str(other)
-    return ""
+    return _controls(study, task).get((hands, _most_trials(study, task, label)), "")
 
 
+@cached
+def _controls(study: Study, task: str) -> dict[tuple[str, float], str]:
+    """Return the labels of random search on a task by the hands of its runs, empty for random
+    search with every hand sequence, and the number of its trials."""
+    labels = dict[tuple[str, float], str]()
+    of_search = study.methods[study.methods.algorithm == "random search"]
+    for label in map(str, of_search.index):
+        hands = {*solved(study.cells.get((task, label), study.runs[:0])).hands}
+        every = {""} if of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
+        if hands and len(every) == 1:
+            labels.setdefault((every.pop(), _most_trials(study, task, label)), label)
+    return labels
+
+
+@cached
 def _most_trials(study: Study, task: str, label: str) -> float:
     """Return the most trials that a run of a method made on a task."""
     return float(study.cells[task, label].trials.fillna(0).max())

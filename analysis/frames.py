@@ -349,9 +349,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     every, rows = {*frame.task[frame.best_known.notna()]}, []
     by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
     for of_method in by_method.values():
-        known = of_method[of_method.best_known.notna()]
-        has_failed = known.gap.isna().groupby(known.task).transform("any")
-        solved = known[~has_failed]
+        of_tasks = of_method[of_method.best_known.notna()]
+        has_failed = of_tasks.gap.isna().groupby(of_tasks.task).transform("any")
+        solved = of_tasks[~has_failed]
         by_task = dict([*solved.groupby("task").gap])
         solved_all = by_task and by_task.keys() == every
         row = (task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap")

@@ -120,11 +120,11 @@ def checked_hits(
     still = [name for name in joints if name not in free | {*frame.columns}]
     frame = frame.assign(**{name: task.q0[joints.index(name)] for name in still})
     if missing := [name for name in needed if name not in frame]:
-        found = ", ".join(map(str, frame.columns.drop(still))) or "none"
+        there = ", ".join(map(str, frame.columns.drop(still))) or "none"
         raise CoarticError(
             f"{source} has no column {', '.join(missing)}; needed are "
             f"{', '.join(name for name in needed if name not in still)} (or duration in place of "
-            f"ticks), separated by commas; found are {found}"
+            f"ticks), separated by commas; found are {there}"
         )
     if not len(frame):
         raise CoarticError(f"{source} has no hit: needed is a row for each")

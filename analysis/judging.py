@@ -209,13 +209,15 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     for (name, (statement, test, finding)), *adjusted in zip(
         claims.items(), p, without, opposite, strict=True
     ):
-        seen = finding.evidence if finding.holds is not None else f"Not judged: {finding.evidence}"
+        evidence = (
+            finding.evidence if finding.holds is not None else f"Not judged: {finding.evidence}"
+        )
         if adjusted[0] < LEVEL <= adjusted[1]:
-            seen += f"; without the task that speaks most for it {p_value(adjusted[1])}"
+            evidence += f"; without the task that speaks most for it {p_value(adjusted[1])}"
         rows[name] = {
             "statement": statement,
             "verdict": finding.verdict(*adjusted[1:]),
-            "evidence": f"{capital(seen)}.",
+            "evidence": f"{capital(evidence)}.",
             "test": test,
             "p_holm": adjusted[0],
             "p_without": adjusted[1],

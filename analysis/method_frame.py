@@ -108,8 +108,12 @@ def _joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple
     for one, two in (*((EC1, label) for label in drawing), INFORMED_LEARNERS):
         one_armed, two_armed = (tasks.get(each, set()) for each in (one, two))
         if two_armed and one_armed - two_armed:
-            both = f"{CONDITION_OF[one]}, {CONDITION_OF[two]}"
-            yield f"{METHOD_PREFIX.rstrip('/')} ({both})", (one, two)
+            yield joined_label(one, two), (one, two)
+
+
+def joined_label(one: str, two: str) -> str:
+    """Return the label of the learner with method ``one`` for one arm and ``two`` for two arms."""
+    return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
 
 
 def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:

@@ -22,8 +22,6 @@ INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two."""
 RANDOM_SEARCH = "random-search"
 """Id of random search: the best of random targets around those of the corrective process."""
-INITIAL = "corrective-alone/given"
-"""Id of the corrective process alone with a task's initial hands: the initial solution."""
 
 
 class _KnownMethod(NamedTuple):

@@ -55,7 +55,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     solved = runs[(runs.status == "ok") & (restrictions(runs).base == BASE)]
     is_search = solved.method.isin(SEARCHES)
     solved = pd.concat([solved[is_search], solved[~is_search]])  # of equal runs a search counts
-    by_task, known = dict([*solved.groupby("task")]), {}
+    by_task, rewards = dict([*solved.groupby("task")]), {}
     for task in tasks:
         here, shipped = by_task.get(task.name, solved[:0]), best_shipped(task)
         searches = here[is_search[here.index]]
@@ -71,8 +71,8 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
             source = label_of(run.method, run.setting), str(run.run_id)
             best = BestKnown(int(run.reward), bound, str(run.hands), *source, only_here)
         if best.reward < 0:
-            known[task.name] = best
-    return known
+            rewards[task.name] = best
+    return rewards
 
 
 @checked_arguments

@@ -12,8 +12,7 @@ import pandas as pd
 
 from coartic.analysis.frames import ranking
 from coartic.analysis.method_frame import with_joined_learners
-from coartic.analysis.optima import BestKnown
-from coartic.analysis.study import Study, cached, solved
+from coartic.analysis.study import Study, cached
 from coartic.internal.text import counted
 
 
@@ -32,6 +31,7 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs of every compared method, by the label of its row in :attr:`.Study.methods`,
     on tasks with a best known reward."""
     runs = study.runs[study.runs.best_known.notna()]
+    runs.attrs = {}  # which pandas copies with every selection
     by_row = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
     rows = study.methods.index[~study.methods.is_search]
     return {method: by_row[method] for method in rows if method in by_row}
@@ -99,12 +99,6 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
     return tuple(str(task) for task, runs in by_task if runs.reward.notna().all())
 
 
-def best_of_instances(study: Study) -> dict[str, BestKnown]:
-    """Return the best known rewards of the instances of families."""
-    optima = study.optima.items()
-    return {name: best for name, best in optima if study.tasks[name].family is not None}
-
-
 def shown_name(study: Study, method: str) -> str:
     """Return the name of a method, with the number of its tasks for a method from a file that did
     not solve all of :func:`common_tasks`."""
@@ -113,8 +107,3 @@ def shown_name(study: Study, method: str) -> str:
         return str(row.title)
     every = {task for runs in compared(study).values() for task in runs.task}
     return f"{row.title} ({len(on)} of {counted(len(every), 'task')})"
-
-
-def gap_of(runs: pd.DataFrame) -> float:
-    """Return the mean gap of the solved runs of a method on a task; NaN without such a run."""
-    return float(solved(runs).gap.astype(float).mean())

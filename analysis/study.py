@@ -177,8 +177,8 @@ class Study:
         CoarticError
             The folder has no such method or task, or no run of them.
         """
-        jobs, known = list(self.plan), {*self.methods.index, *self.methods.base}
-        for kind, names, there in (("method", methods, known), ("task", tasks, {*self.tasks})):
+        jobs, labels = list(self.plan), {*self.methods.index, *self.methods.base}
+        for kind, names, there in (("method", methods, labels), ("task", tasks, {*self.tasks})):
             for name in names or ():
                 if name not in there:
                     raise CoarticError(unknown(kind, name, sorted(there)))
@@ -221,12 +221,12 @@ class Study:
 
         Where the corrective process alone with its best hands exceeds all runs, its reward.
         """
-        known = best_known(self.stored, self.tasks.values())
-        for name, best in known.items():
+        rewards = best_known(self.stored, self.tasks.values())
+        for name, best in rewards.items():
             if (alone := self.corrective_best[name]) > best.reward:
                 source = "corrective process alone"
-                known[name] = replace(best, reward=int(alone), source=source, run_id="")
-        return known
+                rewards[name] = replace(best, reward=int(alone), source=source, run_id="")
+        return rewards
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
@@ -415,17 +415,21 @@ class Study:
             By the index of :attr:`runs`; NaN for runs without the signature, and for runs after the
             first 500 of a method on a task.
         """
-        signature, values = signature_named(name), pd.Series(np.nan, self.runs.index, name=name)
+        values = pd.Series(np.nan, self.runs.index, name=name)
         for key, runs in self.cells.items():
-            executed = self.executed(*key, replay=replay)
-            here = runs.index[runs.run_id.isin(executed.run_ids)]
-            values[here] = signature.each(executed)
+            here = runs.index[runs.run_id.isin(self.executed(*key, replay=replay).run_ids)]
+            values[here] = self._signature_of_each(name, *key, replay=replay)
         return values
+
+    @cached
+    def _signature_of_each(self, name: str, task: str, method: str, *, replay: bool) -> Array:
+        return signature_named(name).each(self.executed(task, method, replay=replay))
 
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
         """Return a signature of the runs of a method on a task that have it, shape ``(n,)``."""
-        return signature_named(name).of(self.executed(task, method, replay=replay))
+        values: Array = self._signature_of_each(name, task, method, replay=replay)
+        return values[np.isfinite(values)]
 
     @cached
     def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
@@ -434,9 +438,9 @@ class Study:
         Arrays have shape ``(n,)``; runs without the signature are left out. Signature ``hand``, the
         choice of hands itself, is of all hand sequences together, ``""``.
         """
-        executed = self.executed(task, method)
-        values = signature_named(name).each(executed)
-        hands = np.array(["" if name == "hand" else run.hands for run in executed.runs])
+        values = self._signature_of_each(name, task, method, replay=False)
+        runs = self.executed(task, method).runs
+        hands = np.array(["" if name == "hand" else run.hands for run in runs])
         there = np.isfinite(values)
         return {str(each): values[there & (hands == each)] for each in np.unique(hands[there])}
 

@@ -93,6 +93,21 @@ def table(caption: str, columns: str) -> Callable[[Callable[[Study], Rows]], Tab
     return as_table
 
 
+class TableFrame(pd.DataFrame):
+    """Rows of a table. ``print`` and notebooks leave out ``run_ids``, which would fill the page."""
+
+    @property
+    def _constructor(self) -> type[pd.DataFrame]:
+        return TableFrame
+
+    def __repr__(self) -> str:
+        with pd.option_context("display.max_columns", 14, "display.precision", 3):
+            return repr(pd.DataFrame(self).drop(columns="run_ids", errors="ignore"))
+
+    def _repr_html_(self) -> str:
+        return self.drop(columns="run_ids", errors="ignore").to_html(max_rows=20)
+
+
 @cached
 def _rows_of(study: Study, table: Table) -> pd.DataFrame:
     """Return the rows of a table by their names."""
@@ -105,7 +120,7 @@ def _rows_of(study: Study, table: Table) -> pd.DataFrame:
             names += [each for each in rows.columns if each.startswith(name)]
         else:
             names += [name + each for each in endings[ending]]
-    frame = rows.reindex(columns=names).rename_axis("row")
+    frame = TableFrame(rows.reindex(columns=names).rename_axis("row"))
     frame.attrs = _shown_names(study)
     return frame
 
@@ -114,8 +129,8 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table.
 
     ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
-    and ablation, by label; ``own``: labels of methods from files; ``known``: True if a best known
-    reward does not come from this folder alone.
+    and ablation, by label; ``own``: labels of methods from files; ``best_known``: True if a best
+    known reward does not come from this folder alone.
     """
     methods, tasks = study.methods, study.tasks
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
@@ -124,8 +139,14 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
         "titles": {**families, **marks, **methods.title},
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
-        "known": any(not best.only_here for best in study.optima.values()),
+        "best_known": any(not best.only_here for best in study.optima.values()),
     }
+
+
+def is_setting(frame: pd.DataFrame) -> pd.Series:
+    """Return which rows of a table are of settings and ablations whose method has a row, too."""
+    label = frame.method if "method" in frame else frame.index.to_series()
+    return label.map(frame.attrs.get("under", {})).isin([*label])
 
 
 @checked_arguments

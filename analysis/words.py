@@ -21,8 +21,6 @@ _LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
 _Digits = Annotated[int, 0, 30]
 NONE = "–"
 """Text of a missing value."""
-MOST_NAMED = 3
-"""Most methods, or tasks, that a sentence names."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 RECONSTRUCTED = "† The paper does not publish the goals of this task; ours are a reconstruction."
 _SIGNS = "αβγδεζηθικλμνξπρςστυφχψωΓΔΘΛΞΠΣΥΦΨΩ←↑→↓↔↕⇐⇑⇒⇓⇔↦≤≥≠≈≡∼∝∈∉∂∇√∑∏∫⋅∧∨∩∪⊂⊆∀∃⊥∥∠≪≫∘⊗⊕ℓ‡"
@@ -78,12 +76,6 @@ def number(value: float, digits: _Digits | None = None) -> str:
     return sign + text.replace(",", NARROW_SPACE)
 
 
-def _spelled(count: int) -> str:
-    """Write a small number in letters, a larger number in figures."""
-    names = "no", "one", "two", "three", "four", "five", "six"
-    return names[count] if count < len(names) else number(count)
-
-
 def p_value(p: float) -> str:
     """Write a p-value, ``p < 0.001`` or ``p = 0.012``, without a line break; empty for NaN."""
     if math.isnan(p):
@@ -99,11 +91,6 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     if math.isnan(low) or math.isnan(high) or low == high:
         return ""
     return f"[{number(low, digits)}, {number(high, digits)}]"
-
-
-def _percent(share: float) -> str:
-    """Write a share in per cent with one decimal."""
-    return f"{number(100 * share, 1)} %"
 
 
 def estimate(value: Estimate, digits: int | None = None) -> str:

@@ -262,9 +262,9 @@ def test_runs_are_tidy(tmp_path):
     postures = study.configurations("two-armed-1", "dual-process/EC3")
     np.testing.assert_array_equal(postures, [run.configurations for run in learned.runs])
     for name, signature in SIGNATURES.items():
-        of_learner = study.signature(name, replay=True)[runs.method == "dual-process/EC3"].dropna()
+        of_learner = study.signature(name, replay=True)[runs.method == "dual-process/EC3"]
         replays = study.executed("two-armed-1", "dual-process/EC3", replay=True)
-        assert of_learner.tolist() == signature.of(replays).tolist()
+        np.testing.assert_array_equal(of_learner, signature.each(replays))
     assert study.signature("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
     with pytest.raises(coartic.CoarticError, match="did you mean 'two-armed-1'"):
         study.executed("two-armed", "EC3")

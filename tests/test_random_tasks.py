@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, RANDOM_SEARCH
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
 from coartic.analysis.report import about
 from coartic.analysis.sections import random_tasks
 from coartic.analysis.sections.random_tasks import on_instances
@@ -18,6 +18,7 @@ ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "l
 FEW = (*ONE, "two-armed/v1", "long/v1")
 """Where no claim is judged, which is on all."""
 COUNT = 5
+INITIAL = "corrective-alone/given"
 BEST, ALONE = -500, -600
 NOISE = (-4, -2, 0, 2, 4)
 

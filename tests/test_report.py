@@ -54,6 +54,8 @@ def test_a_csv_file_has_the_rows_and_runs_of_its_table(tables_by_name, report):
         written = pd.read_csv(path, index_col="row", dtype=str, keep_default_na=False)
         assert [*written.index] == [*table.index]
         assert written.run_ids.tolist() == table.run_ids.tolist()
+        for shown in (repr(table), repr(table.head()), table._repr_html_()):
+            assert "run_ids" not in shown
 
 
 def test_a_report_is_stamped_with_the_results_of_its_runs(traced, report):

@@ -89,7 +89,7 @@ def test_a_table_is_copied_for_a_spreadsheet(opened, traced):
     table = table[table.method.map(methods.under) == ""]  # settings are folded
     assert [row[0] for row in rows[1:]] == [methods.title[method] for method in table.method]
     assert rows[0][1].startswith("gap")
-    assert [float(row[1].split()[0]) for row in rows[1:] if row[1] != "–"] == pytest.approx(
+    assert [float(row[1].split()[0]) for row in rows[1:] if row[1]] == pytest.approx(
         list(100 * table.gap.dropna()), abs=0.05
     )
 

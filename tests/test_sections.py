@@ -137,15 +137,12 @@ def test_runtimes(study):
 
 
 def test_learning(study):
-    """Half of the gain of the three runs on ascending is there at trial 500, 101 and 20."""
-    names = ["runs", "corrective_best", "after_100", "after_1000", "after_10000",
-             "trials_to_half_gain", "trials_to_half_gain_low",
-             "trials_to_half_gain_high"]  # fmt: skip
+    names = ["runs", "corrective_best", "after_100", "after_1000", "after_10000"]
     cells = {
-        f"{ONE} {EC1}": (3, -319.0, -312.0, -302.0, NONE, 101.0, 20.0, 500.0),
-        f"{TWO} {EC4}": (3, -532.0, -675.0, -480.0, NONE, 1000.0, 1000.0, 1000.0),
-        f"{ONE} {CMA}": (3, -319.0, -293.0, NONE, NONE, 10.0, 10.0, 10.0),
-        f"{TWO} {CMA}": (3, -532.0, -470.0, NONE, NONE, 10.0, 10.0, 10.0),
+        f"{ONE} {EC1}": (3, -319.0, -312.0, -302.0, NONE),
+        f"{TWO} {EC4}": (3, -532.0, -675.0, -480.0, NONE),
+        f"{ONE} {CMA}": (3, -319.0, -293.0, NONE, NONE),
+        f"{TWO} {CMA}": (3, -532.0, -470.0, NONE, NONE),
     }
     same(TABLES["learning"](study), {
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()

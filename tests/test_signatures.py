@@ -231,14 +231,16 @@ def test_signs_are_one_number_a_run():
     cell = Solutions(task, "", tuple(learned))
     corrective = [corrective_trial(task, run.hands).ticks_by_goal() for run in cell.runs]
     learned = [run.ticks_by_goal() for run in cell.runs]
-    first, whole = SIGNATURES["first"].of(cell), SIGNATURES["whole"].of(cell)
+    first, whole = (SIGNATURES[name].each(cell) for name in ("first", "whole"))
     assert first.tolist() == [a[0] - b[0] for a, b in zip(learned, corrective, strict=True)]
     assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
-    assert not any(signature.of(Solutions(task, "", ())).size for signature in SIGNATURES.values())
+    assert not any(
+        signature.each(Solutions(task, "", ())).size for signature in SIGNATURES.values()
+    )
     one = load_task("ascending")
     alone = Solutions(one, "", (corrective_trial(one, "RRR"),))
-    sizes = {name: signature.of(alone).size for name, signature in SIGNATURES.items()}
-    assert sizes == {name: int(name not in ("hand", "other arm")) for name in SIGNATURES}
+    missing = {name for name, signature in SIGNATURES.items() if np.isnan(signature.each(alone))}
+    assert missing == {"hand", "other arm"}
 
 
 def test_choice_in_isolation():
@@ -250,7 +252,7 @@ def test_choice_in_isolation():
     assert agrees[:, 0].tolist() == [1, 0, 1]
     assert agrees[[0, 2], 1].tolist() == [1, 0]
     # Not of the last goal.
-    assert SIGNATURES["hand"].of(Solutions(task, "", some)).tolist() == [0.0, 1.0, 0.0]
+    assert SIGNATURES["hand"].each(Solutions(task, "", some)).tolist() == [0.0, 1.0, 0.0]
 
 
 def test_preshaping_by_the_arm_alone():

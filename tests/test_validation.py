@@ -449,7 +449,7 @@ CALLS = (
     (load, {"folder": "nowhere"}),
     *((function, {"runs": SOLUTIONS}) for function in (
         measures.arm, measures.as_in_isolation, measures.gain_at_next, measures.hand,
-        measures.other_arm, measures.ticks_slower, measures.signature_named("first").of)),
+        measures.other_arm, measures.ticks_slower)),
     (measures.isolated_reaches, {"task": TASK, "q": np.tile(TASK.q0, (3, 1)), "goals": [1, 2, 3],
                                  "hands": [1, 1, 1]}),
     (measures.preshaping, {"task": TASK, "run": TRIAL, "initial": TRIAL}),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import html
 import io
 import re
+import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import pandas as pd
 from matplotlib import rc_context
@@ -57,34 +58,16 @@ class Plot:
         words = html.escape(one_line(f"{self.title}. {self.caption}"))
         return f"<figure>{for_page(self)}<figcaption>{words}</figcaption></figure>"
 
-    def _repr_png_(self) -> bytes:
-        """Return the picture that programs show that show no HTML."""
-        return picture(self.figure, ".png")
-
 
 Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 """Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and its tasks."""
+DrawsFigure = Callable[..., Plot | None]
+"""A figure of the report, as a function of a study; None if the folder has no runs for it.
 
-
-class DrawsFigure(Protocol):
-    """A figure of the report, as a function of a study."""
-
-    def __call__(
-        self,
-        study: Study,
-        /,
-        *,
-        width: float | None = None,
-        methods: Sequence[str] | None = None,
-        tasks: Sequence[str] | None = None,
-        style: Any = (),
-    ) -> Plot | None:
-        """Draw the figure, or return None if the folder has no runs for it.
-
-        ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks`` as
-        :meth:`.Study.only` takes them; ``style``: settings of Matplotlib that count more than the
-        project's, as ``matplotlib.style.use`` takes them.
-        """
+Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks`` as
+:meth:`.Study.only` takes them; ``style``: settings of Matplotlib that count more than the
+project's, as ``matplotlib.style.use`` takes them.
+"""
 
 
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
@@ -124,12 +107,17 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
 
 def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
-    """Return the look of the lines of each method, the same in all figures of a study."""
-    return {label: style.look_of(*study.methods.look[label]) for label in labels}
+    """Return the look of the lines and marks of each method, the same in all figures of a study;
+    methods from files are bold."""
+    rows = study.methods.loc[[*labels]]
+    own = ~rows.built_in.astype(bool)
+    return {label: style.look_of(rows.look[label], own[label]) for label in rows.index}
 
 
-def spoken(rows: pd.DataFrame, template: str) -> str:
-    """Return each row in words, for an alternative text: names in ``{}`` are columns."""
+def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
+    """Return each row in words, for an alternative text: names in ``{}`` are columns, ``{title}``
+    is the name of the method."""
+    rows = rows.assign(title=rows.method.map(study.methods.title))
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 
@@ -155,10 +143,11 @@ def for_page(plot: Plot) -> str:
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
     one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
     :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a page.
+    Looks that several elements have are classes, named by their hashes.
     """
 
-    def shorten(attribute: re.Match[str]) -> str:  # lengths to hundredths of a point
-        cut = re.sub(r"(\.\d\d)\d+", r"\1", attribute[0])
+    def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point
+        cut = re.sub(r"(\.\d)\d+", r"\1", attribute[0])
         return re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut) if cut.startswith("d=") else cut
 
     stream = io.StringIO()
@@ -168,6 +157,7 @@ def for_page(plot: Plot) -> str:
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, stream.getvalue())
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
     text = re.sub(rf' id="{style.TIP}([^"]*)">', r"><title>\1</title>", text)
+    text = re.sub(r' id="[\w.]+_\d+"', "", text)  # of elements that nothing refers to
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
     # The backend leaves black fills out: they inherit the root's.
     text = text.replace(style.INK, "currentColor").replace(style.BACKGROUND, "var(--paper, none)")
@@ -178,9 +168,18 @@ def for_page(plot: Plot) -> str:
     assert view is not None
     # Styles that the backend gives to all elements would apply to the whole page.
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", body, flags=re.DOTALL)
+    looks: dict[str, str] = {}
+
+    def as_class(style: re.Match[str]) -> str:
+        name = looks.setdefault(style[1], f"s{zlib.crc32(style[1].encode()):x}")
+        return f'class="{name}"'
+
+    body = re.sub(r'style="([^"]*)"', as_class, body)
+    rules = "".join(f".{name}{{{look}}}" for look, name in looks.items())
     return (
         f'<svg {view[0]} xmlns="http://www.w3.org/2000/svg" role="img" '
         f'aria-label="{html.escape(one_line(plot.alt))}"><g stroke-linejoin="round" '
         'stroke-linecap="butt" fill="currentColor">'
+        f"<style>{rules}</style>"
         f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )

@@ -64,21 +64,22 @@ _DASHES: dict[str, Any] = {
     "dash-dotted": (0, (5, 1.2, 1, 1.2)),
     "long-dashed": (0, (9, 1.5)),
 }
-SOLID, DASHED, DOTTED, DASH_DOTTED, _ = _DASHES.values()
-OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": DOTTED}
-INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": DASH_DOTTED}
+OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": _DASHES["dotted"]}
+INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": _DASHES["dash-dotted"]}
 """Lines at the rewards of the optimum and of the initial solution."""
 styled = style.context(["default", RC])
 """Decorator that draws in this style on Matplotlib's defaults, without the user's settings."""
 
 
 Look = dict[str, Any]
-"""Look of a method's lines: ``color`` and ``linestyle``."""
+"""Look of a method's lines and marks: ``color``, ``linestyle``, ``linewidth``, ``markersize``."""
 
 
-def look_of(color: str, dash: str) -> Look:
-    """Return the look of lines by the names of a colour and a dash."""
-    return {"color": _COLORS[color], "linestyle": _DASHES[dash]}
+def look_of(names: tuple[str, str], bold: bool) -> Look:
+    """Return the look of lines and marks by the names of a colour and a dash."""
+    color, dash = names
+    sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
+    return {"color": _COLORS[color], "linestyle": _DASHES[dash], **sizes}
 
 
 def grid(panels: int) -> tuple[int, int]:

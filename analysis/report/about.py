@@ -12,19 +12,18 @@ from typing import Any, TypeVar
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
-from coartic.analysis.method_frame import GROUPS
-from coartic.analysis.methods import LEARNERS, RANDOM_SEARCH
+from coartic.analysis.method_frame import GROUPS, joined_label
+from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.standings import common_tasks, reference
 from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.table import is_setting
 from coartic.analysis.words import NO_BREAK, interval, listed, marked, number, p_value, tally
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
 
 Made = TypeVar("Made")
-LEARNER = "dual-process (EC1, EC4)"
-"""Label of the paper's learner over tasks for one arm and for two."""
 RUNS = 20
 """Number of runs of every experiment of the paper."""
 
@@ -62,9 +61,7 @@ def finding(study: Study, section: Section) -> list[str]:
     """Return the lines of a section's sentence; none without rows in its first table."""
     frame = section.tables[0](study)
     label = frame.method if "method" in frame else frame.index.to_series()
-    under = frame.attrs["under"]
-    main = ~label.map(lambda method: under.get(method) in {*label}).astype(bool)
-    rows = frame.assign(title=label.map(study.methods.title))[main]
+    rows = frame.assign(title=label.map(study.methods.title))[~is_setting(frame)]
     if not section.sentence or not len(rows):
         return []
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -80,7 +77,7 @@ def finding(study: Study, section: Section) -> list[str]:
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
     """Return the first two rows, and the rows of the paper's learner and of random search."""
     label = rows.method if "method" in rows else rows.index.to_series()
-    kept = label.isin([*label[:2], LEARNER, *LEARNERS[::3], RANDOM_SEARCH])
+    kept = label.isin([*label[:2], joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH])
     return rows[kept].to_dict("records")
 
 

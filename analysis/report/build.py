@@ -26,7 +26,7 @@ from coartic.analysis.report.render import (
 )
 from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.study import Study, cached
-from coartic.analysis.table import Table
+from coartic.analysis.table import Table, is_setting
 from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
@@ -108,10 +108,16 @@ def _plots_of(study: Study, section: Section) -> list[Plot]:
 
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
-    """Return the values of a section for the template: finding, figures and tables."""
+    """Return the values of a section for the template: finding, figures and tables.
+
+    Of settings and ablations only the ranking, the table of all methods and CSV files have rows.
+    """
     tables = []
     for table in section.tables:
-        if len(frame := table(study)):
+        frame = table(study)
+        if table.id not in ("ranking", "methods"):
+            frame = frame[~is_setting(frame)]
+        if len(frame):
             settings = sum("setting" in names for names in classes_of(table, frame))
             tables.append({
                 "id": table.id, "caption": table.caption, "rows": len(frame),

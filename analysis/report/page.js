@@ -28,7 +28,7 @@
         let ordered = rows;
         if (next !== "none") {
           head.setAttribute("aria-sort", next);
-          const missing = (row) => key(row, column) === "–";
+          const missing = (row) => key(row, column) === "";
           const sign = next === "ascending" ? 1 : -1;
           ordered = [...rows].sort((a, b) => missing(a) - missing(b) || sign * compare(key(a, column), key(b, column)));
         }

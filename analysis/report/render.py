@@ -14,7 +14,7 @@ from typing import Any
 
 import pandas as pd
 
-from coartic.analysis.table import Table
+from coartic.analysis.table import Table, is_setting
 from coartic.analysis.words import (
     NARROW_SPACE,
     NONE,
@@ -31,7 +31,7 @@ IN_LATEX = {
     "contexts": "place, method, runs, distance, p_holm, control, p_random_search",
     "ranking": "method, gap, share, on *",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
-    "learning": "task, method, runs, after_*, trials_to_half_gain",
+    "learning": "task, method, runs, after_*",
     "signatures": "task, method, hands, runs, first, first_control, first_p, arm, arm_p",
     "family-gaps": "method, gap, in *",
     "tasks": "task, arms, base, initial, optimum, bound",
@@ -66,7 +66,7 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
             continue
         what = name.removeprefix(column.name)
         header = column.header.replace("{}", titles.get(what, what))
-        if header == "gap (%)" and not frame.attrs.get("known", True):
+        if header == "gap (%)" and not frame.attrs.get("best_known", True):
             header = "gap to the best of this folder (%)"
         if f"{name}_sd" in frame:
             header += " ± SD"
@@ -105,14 +105,16 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
     """Return a table in HTML.
 
     Its first column stays while the others scroll. Rows have links and the classes of
-    :func:`classes_of`. A text that is the same in all rows moves to the caption.
+    :func:`classes_of`. A text that is the same in all rows moves to the caption. Cells without a
+    value are empty.
     """
     slug = slugs(map(str, frame.index))
     cells: list[list[str]] = []
     heads: list[str] = []
     for column, header in columns_of(table, frame).items():
         texts = [
-            html.escape(text).replace(" †", "&nbsp;†") for text in texts_of(table, frame, column)
+            html.escape(text).replace(" †", "&nbsp;†") if text != NONE else ""
+            for text in texts_of(table, frame, column)
         ]
         head = f'<span data-column="{html.escape(column)}">{html.escape(header)}</span>'
         if cells and len(texts) > 2 and len(set(texts)) == 1 and not _is_number(frame[column]):
@@ -149,12 +151,11 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
 def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
     """Return the classes of each row: ``own`` for methods from files in a table with other methods,
     ``setting`` for settings and ablations of a method of the same ranking."""
-    labels = [str(label) for label in frame.get("method", frame.index)]
-    under = frame.attrs.get("under", {}) if table.id == "ranking" else {}
-    is_own = [label in frame.attrs.get("own", ()) for label in labels]
+    is_own = [label in frame.attrs.get("own", ()) for label in frame.get("method", frame.index)]
+    is_folded = is_setting(frame) & (table.id == "ranking")
     return [
-        " ".join(["own"] * (own and not all(is_own)) + ["setting"] * (under.get(label) in labels))
-        for label, own in zip(labels, is_own, strict=True)
+        " ".join(["own"] * (own and not all(is_own)) + ["setting"] * folded)
+        for own, folded in zip(is_own, is_folded, strict=True)
     ]
 
 
@@ -163,7 +164,7 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
 
     ``notes`` are below the table, with the meaning of a dagger in it.
     """
-    frame = frame[["setting" not in names for names in classes_of(table, frame)]]
+    frame = frame if table.id == "methods" else frame[~is_setting(frame)]
     columns = columns_of(table, frame)
     chosen = [c for want in IN_LATEX[table.id].split(", ") for c in columns if fnmatch(c, want)]
     cells = [[latex(text) for text in texts_of(table, frame, column)] for column in chosen]

@@ -60,7 +60,7 @@ SECTIONS = (
 {% endfor %}""",
         note="On the tasks on which the own method solved every run: the built-in method with the "
         "nearest gap and the same use of the reward, the learner and CMA-ES. What an own method "
-        "uses is as its author declares.",
+        "uses is as its author declares. Own methods are bold in all figures.",
         single=False,
     ),
     Section(
@@ -111,7 +111,7 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
         "best of as many trials is selected. A row has the runs with one hand sequence (of at "
         "least a tenth of a method's runs); random search has the same hands, and all its runs "
         "count. The choice of hands, in rows without a sequence, is compared with random search "
-        "that tries every sequence. p is one-tailed, and uncorrected unless it says so; a dash: no "
+        "that tries every sequence. p is one-tailed, and uncorrected unless it says so; empty: no "
         "such random search.",
         folded=True,
     ),
@@ -121,7 +121,8 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
         (costs.list_runtimes, learning.list_learning),
         (costs.draw_runtimes, learning.draw_learning_curves),
         sentence="""\
-Reward targets reached, and trials to half of them: \
+Targets reached (rewards from the corrective process alone to the optimum, evenly spaced), and \
+trials to half of the targets: \
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
 {{ row.title }} {{ (100 * row.reached) | number(0) }} % \

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
@@ -37,9 +38,9 @@ SAME = 1e-9
 
 def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
     """Yield each first goal that two tasks share, for each hand that hit this goal in both."""
-    for first, second, shared in context_pairs(study.tasks):
+    for first, second, shared in context_pairs(one_by_one(study)):
         keys = (first, label), (second, label)
-        if {first, second} <= one_by_one(study).keys() and study.cells.keys() >= {*keys}:
+        if study.cells.keys() >= {*keys}:
             runs = study.executed(first, label), study.executed(second, label)
             for goal in range(1, shared + 1):
                 for hand in HANDS:
@@ -88,8 +89,8 @@ def list_contexts(study: Study) -> Rows:
                 "distance": shared.posture_difference,
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
-                **beside_control(study, shared),
-                "verdict": verdict_of(study, shared),
+                **(control := beside_control(study, shared)),
+                "verdict": verdict_of(study, shared, control),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **run_ids(*(study.cells[task.name, label] for task in shared.tasks)),
@@ -194,11 +195,11 @@ def draw_coarticulation(study: Study) -> Parts | None:
     lasts = data.sort_values("trials").drop_duplicates("base", keep="last").sort_index()
     looks: Any = looks_in(study, lasts.method)
     for look, mark in zip(looks.values(), itertools.cycle("osD^v<>pPX*"), strict=False):
-        look |= {"marker": mark, "markersize": 4}
+        look["marker"] = mark
     for axes, name in zip(panels, shown, strict=True):
         for _, rows in data.dropna(subset=name).sort_values("trials").groupby("base"):
             last: Any = rows.iloc[-1]
-            axes.plot(rows.gain, rows[name], linewidth=0.8, **looks[last.method])
+            axes.plot(rows.gain, rows[name], **looks[last.method])
             title = study.methods.title[last.method]
             style.tip(axes.lines[-1], f"{title}: gain {last.gain:.1f}, {last[name]:.2f}")
         axes.axhline(0, color=style.GREY, linewidth=0.5)
@@ -207,14 +208,15 @@ def draw_coarticulation(study: Study) -> Parts | None:
     style.letters(panels)
     handles = [style.legend_line(study.methods.title[each], **looks[each]) for each in looks]
     style.legend(drawing, handles, 3)
-    words = spoken(lasts.join(study.methods.title, on="method"), "{title}: gain {gain:.0f}")
+    words = spoken(study, lasts, "{title}: gain {gain:.0f}")
     return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
 
 
-def verdict_of(study: Study, shared: TwoContexts) -> str:
+def verdict_of(study: Study, shared: TwoContexts, control: Row | None = None) -> str:
     """Return in words whether the posture at a shared goal depends on the next goal.
 
     Stochastic methods need a test; methods that select from trials need random search, too.
+    ``control``: :func:`beside_control` if it is there already.
     """
     method: Any = study.methods.loc[shared.method]
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
@@ -226,7 +228,8 @@ def verdict_of(study: Study, shared: TwoContexts) -> str:
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"
-    beyond = beside_control(study, shared).get("p_random_search", math.nan)
+    control = beside_control(study, shared) if control is None else control
+    beyond = control.get("p_random_search", math.nan)
     if math.isnan(beyond):
         return "undecided: too few runs of random search"
     return "different postures" if beyond < LEVEL else "no more than random search"
@@ -297,9 +300,9 @@ def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     parts = []
     for place, (task, runs) in enumerate(zip(shared.tasks, shared.configurations, strict=True)):
         color, following = (style.BLUE, style.VERMILLION)[place], goals[place].tolist()
-        faint: Any = {"linewidth": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
-        for q in runs:
-            axes.plot(*robot.joint_positions(q, shared.hand).T, color=color, **faint, zorder=1)
+        faint: Any = {"linewidths": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
+        arms = [robot.joint_positions(q, shared.hand) for q in runs]
+        axes.add_collection(LineCollection(arms, colors=color, **faint, zorder=1), autolim=False)
         base: Any = {"facecolor": color, "alpha": 0.12, "edgecolor": color, "linewidth": 0.8}
         axes.fill(*outlines[place].T, **base)
         around = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]

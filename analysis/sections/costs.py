@@ -251,7 +251,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     steps = []
     for (label, spend), curve in data.groupby(["method", "spend"], sort=False):
         # No more than are seen.
-        curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 150).round()).astype(int)]
+        curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 100).round()).astype(int)]
         runs = runs_with_targets(study)[str(label)]
         times = _times_on_tasks(study, runs, str(spend))
         low, high = running_times.interval_by_budget(times, curve.budget.to_numpy())
@@ -276,7 +276,7 @@ def draw_runtimes(study: Study) -> Parts | None:
             axes.fill_between(
                 x, low, high, step="post", color=look["color"], alpha=0.22, linewidth=0
             )
-            (drawn,) = axes.step(x, y, where="post", linewidth=1.3, **look)
+            (drawn,) = axes.step(x, y, where="post", **look)
             name = standings.shown_name(study, str(label))
             style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
         axes.set_xlim(edge, most)
@@ -296,7 +296,8 @@ def draw_runtimes(study: Study) -> Parts | None:
             standings.shown_name(study, end["method"]), (1, height), (4, 0), va="center",
             color=looks[end["method"]]["color"], xycoords=panels[-1].get_yaxis_transform(),
             textcoords="offset points", annotation_clip=False,
+            weight="normal" if study.methods.built_in[end["method"]] else "bold",
         )  # fmt: skip
-    shares = spoken(ends.join(study.methods.title, on="method"), "{title} {share:.0f} %")
+    shares = spoken(study, ends, "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()

@@ -27,13 +27,10 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "Best reward so far, mean over runs (ticks)",
     "task; method; runs; corrective_best: corrective process, best hands .1; "
     "after_100: after 100 trials .1; "
-    "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1; "
-    "trials_to_half_gain[]: trials to half of the gain [quartiles of runs]",
+    "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1",
 )
 def list_learning(study: Study) -> Rows:
-    """List the best reward after some numbers of trials (mean over runs), and the trial at which a
-    run has half of its gain over the corrective process with its best hands (median and quartiles;
-    ∞ without gain)."""
+    """List the best reward after some numbers of trials (mean over runs)."""
     for (task, label), every in study.cells.items():
         runs = [improvements(study)[run] for run in every.run_id if run in improvements(study)]
         if task not in one_by_one(study) or study.methods.is_search[label]:
@@ -42,19 +39,10 @@ def list_learning(study: Study) -> Rows:
             continue
         if every.trials.min() < BUDGETS[0]:  # a try or two, no learning
             continue
-        zero = study.corrective_best[task]
-        row = row_of_cell(study, every) | {"corrective_best": zero}
+        row = row_of_cell(study, every) | {"corrective_best": study.corrective_best[task]}
         for budget in (each for each in BUDGETS if each <= every.trials.min()):
             best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
             row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan
-        gained = [
-            trials[(rewards >= (zero + rewards[-1]) / 2) & (rewards[-1] > zero)]
-            for trials, rewards in runs
-        ]
-        halves = [trials[0] if len(trials) else math.inf for trials in gained]
-        quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
-        names = (f"trials_to_half_gain{end}" for end in ("", "_low", "_high"))
-        row |= dict(zip(names, quartiles, strict=True))
         yield f"{task} {label}", row
 
 
@@ -82,7 +70,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
             look = looks[str(label)]
             band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
             axes.fill_between(curve.trial, curve.best_low, curve.best_high, **band)
-            axes.plot(curve.trial, curve.best, linewidth=1.3, **look)
+            axes.plot(curve.trial, curve.best, **look)
         floor, top = of_task.best.min(), of_task.best_high.max()
         zero, optimum = study.corrective_best[task.name], study.optima.get(task.name)
         if not math.isnan(zero):
@@ -100,15 +88,14 @@ def draw_learning_curves(study: Study) -> Parts | None:
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.legend_line(study.methods.title[label], linewidth=1.3, **look)
-        for label, look in looks.items()
+        style.legend_line(study.methods.title[label], **look) for label, look in looks.items()
     ]
     handles += [style.legend_line("corrective process alone, best hands", **style.INITIAL)]
     if known := [task.name for task in tasks if task.name in study.optima]:
         handles.append(style.legend_line(standings.reference(study, known), **style.OPTIMUM))
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
-    words = spoken(ends.join(study.methods.title, on="method"), "{task}, {title}: {best:.0f}")
+    words = spoken(study, ends, "{task}, {title}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."
     return drawing, data, alt, tasks
 

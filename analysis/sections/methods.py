@@ -46,9 +46,11 @@ def list_methods(study: Study) -> Rows:
 )
 def list_failed(study: Study) -> Rows:
     """List the numbers of failed runs of each method on each task, with their reasons."""
+    failures = study.runs[study.runs.status != "ok"]
+    by_cell = dict([*failures.groupby(["task", "label"], sort=False)])
     for (task, label), runs in study.cells.items():
-        failed = runs[runs.status != "ok"]
-        if len(failed):
+        if (task, label) in by_cell:
+            failed = by_cell[task, label]
             reasons = Counter(map(str, failed.reason.fillna(""))).most_common(3)
             row: Row = {"task": marked(study.tasks[task]), "method": label}
             row |= {"failed": len(failed), "runs": len(runs), **run_ids(failed)}

@@ -42,8 +42,8 @@ def list_own(study: Study) -> Rows:
         parts = {name: runs_on(study, name, tasks) for name in compared(study)}
         there = [runs.assign(method=name) for name, runs in parts.items() if len(runs)]
         scores = ranking(pd.concat(there).assign(setting=""))
-        known = study.methods.loc[scores.index[scores.gap.notna()]]
-        built_in = known[known.built_in & (known.under == "")]
+        rows = study.methods.loc[scores.index[scores.gap.notna()]]
+        built_in = rows[rows.built_in & (rows.under == "")]
         same_use = built_in[built_in.information == study.methods.information[own]]
         apart = (scores.gap[same_use.index[~same_use.is_learner]] - scores.gap[own]).abs()
         explores = built_in.condition[built_in.is_learner].map([*CONDITIONS].index)
@@ -84,5 +84,5 @@ def difference_of_gaps(
                 drawn.append(gaps)
     if not drawn:
         return Estimate(exact)
-    found = mean_of_means(drawn, weights, FEWER_RESAMPLES)
-    return Estimate(found.value + exact, found.low + exact, found.high + exact)
+    sampled = mean_of_means(drawn, weights, FEWER_RESAMPLES)
+    return Estimate(sampled.value + exact, sampled.low + exact, sampled.high + exact)

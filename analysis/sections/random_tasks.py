@@ -10,7 +10,7 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.standings import best_of_instances, compared
+from coartic.analysis.standings import compared
 from coartic.analysis.statistics.instances import Scores, other_tasks
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
@@ -20,10 +20,10 @@ from coartic.analysis.table import Row, Rows, run_ids, table
 def on_instances(study: Study) -> pd.DataFrame:
     """Return the solved runs of compared methods on instances of families, with the label of the
     row of the method in column ``method``."""
-    names = [*best_of_instances(study)]
     parts = [solved(runs).assign(method=method) for method, runs in compared(study).items()]
     every = pd.concat([*parts, study.runs[:0]], ignore_index=True)
-    place = every.task.map({name: number for number, name in enumerate(names)})
+    instances = [name for name in study.optima if study.tasks[name].family is not None]
+    place = every.task.map({name: number for number, name in enumerate(instances)})
     return every[place.notna()].assign(place=place).sort_values("place", kind="stable")
 
 
@@ -92,13 +92,18 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         for label, rows in data[data.family == family].groupby("method"):
             place = order.index(label)
             heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
-            dot: Any = {"color": looks[label]["color"], "markersize": 2.5, "markeredgewidth": 0}
+            size = looks[label]["markersize"]
+            dot: Any = {
+                "color": looks[label]["color"],
+                "markersize": size / 2,
+                "markeredgewidth": 0,
+            }
             gaps = rows.gap.clip(upper=1.0)
             axes.plot(gaps, heights, "o", linestyle="", alpha=0.5, **dot)
             mean = rows.iloc[0]
             ends = [mean.mean_low, mean.mean_high]
             axes.plot(ends, [-place, -place], color=style.INK, linewidth=1)
-            diamond: Any = {"markersize": 4, "markerfacecolor": style.BACKGROUND, "zorder": 4}
+            diamond: Any = {"markersize": size, "markerfacecolor": style.BACKGROUND, "zorder": 4}
             axes.plot(mean["mean"], -place, "D", color=style.INK, **diamond)
         axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
         axes.set_xlim(-0.004, 1.15)
@@ -106,8 +111,10 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])
     style.name_rows(panels[0], [*methods.title[order]])
+    for label, method in zip(panels[0].get_yticklabels(), order, strict=True):
+        label.set_fontweight("normal" if methods.built_in[method] else "bold")
     panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
-    first = data.drop_duplicates(["method", "family"]).join(methods.title, on="method")
-    means = spoken(first, "{title}, {family}: {mean:.1%}")
+    first = data.drop_duplicates(["method", "family"])
+    means = spoken(study, first, "{title}, {family}: {mean:.1%}")
     return drawing, data, f"Gaps of instances by method and family. {means}.", ()

@@ -19,7 +19,6 @@ from coartic.analysis.standings import (
     common_runs,
     common_tasks,
     compared,
-    gap_of,
     reference,
     shown_name,
 )
@@ -89,9 +88,7 @@ def after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     "Gap and share of the possible gain, over all tasks, and gap on each",
     "method; gap[]: gap (%) .1; share[]: share of the gain (%) .0; information: use of the reward; "
     "better: better than the learner on (tasks); worse: worse on (tasks); "
-    "share_early[]: -; gap_early: -; "
-    "share_one_armed[]: -; gap_one_armed: -; share_two_armed[]: -; gap_two_armed: -; "
-    "on *: {} (%) .1; tasks; missing: -; without_gain: -; "
+    "gap_early: -; on *: {} (%) .1; tasks; missing: -; without_gain: -; "
     "forward_kinematics: -; cpu_s: -; runs; failed: -",
 )
 def list_ranking(study: Study) -> Rows:
@@ -99,31 +96,23 @@ def list_ranking(study: Study) -> Rows:
     after their method.
 
     ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
-    them, over the ``tasks`` that it solved. Also by arms, and after a thousand trials; and means of
-    what a run costs.
+    them, over the ``tasks`` that it solved. Also the gap after a thousand trials, and means of what
+    a run costs.
     """
     tested, runs = list_against_learner(study), common_runs(study)
-    subsets = {
-        "_one_armed": runs[runs.arms == 1],
-        "_two_armed": runs[runs.arms == 2],
-        "_early": after(study, runs, EARLY),
-    }
     wide = board(study).reindex(columns=[*SCORE_COLUMNS, "tasks", "missing", "without_gain"])
-    for name, frame in subsets.items():
-        if len(frame):
-            ends = [score.partition("_") for score in SCORE_COLUMNS]
-            names = [score + name + line + end for score, line, end in ends]
-            wide = wide.join(ranking(frame).reindex(columns=SCORE_COLUMNS).set_axis(names, axis=1))
+    if len(runs):
+        wide["gap_early"] = ranking(after(study, runs, EARLY)).gap
     wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
     over: dict[Any, Any] = wide.to_dict("index")
     single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
     for method in ranked(study):
         of_method = compared(study)[method]
-        by_task = dict([*of_method.groupby("task", sort=False)])
+        gaps = {task: solved(runs).gap.mean() for task, runs in of_method.groupby("task")}
         row: Row = {"method": method, "information": study.methods.information[method]}
-        row |= {f"on {t}": gap_of(by_task[t]) if t in by_task else math.nan for t in single}
+        row |= {f"on {task}": gaps.get(task, math.nan) for task in single}
         row |= {"runs": len(of_method), "failed": len(of_method) - len(solved(of_method))}
-        row |= {"missing": sum(task not in by_task for task in common_tasks(study))}
+        row |= {"missing": sum(task not in gaps for task in common_tasks(study))}
         row |= over.get(method, {})
         pairs = {f"{task} {label}" for task, label in of_method[["task", "label"]].to_numpy()}
         tests = tested[tested.index.isin(pairs)]
@@ -136,19 +125,12 @@ def list_ranking(study: Study) -> Rows:
 
 
 def ranked(study: Study) -> list[str]:
-    """Return the methods of the ranking in their order.
+    """Return the methods of the ranking by mean gap, then those without one as in lists.
 
-    By mean gap; then methods without a mean gap, by the gap on the first task that they solved.
     Methods from files come first, and settings after their method.
     """
-    over, rest = [*board(study).index], list[tuple[float, float, str]]()
-    for method, runs in compared(study).items():
-        if method not in over and len(study.methods.parts[method]) == 1:
-            gaps = solved(runs).groupby("task", sort=False).gap.mean()
-            places = [place for place, task in enumerate(study.tasks) if task in gaps.index]
-            gap = gaps[[*study.tasks][places[0]]] if places else math.inf
-            rest.append((places[0] if places else math.inf, gap, method))
-    names = [*over, *(method for *_, method in sorted(rest, key=lambda each: each[:2]))]
+    single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
+    names = [*dict.fromkeys((*board(study).index, *single))]
     names.sort(key=lambda method: bool(study.methods.built_in[method]))
     under = study.methods.under
     of_method = {first: [m for m in names if under[m] == first] for first in names}
@@ -162,7 +144,7 @@ def ranked(study: Study) -> list[str]:
     "proven, to the best of this folder where none is known. Means over all tasks where there are "
     "several. The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
     "have none. n: runs. Diamonds: the paper's learner. Bold names: the learner and methods from "
-    "files.",
+    "files, whose marks are larger.",
 )
 def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of every method, a mean over tasks, with its name."""
@@ -203,10 +185,11 @@ def draw_ranking(study: Study) -> Parts | None:
             label.set_color(style.GREY)
             continue
         learner, y = row["is_learner"], -place
+        size = looks[row["method"]]["markersize"] + learner  # a diamond of equal width is smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
-        axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=4, alpha=0.5, **look)
+        axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
         mark = "D" if learner else "o"
-        (dot,) = axes.plot(row["gap"], y, mark, markersize=2.6, markeredgewidth=0, **look)
+        (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = shown_name(study, row["method"])
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
@@ -217,7 +200,7 @@ def draw_ranking(study: Study) -> Parts | None:
     where = "" if len(tasks) > 1 else f"{study.tasks[tasks[0]].label}: "
     short = to.removesuffix(" reward").replace("this ", "").replace("optimum", "the optimum")
     axes.set_xlabel(f"{where}gap to {short} (%)")
-    alt = f"Gap to the {to} by method: {spoken(shown, '{title} {gap:.1f} %')}."
+    alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
 
 

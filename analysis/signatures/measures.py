@@ -156,12 +156,6 @@ class Signature:
     """Function of solutions that returns the signature of each run, shape ``(n,)``, or NaN."""
     words: str
 
-    @checked_arguments
-    def of(self, runs: Solutions) -> Array:
-        """Return the signature of the k runs that have it, shape ``(k,)``."""
-        values = self.each(runs)
-        return values[np.isfinite(values)]
-
 
 @checked_arguments
 def hand(runs: Solutions) -> Array:
@@ -185,25 +179,18 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 @checked_arguments
 def other_arm(runs: Solutions) -> Array:
-    """Return the mean of :func:`_preshaping_of_the_other_arm` over goals, without NaN."""
-    values = _preshaping_of_the_other_arm(runs)
-    means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
-    # The last goal counts as a missing value: the order of summation decides the last bit.
-    padded = np.pad(values[some], ((0, 0), (0, 1)), constant_values=np.nan)
-    means[some] = np.nanmean(padded, axis=1)
-    return means
+    """Return the mean of :func:`preshaping` over the goals after which the idle hand hits another.
 
-
-def _preshaping_of_the_other_arm(runs: Solutions) -> Array:
-    """Return :func:`preshaping` of each run at goals g < G, shape ``(n, G − 1)``.
-
-    NaN on a task for one hand, without an initial solution, and at goals after which the idle hand
-    hits none; negative where the idle hand moves away.
+    Negative where the idle hand moves away. NaN on a task for one hand, without an initial
+    solution, and for a run whose idle hand never hits a later goal.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:
-        return np.full((len(runs.runs), len(runs.task.goals) - 1), np.nan)
-    return np.array([preshaping(runs.task, run, initial)[:-1] for run in runs.runs])
+        return np.full(len(runs.runs), np.nan)
+    values = np.array([preshaping(runs.task, run, initial) for run in runs.runs])
+    means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
+    means[some] = np.nanmean(values[some], axis=1)
+    return means
 
 
 @checked_arguments

@@ -59,10 +59,12 @@ def report(
 
 def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     """Print ten rows of the ranking, the nearest methods with the learner and random search,
-    coarticulation and cost in a line each, the failed runs, and further pairs of word and text."""
-    from coartic.analysis.report.about import finding, leading, limits
+    coarticulation and cost in a line each, numbers of runs and trials that are not those of the
+    paper, the failed runs, and further pairs of word and text."""
+    from coartic.analysis.report.about import RUNS, finding, leading, limits
     from coartic.analysis.sections import SECTIONS, TABLES
     from coartic.analysis.words import interval, number
+    from coartic.learner.learning import TRIALS
 
     rows = TABLES["ranking"](study).dropna(subset="gap").sort_values("gap", kind="stable")
     rows = rows[~rows.method.isin(study.methods.index[study.methods.under != ""])]
@@ -79,6 +81,10 @@ def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
     pairs = [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
+    unlike = [f"{what['few']} runs, not {RUNS}"] * bool(what["few"])
+    unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
+    if unlike:
+        pairs.append(("Unlike the paper", "; ".join(unlike)))
     if what["failed"]:
         failed = f"{what['failed']} of {counted(what['runs'], 'run')}: {'; '.join(what['reasons'])}"
         pairs.append(("Failed", failed))
