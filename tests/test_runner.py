@@ -283,8 +283,8 @@ def test_ten_thousand_movements_are_not_too_many():
 
 def test_robots_of_different_size_share_a_table(tmp_path):
     small = tiny_task(
-        name="small", robot={"left_links": [2.0], "right_links": [1.0] * 8},
-        start={"left": [0.1], "right": [0.1] * 8}, goals=[[3.0, 1.0]], initial_hands="R",
+        name="small", robot={"left_links": [2.0], "right_links": [2.0] * 2},
+        start={"left": [0.1], "right": [0.1] * 2}, goals=[[3.0, 1.0]], initial_hands="R",
     )  # fmt: skip
     cells = [cell_on(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
     study = run_and_write(tmp_path, cells, trials=20)

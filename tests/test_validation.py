@@ -325,6 +325,9 @@ def test_a_renamed_method_is_known_by_its_present_id():
     assert did_you_mean("guesses", ["guessing"]) == "; did you mean 'guessing'?"
 
 
+OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML file"
+
+
 @pytest.mark.parametrize(
     ("command", "words"),
     [
@@ -364,7 +367,16 @@ def test_a_renamed_method_is_known_by_its_present_id():
         (["report", "nowhere"], "there is no folder nowhere"),
         (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
         (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),
-        (["draw", "ascending", "--out", "x.bmp"], ".bmp"),
+        (["play", "--out", "x.txt"], "the name must end in .html"),
+        (["animate", "1a2b", "--out", "x.txt"], "the name must end in .gif or .mp4"),
+        (["draw", "ascending", "--out", "x.txt"], "the name must end in .svg or .pdf or .png"),
+        (["new", "my-search", "--out", "x.txt"], "the name must end in .py"),
+        (["run", "comparison", "--tasks", "arm.urdf"], OF_ANOTHER_PROGRAM),
+        *(
+            ([command, "arm.urdf"], OF_ANOTHER_PROGRAM)
+            for command in ("check", "draw", "play", "list")
+        ),
+        (["run", "paper", "--seed", "-1"], "it should be at least 0"),
     ],
 )
 def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, coartic):
