@@ -38,6 +38,8 @@ from tests.support.suites import (
 )
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
+NEAR = GOOD.replace("[5.0, 1.0], [5.0, 2.0]", "[4.7, 0.1], [4.8, 0.1]")
+"""A task of few ticks, whose film is short."""
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
 
 
@@ -433,7 +435,7 @@ def test_draw(coartic, tmp_path, monkeypatch):
 @pytest.mark.usefixtures("in_this_process")
 def test_animate(coartic, tmp_path):
     out, film, near = tmp_path / "out", tmp_path / "film.gif", tmp_path / "near.toml"
-    near.write_text(GOOD.replace("[5.0, 1.0], [5.0, 2.0]", "[4.7, 0.1], [4.8, 0.1]"))
+    near.write_text(NEAR)
     assert coartic("run", "paper", "--tasks", near, "--trials", 5, "--out", out)[0] == 0
     run_id = load(out).runs.run_id[0]
     assert coartic("animate", run_id, "--in", out, "--out", film, "--width", 200)[0] == 0
@@ -564,7 +566,9 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     coartic, commands, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    study = run_and_write(tmp_path / "out", paper_cells(tasks=["ascending"]), runs=1, trials=5)
+    Path("near.toml").write_text(NEAR, "utf-8")
+    near = paper_cells(tasks=["near.toml"], methods=["EC1"])
+    study = run_and_write(tmp_path / "out", near, runs=1, trials=5)
     Path("mine.py").write_text(
         (ROOT / "tests" / "methods" / "nearest_hand.py").read_text("utf-8"), "utf-8"
     )
