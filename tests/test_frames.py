@@ -214,22 +214,18 @@ CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]
 """Values whose mean is above 0 because of the last one."""
 
 
-@pytest.mark.parametrize("side", [1, -1])
-def test_one_task_carries_no_claim(side):
+@pytest.mark.parametrize(("side", "where"), [(1, "greater"), (-1, "less")])
+def test_one_task_carries_no_claim_and_refutes_none(side, where):
     """Without it the test is that of the other tasks alone."""
-    where = {1: "greater", -1: "less"}[side]
-    every, others = (
-        judge({"": ("", "", mean_beyond("{}", side * np.array(values), 0, where))}).loc[""]
-        for values in (CARRIED, CARRIED[:-1])
-    )
+
+    def judged(values, where):
+        return judge({"": ("", "", mean_beyond("{}", side * np.array(values), 0, where))}).loc[""]
+
+    every, others = judged(CARRIED, where), judged(CARRIED[:-1], where)
     assert every.p_holm < 0.05 < every.p_without == others.p_holm
     assert every.verdict == "undecided"
     assert every.evidence.endswith(f"for it {p_value(every.p_without)}.")
-
-
-def test_one_task_refutes_no_claim():
-    opposite = judge({"": ("", "", mean_beyond("{}", CARRIED, 0, "less"))}).loc[""]
-    others = judge({"": ("", "", mean_beyond("{}", CARRIED[:-1]))}).loc[""]
+    opposite = judged(CARRIED, {"greater": "less", "less": "greater"}[where])
     assert opposite.opposite_p_holm == others.p_holm > 0.05
     assert opposite.verdict == "undecided"
 

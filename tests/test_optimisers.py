@@ -79,6 +79,9 @@ COST = coartic.objective("ascending")
 GOALS = np.argwhere(COST.joints)[:, 0]  # of each entry of a point
 
 
+MASKED = np.ma.array(COST.x0, mask=np.arange(18) == 3)
+
+
 def with_width(half_width):
     return coartic.objective("ascending", half_width=half_width)
 
@@ -95,6 +98,10 @@ def with_width(half_width):
         (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
          "point 0: of goal 2 some entries are NaN"),
         (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
+        *((call, wrong, "has masked entries; needed are numbers without a mask")
+          for call, wrong in ((COST, MASKED), (COST.many, np.ma.array([MASKED])),
+                              (COST.many, [MASKED]), (COST.movements, MASKED),
+                              (COST.evaluations_to, np.ma.array([1.0, 2.0], mask=[0, 1])))),
         (COST.movements, COST.x0[1:], "needed is"),
         (COST.movements, np.full(18, np.inf), "infinite"),
         *((COST.evaluations_to, wrong, r"targets (are|is) .*(a cost, the ticks|real numbers)")

@@ -54,19 +54,7 @@ class Nobody(InProcess):
 
 
 LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
-
-
 ALONE = cell_on(load_task("ascending"), KNOWN["corrective-alone/given"])
-
-
-def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
-    tables = []
-    for number, executor in enumerate((InProcess(), Nobody())):
-        options = {"runs": SLOTS + 2, "trials": 3, "executor": executor}
-        tables.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
-    assert (tables[0].status == "ok").all()
-    assert tables[0].result.tolist() == tables[1].result.tolist()
-    assert [set(runs.together) for runs in tables] == [{1, 2, SLOTS}, {1}]
 
 
 class Forges(InProcess):
@@ -81,16 +69,19 @@ class Forges(InProcess):
             yield job, outcomes
 
 
-def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):
-    """Of runs side by side each is executed by itself; those alone are performed again."""
-    forged, honest = (
-        run_and_write(tmp_path / each.__name__, [LEARNER], runs=SLOTS, trials=3, executor=each())
-        for each in (Forges, InProcess)
+def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
+    """Where processes end all runs are, and what is no solution is that of one run alone."""
+    options = {"runs": SLOTS + 2, "trials": 3}
+    honest, lost, forged = (
+        run_and_write(tmp_path / each.__name__, [LEARNER, ALONE], executor=each(), **options).runs
+        for each in (InProcess, Nobody, Forges)
     )
-    assert forged.runs.result.tolist() == honest.runs.result.tolist()
-    assert (forged.runs.status == "ok").all()
-    again = forged.runs.together == 1
-    assert again[again].index.tolist() == [5, 7]
+    assert (honest.status == "ok").all()
+    assert (forged.status == "ok").all()
+    assert honest.result.tolist() == lost.result.tolist() == forged.result.tolist()
+    assert [set(runs.together) for runs in (honest, lost)] == [{1, 2, SLOTS}, {1}]
+    again = forged.together == 1
+    assert again[again].index.tolist() == [5, 7, len(forged) - 1]  # the last is the planner's
 
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"

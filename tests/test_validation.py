@@ -75,9 +75,11 @@ from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER
 from coartic.cli.arguments import value_in
 from coartic.internal.text import RENAMED, did_you_mean
+from coartic.runs.record import movement_data
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
+from tests.support.strategies import make_trials
 from tests.support.suites import KNOWN, ROOT
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
@@ -390,6 +392,7 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
 
 
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
+UNMASKED = "has masked entries; needed are numbers without a mask"
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
@@ -528,9 +531,21 @@ def test_all_functions_are_called_wrongly():
         (lambda: parse_task({}, source=5, reach=1), "source is 5"),
         (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
         (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
-        (lambda: Movement(1, "right", "planned", MASKED), "target has masked entries"),
-        (lambda: Movement(1, "right", "path", waypoints=[MASKED]), "waypoints has masked"),
-        (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), "p_values has masked entries"),
+        (lambda: Movement(1, "right", "planned", MASKED), f"target {UNMASKED}"),
+        (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints {UNMASKED}"),
+        (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), f"p_values {UNMASKED}"),
+        *(
+            (call, UNMASKED)
+            for call in (
+                lambda: movement_data(Movement(1, "right", "planned", MASKED)),
+                lambda: movements_of("RRR", np.ma.array([MASKED] * 3)),
+                lambda: make_trials(TASK, "RRR", np.ma.masked_equal(np.zeros((1, 3, 10)), 0.0)),
+                lambda: make_trials(TASK, "RRR", [[MASKED] * 3]),
+                lambda: move(ROBOT, TASK.q0, MASKED, "right", (5, 1), 0.1),
+                lambda: mean([1.0, 2.0, np.ma.masked]),
+                lambda: other_tasks({"family": [MASKED]}),
+            )
+        ),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
         (lambda: interval({}, "gap"), "the row has no numbers gap, gap_low, gap_high"),
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
