@@ -75,7 +75,6 @@ def test_imports_point_one_way():
 
 
 def test_coartic_imports_nothing_above_by_name():
-    """Nor by a function that imports what its caller names."""
     by_name = re.compile(r"import_module|__import__|importlib\.util|^def __getattr__", re.MULTILINE)
     found = {
         path.relative_to(ROOT).as_posix()
@@ -102,7 +101,6 @@ def statements(tree):
 
 
 def test_no_imports_go_round_in_circles():
-    """Those within functions count as well."""
     modules = {module_of(path): path for path in sources()}
     imports = {}
     for module, path in modules.items():
@@ -253,7 +251,6 @@ assert not modules & set(coartic.__all__), "a module would hide what has its nam
 
 @pytest.mark.process
 def test_the_package_imports_what_is_asked_for():
-    """Every public name is there, under its own name whatever is imported first."""
     subprocess.run([sys.executable, "-c", FRESH], cwd=ROOT, check=True)
 
 
@@ -317,7 +314,6 @@ def test_one_kinematic_module():
 
 
 def test_no_module_is_imported_but_undeclared():
-    """Every third-party import is a declared dependency."""
     declared = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     aliases = {"pydantic_core": "pydantic", "llvmlite": "numba", "click": "typer", "PIL": "pillow",
                "stable_baselines3": "stable-baselines3"}  # fmt: skip

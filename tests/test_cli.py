@@ -127,7 +127,6 @@ def test_a_terminal_without_a_sign_shows_one_like_it(encoding, printed):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_check(coartic, tmp_path):
-    """A task file and a method that keep the rules, and ones that do not."""
     assert coartic("check", TASK_FILE)[0] == 0
     (tmp_path / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), encoding="utf-8")
     assert coartic("check", tmp_path / "mine.toml")[0] != 0
@@ -246,7 +245,6 @@ def call_apart(place, command):
 
 @pytest.mark.process
 def test_a_locale_changes_no_report(tmp_path, coartic, in_this_process):
-    """Also one whose encoding lacks daggers and minus signs."""
     (tmp_path / "mine.toml").write_text(f'title = "Grüße †"\n{GOOD}', "utf-8")
     runs, task = tmp_path / "runs", tmp_path / "mine.toml"
     alone = ("--methods", "corrective-alone/given")
@@ -287,7 +285,6 @@ def test_modules_in_the_working_folder_are_not_imported(tmp_path):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_path, monkeypatch):
-    """And what to do for a report of it, where the command is interrupted."""
     out, words = tmp_path / "out", []
     assert coartic(*SMALL, "--methods", "EC1", "--out", out)[0] == 0
 
@@ -381,7 +378,6 @@ def test_kernels_that_may_not_be_compiled_get_a_sentence(tmp_path):
 
 @pytest.mark.process
 def test_what_a_method_prints_and_where_it_crashes(tmp_path):
-    """With --verbose; the place in any case."""
     text = Path(template.__file__).read_text().replace("def optimise", "def unused")
     body = """
     def optimise(self, *_):

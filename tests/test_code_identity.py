@@ -53,7 +53,6 @@ def after(before, monkeypatch):
 
 
 def test_what_plans_stores_reads_and_shows_runs_does_not_count():
-    """No sentence of these makes results those of other code."""
     for file in FILES.values():
         rooms = {path.relative_to(PACKAGE).parts[0] for path in files_of(file)}
         assert not rooms & {"__init__.py", "analysis", "benchmarks", "cli", "play", "runs"}

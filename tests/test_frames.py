@@ -116,7 +116,6 @@ def test_what_is_no_frame_of_results_is_refused(compute, words):
 
 
 def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
-    """As set_index(drop=False) and merges make it."""
     frame = small_frame(task=["t", "u"])
     for names in (["method", "run"], "reward"):
         named = frame.set_index(names, drop=False)
@@ -167,7 +166,6 @@ def test_tasks_are_names_numbers_tuples_or_categories(tasks):
 
 
 def test_a_method_with_several_settings_has_a_row_for_each():
-    """Missing and empty are the default."""
     frame = small_frame(method="a", setting=["", "h=2"])
     frame = pd.concat([frame, small_frame(method=["b", "a"], setting=["h=1", None])])
     ranked = frames.ranking(frame.reset_index(drop=True))
@@ -177,7 +175,6 @@ def test_a_method_with_several_settings_has_a_row_for_each():
 
 
 def test_a_task_that_a_method_lacks_is_not_reached():
-    """A method that reaches nothing has a row."""
     none = frames.ecdf(small_frame(method="none", reward=np.nan), [0.05])
     assert none.to_dict("records") == [{"method": "none", "trials": np.inf, "share": 0.0}]
     unknown = small_frame(task=["easy", "unknown"], method="a", best_known=[-300, np.nan])

@@ -159,7 +159,6 @@ def test_the_vector_is_as_many_single_ones(options):
     [({}, "development"), ({"split": "test"}, "test"), ({"split": "fresh", "year": 2027}, "fresh")],
 )
 def test_splits_never_mix_and_a_seed_gives_the_same(options, split):
-    """Also a seed of NumPy."""
     env = TaskEnv("two-armed/v1", count=8, **options)
     names, again = ([env.reset(seed=seed)[1]["task"] for seed in seeds]
                     for seeds in (range(60), np.arange(60)))  # fmt: skip

@@ -79,7 +79,6 @@ def test_parts_make_a_whole(parts, tmp_path):
 
 
 def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
-    """Parts join to what one command makes; alone a part is no results folder."""
     command = ("run", "paper", "--tasks", "ascending", "--trials", 20, "--methods", f"EC1,{ALONE}")
     places = [tmp_path / each for each in ("first", "second", "whole", "once")]
     for place, runs in zip(places, ("0..1", "2..3"), strict=False):
@@ -105,7 +104,6 @@ def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
 
 
 def test_what_no_folder_has_is_performed(parts, left, tmp_path):
-    """Cells of the plan, and runs of a folder that was not finished."""
     edit(left, f"DELETE FROM results WHERE id = {OF_EC1}")
     progress = joined([left], tmp_path / "whole")
     assert (progress.present, progress.done) == (2, 1 + 3)
@@ -136,7 +134,6 @@ def test_a_run_that_views_would_not_show(left, tmp_path):
 
 
 def test_a_folder_is_read_in_one_state(left):
-    """A suite that begins in it meanwhile waits until it is read."""
     with open_store(left) as store:
         before = store.ids()
         with closing(sqlite3.connect(left / RUNS_FILE, timeout=0, isolation_level=None)) as other:
@@ -176,7 +173,6 @@ def test_what_was_changed_is_not_copied(parts, left, tmp_path, said):
 
 
 def test_two_results_of_one_run(parts, tmp_path):
-    """They are named, and nothing is copied; a downsampled one is the same result."""
     downsampled, other = (
         shutil.copytree(parts[0], tmp_path / name) for name in ("downsampled", "other")
     )
@@ -227,7 +223,6 @@ def test_what_does_not_go_together(parts, tmp_path):
 
 
 def test_what_a_folder_has_may_be_of_other_code(parts, tmp_path):
-    """Where nothing of it is missing: it is copied as it is."""
     new = replace(KNOWN[EC1], code="0123456789ab")
     ours = [replace(cell, method=new if cell.method.name == EC1 else cell.method) for cell in LEFT]
     assert joined(parts[:1], tmp_path / "whole", ours).done == 0
@@ -259,7 +254,6 @@ def test_a_stranger_beside_others(parts, tmp_path):
 
 
 def test_shipped_results(monkeypatch, tmp_path):
-    """They are those of their hash, and are read as any folder."""
     for suite in shipped.shipped_hashes():
         with shipped.open_shipped(suite) as store:
             plan = store.plan()
@@ -311,8 +305,6 @@ def packed(parts, tmp_path, monkeypatch):
 def test_results_are_packed_again_where_they_have_not_changed(
     packed, tmp_path, monkeypatch, capsys
 ):
-    """Of another code they may be, and times may differ."""
-
     def pack(folder, *options):
         monkeypatch.setattr(sys, "argv", ["shipped", *options, str(folder)])
         return pack_shipped.main(), capsys.readouterr().out

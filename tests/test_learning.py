@@ -338,7 +338,6 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
     ],
 )  # fmt: skip
 def test_runs_that_cannot_be_are_refused(error, words, options):
-    """More runs than memory holds among them."""
     usual = {"task": "ascending", "condition": "EC1", "seeds": [0], "trials": 1}
     with pytest.raises(error, match=words):
         learn_many(**usual | options)
@@ -349,7 +348,6 @@ def test_runs_that_cannot_be_are_refused(error, words, options):
     [("epsilon", 1.5), ("noise_sd", -1.0), ("noise_sd", 1e20), ("discount", 0.5)],
 )
 def test_a_condition_keeps_its_limits(field, value):
-    """A discount needs credit by subtask."""
     with pytest.raises(ValueError, match=field):
         replace(CONDITIONS["EC1"], **{field: value})
 
@@ -376,7 +374,6 @@ def test_a_copy_that_is_no_task_is_refused(update, message):
 
 
 def test_methods_of_the_learner():
-    """The condition that takes the closest hand uses the goals; a budget may end a run."""
     information = {method.name for method in METHODS if Information.GOALS in method.information}
     assert information == {"dual-process/EC2", "dual-process/custom"}
     method, parameters = METHODS[0], METHODS[0].Parameters
@@ -416,7 +413,6 @@ def own_suite(folder, line):
 
 
 def test_any_condition_is_a_setting_of_a_method(tmp_path):
-    """A suite changes fields of a condition, among them a list of drifts."""
     fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
     suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
     run_suite(str(suite), tmp_path / "results")

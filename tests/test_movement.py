@@ -72,7 +72,6 @@ def test_equals_every_step_many_times(robot, largest, hand):
 
 
 def test_grazing_a_goal():
-    """Goals whose rim the hand's path only just touches, or only just misses."""
     rng = np.random.default_rng(8)
     outcomes = set()
     for _ in range(2000):
@@ -118,7 +117,6 @@ def test_the_bound_keeps_its_promise(largest):
 
 
 def test_the_bound_clears_nearly_all_it_may():
-    """Of a straight approach, and of motions that turn as much as they can."""
     for u, c in ((0.01, 0.0), (-0.01, 1e-4)):
         exact = 0.5 / u if c == 0.0 else (np.sqrt(u * u + 2 * c * 0.5) - u) / c
         assert _cleared(1.0, 0.5, u, 0.0, c) == pytest.approx(exact, rel=2e-5)

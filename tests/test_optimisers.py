@@ -148,7 +148,6 @@ def test_copies_are_refused_with_another_way():
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of fork, beside threads
 @pytest.mark.parametrize("start", ["fork", "spawn"])
 def test_other_processes_are_refused(start):
-    """One that is sent, and one that is inherited."""
     cost = coartic.objective("ascending", budget=50)
     SHARED[:] = [cost]
     functions = [cost, evaluate_shared] if start == "fork" else [cost]
@@ -220,7 +219,6 @@ def test_the_examples_are_methods(path, in_this_process):
 
 
 def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):
-    """It ends nearer to the optimum than given hands, which stay 14 % away."""
     costs, objective = [], coartic.objective
     monkeypatch.setattr(coartic, "objective", lambda *a: costs.append(objective(*a)) or costs[-1])
     runpy.run_path(str(EXAMPLES / "choose_hands.py"), run_name="__main__")
@@ -233,7 +231,6 @@ def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):
 
 
 def test_targets_and_hands_are_minimised_together_by_catcma():
-    """It spends the budget, chooses hands itself, and betters the corrective process alone."""
     pytest.importorskip("cmaes")
     search = runpy.run_path(str(EXAMPLES / "catcma.py"))["search"]
     cost, again = (search("two-armed-1", 400) for _ in range(2))
@@ -246,7 +243,6 @@ def test_targets_and_hands_are_minimised_together_by_catcma():
 
 
 def test_runs_in_the_format_of_iohprofiler(monkeypatch, tmp_path):
-    """What the reader of IOHprofiler finds is what the functions have kept."""
     for library in ("cma", "ioh", "iohinspector"):
         pytest.importorskip(library)
     import iohinspector

@@ -35,7 +35,6 @@ def do(*command, cwd):
 
 
 def test_shipped_results_are_of_this_code():
-    """Otherwise no runs of a built-in method can include them."""
     now = {name: info.code for name, info in built_in().items()}
     for suite in shipped_hashes():
         with open_shipped(suite) as store:
@@ -141,7 +140,6 @@ def test_source_distribution(built, libraries, tmp_path):
 
 
 def test_what_is_in_them(built):
-    """Of the packages all that git has, their data among it, and nothing else."""
     sdist, wheel = built
     with zipfile.ZipFile(wheel) as file:
         names = {name for name in file.namelist() if ".dist-info/" not in name}

@@ -99,7 +99,6 @@ OPTIONS = {
 
 @pytest.mark.usefixtures("here", "in_this_process")
 def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, commands, monkeypatch):
-    """And each option is tried."""
     known = commands.commands["run"].params
     assert {parameter.name for parameter in known} == {*OPTIONS, "help"} - {"help"}
     base = {"suite": ("paper",), "folder": ("--out", "out"), "tasks": ("--tasks", "ascending")}
@@ -136,8 +135,6 @@ def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, comman
 
 @pytest.mark.usefixtures("here")
 def test_a_method_file_that_is_named_runs():
-    """All its methods, with what was asked for, unless some of them are named."""
-
     def methods(suite="paper", **selection):
         plan = plan_suite(
             suite, **{"tasks": ["ascending"], "method_files": ["mine.py"]} | selection

@@ -128,7 +128,6 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
 
 @pytest.mark.parametrize("rule", ["best-single-hand", "best-of-all", "RLLR"])
 def test_a_task_from_a_file_begins_with_the_hands_of_the_package(visited, tmp_path, rule):
-    """Trial 0, the learner, and the corrective process with its best hands, by each rule."""
     file = tmp_path / "shelf.toml"
     goals = [(2.1, 3.6), (4.4, 3.6), (5.2, 0.55), (7.0, 3.6)]
     Task(name="shelf", goals=goals, initial_hands=rule).save(file)

@@ -51,7 +51,6 @@ def test_a_dense_store_gives_the_nearest_posture(task, hand):
 
 @pytest.mark.parametrize("free", [["right"], ["left", "right"]])
 def test_two_goals_give_the_shortest_way_through_both(free):
-    """With one hand, and with the best of all pairs."""
     task = bent(goals=[[5.0, 1.0], [4.0, 2.5]], hands=free)
     result, *_ = solve(TwoGoals, task, rounds=100)
     # The second posture is planned anew from where the first movement ends.

@@ -43,7 +43,6 @@ def stated(rows, least, preferred):
 
 @pytest.mark.parametrize(("far", "preferred", "bind"), [(0.5, 0.3, False), (4.0, 1.0, True)])
 def test_both_levels_of_a_disc_are_as_another_solver_has_them(far, preferred, bind):
-    """With and without active limits."""
     moved = bound = 0
     for rows, least, wanted in problems(20, 4, far, preferred):
         short, nearest = stated(rows, least, wanted)
@@ -66,7 +65,6 @@ def test_a_failed_solve_is_an_outcome():
 
 
 def test_subgoals_of_lower_priority_coarticulate():
-    """Steps within m, locks kept, every goal hit without correction."""
     task = load_task("ascending")
     assert [solve(method, task)[1].reward for method in METHODS] == [-318, -293]
     task = load_task("two-armed-1")

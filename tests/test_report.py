@@ -109,7 +109,6 @@ def test_what_pdflatex_cannot_print_is_for_xelatex(traced):
 
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
 def test_no_text_is_a_formula_of_a_spreadsheet(text):
-    """Numbers stay numbers."""
     frame = pd.DataFrame(
         {"method": [text, "a=b"], "reward": [-1.5, -2], "run_ids": ["", "x"]},
         index=pd.Index([f"{text} row", "other"], name="row"),
@@ -129,7 +128,6 @@ def test_a_report_is_not_written_through_a_link(traced, tmp_path):
 
 
 def test_a_page_stands_alone(report):
-    """Every id is there once, every reference has its id, and ink is the page's."""
     text = (report / "report.html").read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!#|data:,|https://doi\.org|tables/|figures/)', text)
     ids = re.findall(r'\bid="([^"]+)"', text)
@@ -222,7 +220,6 @@ def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):
 
 
 def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
-    """The page names it in its place, the command names it and exits with 1."""
     cells = cells_of("paper", tasks=["ascending"], methods=["EC1"])
     run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
 

@@ -120,7 +120,6 @@ def test_long_runs_begin_first(tmp_path):
 
 @pytest.mark.process
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
-    """In this process and in two others: the same but for the timings."""
     same_results(run_and_write(tmp_path, executor=Local(2)), results)
 
 
@@ -180,7 +179,6 @@ def test_failures_are_kept_as_data(tmp_path):
 
 
 def test_learner_columns_are_the_learners(tmp_path):
-    """A method's details never pass for columns that mean something else."""
     methods = registry([BROKEN])
     cell = cell_on(load_task("ascending"), methods["test/pretender"])
     study = run_and_write(tmp_path, [cell], runs=1)
@@ -260,7 +258,6 @@ def test_the_runs_of_a_batch_share_its_time():
 
 
 def test_a_solution_that_misses_a_goal_is_infeasible():
-    """Whatever the method says."""
     job = Job(cell_on(STUCK, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.outcome.status, run.scores) == ("infeasible", {})

@@ -518,7 +518,6 @@ def test_a_folder_that_only_its_owner_can_put_right(tmp_path):
 
 
 def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, tmp_path):
-    """Only its own rows are, and only what SQLite cannot use is to be moved away."""
     for error in (ValueError("another folder"), MemoryError(), CoarticError("the disk is full")):
         with pytest.raises(type(error)) as caught, open_store(undisturbed.folder):
             raise error

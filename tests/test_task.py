@@ -170,7 +170,6 @@ def test_reach_of_the_corrective_process():
 
 
 def test_inner_reach():
-    """An arm of links 3 and 1 cannot reach within 2 of its shoulder."""
     content = {"robot": {"right_links": [3.0, 1.0]}, "hands": ["right"], "goals": [[1.0, 0.1]],
                "start": {"left": [0.0] * 4, "right": [0.0, 1.0]}}  # fmt: skip
     with pytest.raises(TaskError, match="goals\\[0\\] \\(1, 0.1\\) is out of reach"):

@@ -252,7 +252,6 @@ def test_the_rest_of_a_piece_lies_ahead():
 
 
 def test_of_too_many_hand_sequences_a_beam_is_planned():
-    """As many as are asked for, as if all were; all where there are no more."""
     task = small_task(goals=((2.6, 1.0), (3.2, -0.4), (1.2, 1.4)))
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}

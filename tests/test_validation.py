@@ -490,7 +490,6 @@ def is_ours(error):
 
 @pytest.mark.parametrize(("call", "usual"), CALLS)
 def test_no_wrong_argument_gets_an_error_of_python(call, usual):
-    """A movement's fields are arguments, too."""
     assert refused_by_us(partial(call, **usual))[0]
     hints = inspect.signature(call).parameters
     for name, value in itertools.product(usual, ODD):

@@ -97,7 +97,6 @@ def edited(true_folder, tmp_path, statement):
 
 @pytest.mark.parametrize("damage", ["zeros", "no UTF-8"])
 def test_a_damaged_file_is_told_from_a_wrong_one(true_folder, tmp_path, coartic, damage):
-    """The command says what is the matter, whichever page or text it is."""
     whole, size = (true_folder / RUNS_FILE).read_bytes(), 4096
     if damage == "zeros":
         starts = range(size, len(whole), 2 * size)
@@ -298,7 +297,6 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
 @pytest.mark.process
 @pytest.mark.parametrize("kernel", ["Haswell", "Prescott"])
 def test_a_folder_is_sound_under_other_kernels_of_blas(true_folder, kernel):
-    """As in another lab, whose processor has them."""
     command = [sys.executable, checker.__file__, true_folder]
     environment = {**os.environ, "OPENBLAS_CORETYPE": kernel}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
