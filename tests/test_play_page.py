@@ -31,6 +31,21 @@ def address(tmp_path_factory):
 
 
 @pytest.fixture
+def opened_task(visited, tmp_path):
+    """Opens the page of a task, with so many trials and other changes of its code."""
+
+    def open_page(task=None, trials=10_000, changes=()):
+        html = pages.play_page(*[task] if task else [])
+        for old, new in (("TRIALS = 10000;", f"TRIALS = {trials};"), *changes):
+            html = html.replace(old, new)
+        file = tmp_path / "play.html"
+        file.write_text(html, encoding="utf-8")
+        return settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
+
+    return open_page
+
+
+@pytest.fixture
 def opened(visited, address):
     """Opens the page in a state."""
 
@@ -96,20 +111,24 @@ def test_it_is_one_small_file_without_addresses():
         assert f'"presets":[{{"label":"{label}"' in own.replace("\\u2020", "†")
 
 
-def median_run(runs):
-    return sorted(runs, key=lambda run: run.reward)[len(runs) // 2]
+def median_of(runs):
+    """Reward of the run that the page shows."""
+    return sorted(run.reward for run in runs)[len(runs) // 2]
 
 
-def test_coarticulation_appears_with_practice(visited, tmp_path):
-    file = tmp_path / "play.html"
-    file.write_text(pages.play_page(), encoding="utf-8")
-    page = settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
+def learned(task, condition, trials=TRIALS):
+    """Ticks that the learner needs, as the page should say."""
+    return -median_of([learn(task, condition, seed=seed, trials=trials) for seed in range(5)])
+
+
+def test_coarticulation_appears_with_practice(opened_task):
+    page = opened_task()
     trials = trials_made(page)
     assert trials == 10_000  # on every machine
     postures = []  # at the goal that they share
     for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
         runs = [learn(name, "EC1", seed=seed, trials=trials) for seed in range(5)]
-        assert ticks(page, role) == -median_run(runs).reward
+        assert ticks(page, role) == -median_of(runs)
         postures.append(np.array([run.execute().configurations[0] for run in runs]))
     learned = standardised_posture_difference(*postures)
     assert learned > 2
@@ -127,21 +146,19 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
 
 
 @pytest.mark.parametrize("rule", ["best-single-hand", "best-of-all", "RLLR"])
-def test_a_task_from_a_file_begins_with_the_hands_of_the_package(visited, tmp_path, rule):
+def test_a_task_from_a_file_begins_with_the_hands_of_the_package(opened_task, tmp_path, rule):
     file = tmp_path / "shelf.toml"
     goals = [(2.1, 3.6), (4.4, 3.6), (5.2, 0.55), (7.0, 3.6)]
     Task(name="shelf", goals=goals, initial_hands=rule).save(file)
-    task, page_file = load_task(file), tmp_path / "play.html"
+    task = load_task(file)
     trials = 1000  # after which it is not as fast as the corrective process by chance
-    html = pages.play_page(task).replace("TRIALS = 10000;", f"TRIALS = {trials};")
-    page_file.write_text(html, encoding="utf-8")
-    page = settled(visited(f"{page_file.as_uri()}#open=1", reduced_motion="reduce"))
-    runs = [learn(task, "EC4", seed=seed, trials=trials) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    page = opened_task(task, trials)
+    spent = learned(task, "EC4", trials)
+    assert ticks(page, "The learner") == spent
     best = max(hand_sequences(task), key=lambda hands: corrective_trial(task, hands).reward)
     alone = corrective_trial(task, best).reward
     assert ticks(page, "Corrective process alone") == -alone
-    fewer = median_run(runs).reward - alone
+    fewer = -spent - alone
     words = (
         f"{abs(fewer)} ticks {'fewer' if fewer > 0 else 'more'} than the corrective process alone"
     )
@@ -159,14 +176,10 @@ RING = """(canvas, { x, y, width, height }) => {  // radius of the circle, by it
 
 
 @pytest.mark.parametrize("radius", [0.01, 0.03])
-def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(visited, tmp_path, radius):
-    task, page_file = metres_task(radius), tmp_path / "play.html"
-    html = pages.play_page(task).replace("TRIALS = 10000;", "TRIALS = 100;")
-    html = html.replace("const figure = new", "const figure = window.player = new")
-    page_file.write_text(html, encoding="utf-8")
-    page = settled(visited(f"{page_file.as_uri()}#open=1", reduced_motion="reduce"))
-    runs = [learn(task, "EC1", seed=seed, trials=100) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(opened_task, radius):
+    task = metres_task(radius)
+    page = opened_task(task, 100, [("figure = new", "figure = window.player = new")])
+    assert ticks(page, "The learner") == learned(task, "EC1", 100)
     assert ticks(page, "Corrective process alone") == -corrective_trial(task, "RRR").reward
     width, height = (page.evaluate(f"player.problems[0].robot.base_size[{k}]") for k in (0, 1))
     assert (width / 0.33, width / height) == (pytest.approx(1 / 4), pytest.approx(5))
@@ -202,8 +215,7 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     page.get_by_role("radio", name="learner").check()
     settled(page)
     assert trials_made(page) == TRIALS
-    runs = [learn(task, "EC1", seed=seed, trials=TRIALS) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    assert ticks(page, "The learner") == learned(task, "EC1")
     # By the pointer, too, and out of reach it says so.
     box = handle.bounding_box()
     page.mouse.move(box["x"] + 22, box["y"] + 22)
@@ -293,9 +305,8 @@ def test_the_link_holds_the_whole_state(opened, address):
     assert f"trials={trials_made(settled(page))}&" in page.url
     comes_back(page)
     assert trials_made(changed_to(page, address, "trials=200")) == 200
-    runs = [learn("two-armed-1", "EC3", seed=seed, trials=TRIALS) for seed in range(5)]
     changed_to(page, address, "preset=3&explores=EC3")
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    assert ticks(page, "The learner") == learned("two-armed-1", "EC3")
     # Entries that are no state are left out, and goals and joints far out lie nearer.
     for name in ("constructor", "toString", "__proto__"):
         changed_to(page, address, f"preset=3&who={name}&mate={name}&explores={name}&{name}=1")
@@ -326,8 +337,7 @@ def test_the_learner_is_that_of_the_python_that_the_page_shows(opened, state, fi
     page = settled(opened(state))
     condition = shown_condition(page)
     assert {name: getattr(condition, name) for name in fields} == fields
-    runs = [learn("two-armed-1", condition, seed=seed, trials=TRIALS) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    assert ticks(page, "The learner") == learned("two-armed-1", condition)
 
 
 def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
