@@ -51,17 +51,22 @@ def tree_of(path):
     return ast.parse(path.read_bytes())
 
 
-@cache
-def imported(path):
-    """Full names of everything a module imports, at any depth of its code."""
+def names_in(nodes):
+    """Full names of everything that code imports."""
     names = set()
-    for node in ast.walk(tree_of(path)):
+    for node in nodes:
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
+            assert node.level == 0, f"relative import: {ast.unparse(node)}"
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
     return names
+
+
+@cache
+def imported(path):
+    """Full names of everything a module imports, at any depth of its code."""
+    return names_in(ast.walk(tree_of(path)))
 
 
 def test_imports_point_one_way():
@@ -104,14 +109,9 @@ def test_no_imports_go_round_in_circles():
     modules = {module_of(path): path for path in sources()}
     imports = {}
     for module, path in modules.items():
-        names = set()
-        for node in statements(tree_of(path)):
-            if isinstance(node, ast.Import):
-                names |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                full = {f"{node.module}.{alias.name}" for alias in node.names}
-                names |= {name if name in modules else node.module for name in full}
-        imports[module] = names & {*modules} - {module}
+        names = names_in(statements(tree_of(path)))
+        homes = {name if name in modules else name.rpartition(".")[0] for name in names}
+        imports[module] = homes & {*modules} - {module}
     try:
         graphlib.TopologicalSorter(imports).prepare()
     except graphlib.CycleError as error:

@@ -515,10 +515,8 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme, s
     assert accessibility.violations_count == 0, accessibility.generate_report()
 
 
-def test_without_scripts_there_is_a_picture(browser, address):
-    context = browser.new_context(java_script_enabled=False)
-    page = context.new_page()
+def test_without_scripts_there_is_a_picture(page_without_scripts, address):
+    page = page_without_scripts
     page.goto(address)
     assert page.locator(".still svg").is_visible()
     assert not page.locator(".stage").is_visible()
-    context.close()

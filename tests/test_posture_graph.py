@@ -8,7 +8,7 @@ import pytest
 from coartic import load_task
 from coartic.baselines.posture_graph import PostureGraph, cheapest_chains, move_other_arm
 from coartic.method import MethodError, Session
-from tests.support.strategies import changed
+from tests.support.strategies import changed, steps_from
 
 
 def cheapest(graph, hands):
@@ -28,8 +28,7 @@ def cheapest(graph, hands):
 
 
 def length_of(task, configurations):
-    steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
-    return np.linalg.norm(steps, axis=1).sum()
+    return np.linalg.norm(steps_from(task.q0, configurations), axis=1).sum()
 
 
 @pytest.mark.parametrize("name", ["two-armed-2", "two-armed-1", "ascending"])
@@ -39,7 +38,7 @@ def test_chains_are_the_cheapest(name):
     chains = dict(graph.chains())
     assert len(chains) == len(task.hands) ** len(task.goals)
     for hands, configurations in chains.items():
-        steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
+        steps = steps_from(task.q0, configurations)
         assert length_of(task, configurations) == pytest.approx(cheapest(graph, hands))
         for goal, hand in enumerate(hands):
             (other,) = {"left", "right"} - {hand}

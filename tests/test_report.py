@@ -11,7 +11,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, Task, load_task
+from coartic import CoarticError, load_task
 from coartic.analysis.report import about, render
 from coartic.analysis.report.about import attempt, limits
 from coartic.analysis.report.build import stamp, write_report
@@ -19,7 +19,7 @@ from coartic.analysis.report.player import methods_played, player
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.study import Study
 from tests.support.made_up import runs_of, study_of
-from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write, suite_of
+from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write
 
 
 @pytest.fixture(scope="module")
@@ -203,20 +203,6 @@ def test_tables_compile(tables_by_name, tmp_path):
     command = ["pdflatex", "-draftmode", "-interaction=nonstopmode", "-halt-on-error", "all"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:]
-
-
-def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):
-    """Two tasks, each with goal 2 in two places: six pairs that share goal 1; a task that is the
-    beginning of another one shares no context with it."""
-    moved = 'tasks = ["ascending", "descending"]\nmethods = ["dual-process/EC1"]\n[blocks.move]\n'
-    cells = suite_of(tmp_path, moved + "goal = 2\nby = [[0.0, 0.0], [0.0, 0.5]]")
-    alone = Task(name="alone", goals=cells[0].task.goals[:1], hands=["right"])
-    cells.append(cell_on(alone, cells[0].method))
-    seen = run_and_write(tmp_path / "moved", cells=cells, runs=2, trials=30)
-    contexts = TABLES["contexts"](seen)
-    assert contexts.index.is_unique
-    assert len(contexts) == 6
-    write_report(seen, tmp_path / "report", for_paper=False)
 
 
 def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):

@@ -401,7 +401,9 @@ def test_p_of_shared_goals_is_corrected_by_method():
         for label, count in ((EC1, 3), (RANDOM_SEARCH, 2))
         for place, task in enumerate(tasks[:count])
     ]
-    table = TABLES["contexts"](study_of_solutions(cells)).set_index("method")
+    table = TABLES["contexts"](study_of_solutions(cells))
+    assert table.index.is_unique
+    table = table.set_index("method")
     assert table.p_holm[EC1].tolist() == pytest.approx([6 * 2 / 70] * 6)
     assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 70] * 2)
 

@@ -73,6 +73,12 @@ def undisturbed(tmp_path_factory):
     return run_and_write(tmp_path_factory.mktemp("undisturbed"), ONE, **FEW)
 
 
+@pytest.fixture
+def copied(undisturbed, tmp_path):
+    """The file of a copy of these runs, to be changed."""
+    return shutil.copy(undisturbed.folder / RUNS_FILE, tmp_path / RUNS_FILE)
+
+
 def plain(run):
     """All of a run, numbers by their bytes."""
     parts = {
@@ -402,12 +408,11 @@ def behind_a_link(path):
         (restored, "was restored from a dump.*copy the file itself"),
     ],
 )
-def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, words):
+def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words):
     def content():
         return {path: path.is_file() and path.read_bytes() for path in tmp_path.iterdir()}
 
-    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
-    spoil(tmp_path / RUNS_FILE)
+    spoil(copied)
     before = content()
     for use in (load, lambda folder: run_and_write(folder, ONE, **FEW)):
         with pytest.raises(CoarticError, match=words) as caught:
@@ -422,9 +427,8 @@ def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, w
     ["ANALYZE", "PRAGMA optimize = 0xfffe", "VACUUM", "CREATE INDEX i ON results (reward)",
      "CREATE VIEW mine AS SELECT 1", "CREATE TABLE notes (text)"],
 )  # fmt: skip
-def test_what_other_programs_add_does_no_harm(undisturbed, tmp_path, statement):
-    shutil.copytree(undisturbed.folder, tmp_path, dirs_exist_ok=True)
-    with closing(sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)) as db:
+def test_what_other_programs_add_does_no_harm(copied, undisturbed, tmp_path, statement):
+    with closing(sqlite3.connect(copied, isolation_level=None)) as db:
         db.execute(statement)
     same_results(load(tmp_path), undisturbed)
     assert check_runs(tmp_path).wrong == []
@@ -453,13 +457,12 @@ def read_all(folder):
         "seed = 'x'",
     ],
 )
-def test_a_value_that_no_run_can_have(undisturbed, tmp_path, change):
+def test_a_value_that_no_run_can_have(copied, tmp_path, change):
     """SQLite refuses it; where it was made not to check, the check of the folder finds it."""
-    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
     statement = f"UPDATE results SET {change} WHERE run = 0"
     with pytest.raises(sqlite3.IntegrityError, match="CHECK"):
-        sql(statement)(tmp_path / RUNS_FILE)
-    with closing(sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)) as db:
+        sql(statement)(copied)
+    with closing(sqlite3.connect(copied, isolation_level=None)) as db:
         db.execute("PRAGMA ignore_check_constraints = ON")
         db.execute(statement)
     assert "Damage: CHECK constraint failed in results." in check_runs(tmp_path).wrong
@@ -497,10 +500,9 @@ def test_a_value_that_no_run_can_have(undisturbed, tmp_path, change):
         f"learning SET rewards = x'{zlib.compress(bytes(7)).hex()}'",
     ],
 )
-def test_content_of_another_kind_is_one_sentence(undisturbed, tmp_path, change):
+def test_content_of_another_kind_is_one_sentence(copied, tmp_path, change):
     """Whatever cannot be read, the check of the folder finds as well, in words."""
-    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
-    sql(f"UPDATE {change}")(tmp_path / RUNS_FILE)
+    sql(f"UPDATE {change}")(copied)
     with pytest.raises(CoarticError) as caught:
         read_all(tmp_path)
     assert str(tmp_path) in str(caught.value)

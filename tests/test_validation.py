@@ -6,6 +6,7 @@ import itertools
 import os
 import re
 import traceback
+from dataclasses import replace
 from functools import partial
 from inspect import isfunction
 from pathlib import Path
@@ -391,6 +392,7 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
     assert not [*tmp_path.iterdir()]
 
 
+Trials = coartic.Optimiser.Parameters
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
 UNMASKED = "has masked entries; needed are numbers without a mask"
 ODD = (
@@ -558,6 +560,20 @@ def test_all_functions_are_called_wrongly():
             "^ExplorationCondition: direction is 'stay', which nothing goes by",
         ),
         (lambda: judge(), "judge: missing a required argument: 'claims'"),
+        (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
+        (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),
+        (lambda: movements_of("RR", "x"), "targets"),
+        (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
+        (
+            lambda: ExplorationCondition("x", ("right",), True, True, "all"),
+            "ExplorationCondition: hand_exploration is 'all'; it sh",
+        ),
+        (
+            lambda: replace(coartic.CONDITIONS["EC4"], epsilon=np.nan),
+            "is nan; it should be a finite",
+        ),
+        (lambda: Trials(trials=0), "Parameters: trials is 0; it should be greater"),
+        (lambda: Trials(half_width=np.nan), "is nan; it should be a finite"),
     ],
 )
 def test_what_was_taken_silently_or_badly_has_a_sentence(call, words):

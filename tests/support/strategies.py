@@ -121,6 +121,11 @@ def make_trials(task, hands, targets, model=PAPER):
     return Session(task, 0, OPTIMISER_INFORMATION, model=model).trials(hands, targets)
 
 
+def steps_from(q, configurations):
+    """Changes of the joints from one posture to the next, beginning with ``q``."""
+    return np.diff(np.vstack([q, *configurations]), axis=0)
+
+
 def least_cost(task, hands, moving, starts, *, radius, square=False):
     """The least length, or sum of squares, of steps in joint space by which hands hit all goals: by
     SLSQP, from steps of the joints that are ``moving``, shape (G, dof); all others are 0."""
