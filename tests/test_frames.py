@@ -128,31 +128,22 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
 
 
 @pytest.mark.parametrize(
-    ("by", "columns", "words"),
+    ("words", "compute", "changes", "arguments"),
     [
-        ([], ["reward"], "by is empty: needed are names"),
-        (3, ["reward"], "by is 3: needed are names"),
-        (["method", "method"], ["reward"], "it names a column twice"),
-        (["reward"], ["reward"], "column reward is in by and in columns"),
+        ("by is empty: needed are names", frames.means, {}, ([], ["reward"])),
+        ("by is 3: needed are names", frames.means, {}, (3, ["reward"])),
+        ("it names a column twice", frames.means, {}, (["method", "method"], ["reward"])),
+        ("column reward is in by and in columns", frames.means, {}, (["reward"], ["reward"])),
+        ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
+        ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
+        ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
+        *(("targets are", frames.ecdf, {}, (targets,))
+          for targets in ([], 0.1, [-0.1], ["a"], [np.nan], [50])),
     ],
-)
-def test_columns_that_cannot_be_meant_are_refused(by, columns, words):
+)  # fmt: skip
+def test_arguments_that_cannot_be_meant_are_refused(words, compute, changes, arguments):
     with pytest.raises(coartic.CoarticError, match=words):
-        frames.means(small_frame(), by, columns)
-
-
-@pytest.mark.parametrize(
-    ("changes", "targets", "words"),
-    [
-        ({"trials": [0, 9]}, [0.1], "trials has 0.0 in row 0"),
-        ({"trials": [np.nan, 9]}, [0.1], "trials has nan in row 0"),
-        ({"run": [0, None]}, [0.1], "run has nan in row 1"),
-        *(({}, targets, "targets are") for targets in ([], 0.1, [-0.1], ["a"], [np.nan], [50])),
-    ],
-)
-def test_trials_and_targets_are_checked(changes, targets, words):
-    with pytest.raises(coartic.CoarticError, match=words):
-        frames.ecdf(small_frame(**changes), targets)
+        compute(small_frame(**changes), *arguments)
 
 
 @pytest.mark.parametrize("tasks", [[(1, 2), (1, 3)], ["x", 2], pd.Categorical([1, 2])])
