@@ -33,7 +33,14 @@ from coartic.method import Information, Session
 from coartic.motion.batch import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
-from tests.support.strategies import PAPER_CELLS, make_trials, tiny_task, uneven_task
+from tests.support.strategies import (
+    PAPER_CELLS,
+    STUCK,
+    failing_task,
+    make_trials,
+    tiny_task,
+    uneven_task,
+)
 
 
 def _tenths(values):
@@ -43,16 +50,6 @@ def _tenths(values):
 
 ZERO = np.zeros(Robot().dof)
 SOON_FAILED = MotionModel(max_iterations=400)  # soon enough for the slow side
-
-
-def failing_task(goals=((1.5, 0.1),), hands="R"):
-    """The left hand starts on a stationary point: its corrective process cannot leave."""
-    return tiny_task(
-        locked_base=["x", "y"],
-        goals=goals,
-        initial_hands=hands,
-        start={"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]},
-    )
 
 
 def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED, start=()):
@@ -289,8 +286,7 @@ def test_a_trial_that_failed_stays_failed_where_the_hand_is_in_the_next_goal():
 
 
 def test_run_without_any_completed_trial():
-    task = tiny_task(locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]])
-    run = learn(task, "EC1", seed=0, trials=20)
+    run = learn(STUCK, "EC1", seed=0, trials=20)
     assert "all 20 trials" in run.reason
     assert run.reward is run.hands is run.replay_reward is run.initial_reward is None
     assert run.solution == ()

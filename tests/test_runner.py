@@ -29,7 +29,7 @@ from coartic.method import Meter
 from coartic.motion.batch import SLOTS
 from coartic.runs.plan import Job, run_seed
 from coartic.runs.record import Outcome, Times, movement_from, too_long
-from tests.support.strategies import tiny_task
+from tests.support.strategies import STUCK, tiny_task
 from tests.support.suites import (
     BROKEN,
     KNOWN,
@@ -156,12 +156,6 @@ def test_run_ids_name_what_the_run_depends_on():
         first([cell_on(cell.task, replace(cell.method, code="c0de"))]),
     ]
     assert len({base, *others}) == 8
-
-
-STUCK = tiny_task(
-    name="stuck", locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]], initial_hands="R"
-)
-"""The corrective process cannot leave where it starts."""
 
 
 def test_failures_are_kept_as_data(tmp_path):

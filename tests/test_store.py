@@ -27,7 +27,7 @@ from coartic.benchmarks.worker import fail
 from coartic.runs import store as store_module
 from coartic.runs.record import Score
 from coartic.runs.store import FORMAT, RUNS_FILE, Store, explain_errors, open_store, writing
-from tests.support.strategies import tiny_task
+from tests.support.strategies import failing_task, tiny_task
 from tests.support.suites import (
     KNOWN,
     Failing,
@@ -41,13 +41,9 @@ from tests.support.suites import (
     same_results,
 )
 
-STUCK = tiny_task(
-    name="stuck", locked_base=["x", "y"], goals=[[1.5, 0.1]], initial_hands="R",
-    start={"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]},
-)  # fmt: skip
 NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
 CELLS = [
-    cell_on(STUCK, KNOWN["dual-process/EC4"], epsilon=0.5),
+    cell_on(failing_task(), KNOWN["dual-process/EC4"], epsilon=0.5),
     cell_on(NEAR, KNOWN["posture-qp/current-goal"]),
 ]
 ONE = paper_cells(tasks=["ascending"])
