@@ -8,16 +8,13 @@ import os
 import pkgutil
 import re
 import signal
-import subprocess
 import sys
 from functools import cache
-from pathlib import Path
 
 import pytest
 
-from tests.support.processes import apart, forget
+from tests.support.processes import ROOT, apart, forget, python
 
-ROOT = Path(__file__).parent.parent
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")
 ALLOWED = {
     "coartic": set(),
@@ -251,7 +248,7 @@ assert not modules & set(coartic.__all__), "a module would hide what has its nam
 
 @pytest.mark.process
 def test_the_package_imports_what_is_asked_for():
-    subprocess.run([sys.executable, "-c", FRESH], cwd=ROOT, check=True)
+    python("-c", FRESH)
 
 
 @pytest.mark.process
@@ -263,8 +260,7 @@ def test_the_package_imports_what_is_asked_for():
     ],
 )
 def test_names_need_no_compiler(command, said, unneeded):
-    line = [sys.executable, "-X", "importtime", "-m", "coartic", command]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
+    done = python("-X", "importtime", "-m", "coartic", command)
     assert said in done.stdout
     imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
     assert not imported & ({"numba", "pandas", "matplotlib"} | unneeded)

@@ -22,7 +22,7 @@ from coartic.gym import TaskEnv
 from coartic.runs.plan import run_seed
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
-from tests.support.processes import comes, folders_of_session
+from tests.support.processes import comes, folders_of_session, python
 from tests.support.strategies import metres_task, tiny_task
 from tests.support.suites import (
     BROKEN,
@@ -251,10 +251,7 @@ def test_a_locale_changes_no_report(tmp_path, coartic, in_this_process):
     assert coartic("run", "quick", "--tasks", f"ascending,{task}", *alone, "--out", runs)[0] == 0
     assert coartic("report", runs, "--out", tmp_path / "here")[0] == 0
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    subprocess.run(
-        [sys.executable, "-m", "coartic", "report", runs, "--out", tmp_path / "there"],
-        env=os.environ | locale | {"PYTHONPATH": str(ROOT)}, check=True, capture_output=True,
-    )  # fmt: skip
+    python("-m", "coartic", "report", runs, "--out", tmp_path / "there", **locale)
     here, there = (
         {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*.*")}
         for folder in (tmp_path / "here", tmp_path / "there")
@@ -273,12 +270,9 @@ def test_modules_in_the_working_folder_are_not_imported(tmp_path):
     for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
         (gift / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
     run = ["run", "quick", "--tasks", "ascending", "--methods", "corrective-alone/given"]
-    command = [sys.executable, program, *run, "--jobs", "1", "--out", "out"]
     temporary = tmp_path / ("long" * 30)  # the system takes no long socket
     temporary.mkdir()
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)}
-    done = subprocess.run(command, cwd=gift, env=environment, capture_output=True, check=False)
-    assert done.returncode == 0, done.stderr
+    python(program, *run, "--jobs", "1", "--out", "out", cwd=gift, TMPDIR=str(temporary))
     assert not list(temporary.iterdir())
     assert not (tmp_path / "run").exists()
 
@@ -368,10 +362,8 @@ def test_a_command_ends_well_whatever_started_it(tmp_path, what):
 
 
 @pytest.mark.process
-def test_kernels_that_may_not_be_compiled_get_a_sentence(tmp_path):
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, "-m", "coartic", "check", TASK_FILE]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+def test_kernels_that_may_not_be_compiled_get_a_sentence():
+    done = python("-m", "coartic", "check", TASK_FILE, fails=True, NUMBA_DISABLE_JIT="1")
     assert done.returncode == 2
     assert done.stderr.startswith("Error: NUMBA_DISABLE_JIT is set")
 
@@ -391,8 +383,7 @@ def helper():
 """
     (tmp_path / "mine.py").write_text(text + body)
     own = ["NAME", "--method-file", "mine.py", "--verbose"]
-    command = [sys.executable, "-m", "coartic", "check", *own]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    done = python("-m", "coartic", "check", *own, cwd=tmp_path, fails=True)
     place = f"mine.py, line {len((text + body).splitlines())}: RuntimeError: here"
     assert (done.returncode, place in done.stdout) == (1, True)
     for words in ("it prints", "INFO:root:it logs", "Traceback", "return helper()"):
@@ -474,11 +465,7 @@ def test_settings_of_matplotlib_in_a_folder_are_not_read(tmp_path):
         except SystemExit:
             import matplotlib
             print(matplotlib.rcParams["text.usetex"])"""
-    done = subprocess.run(
-        [sys.executable, "-c", code, "--version"], cwd=tmp_path, capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True,
-    )  # fmt: skip
-    assert done.stdout.splitlines()[-1] == "False"
+    assert python("-c", code, "--version", cwd=tmp_path).stdout.splitlines()[-1] == "False"
 
 
 @pytest.mark.parametrize(("command", "example"), COMMANDS)

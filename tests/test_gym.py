@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -29,6 +28,7 @@ from coartic.optimisers import FAILED
 from coartic.tasks import families
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import address_of
+from tests.support.processes import python
 from tests.support.strategies import tiny_task
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -283,7 +283,7 @@ def test_a_specification_is_kept_as_json(number, tmp_path):
 @pytest.mark.process
 def test_importing_the_environments_compiles_nothing():
     code = "import sys, coartic.gym; assert not {'numba', 'matplotlib', 'torch'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    python("-c", code)
 
 
 def names_of_program(title):

@@ -2,11 +2,9 @@
 
 import json
 import math
-import os
 import re
 import shutil
 import sqlite3
-import subprocess
 import sys
 import zlib
 from contextlib import closing
@@ -29,6 +27,7 @@ from coartic.runs.plan import Cell, Job
 from coartic.runs.record import PARTS, Outcome, Run, Score
 from coartic.runs.store import RUNS_FILE, writing
 from coartic.tasks.task import hands_of
+from tests.support.processes import python
 from tests.support.strategies import tiny_task, uneven_task
 from tests.support.suites import edit, edit_plan, moved
 
@@ -297,7 +296,5 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
 @pytest.mark.process
 @pytest.mark.parametrize("kernel", ["Haswell", "Prescott"])
 def test_a_folder_is_sound_under_other_kernels_of_blas(true_folder, kernel):
-    command = [sys.executable, checker.__file__, true_folder]
-    environment = {**os.environ, "OPENBLAS_CORETYPE": kernel}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, "Nothing differs" in done.stdout) == (0, True)
+    done = python(checker.__file__, true_folder, OPENBLAS_CORETYPE=kernel)
+    assert "Nothing differs" in done.stdout

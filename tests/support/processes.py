@@ -4,10 +4,21 @@ import contextlib
 import importlib.util
 import multiprocessing
 import os
+import subprocess
 import sys
 import time
 import warnings
 from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def python(*arguments, cwd=None, fails=False, **environment):
+    """Output and end of Python on this code, in a process of its own."""
+    command, env = [sys.executable, *arguments], os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=cwd, env=env | environment, capture_output=True, text=True)
+    assert fails == bool(done.returncode), done.stderr
+    return done
 
 
 def processes():
