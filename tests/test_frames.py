@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import coartic
+from coartic import CoarticError
 from coartic.analysis import frames, judging, load, pages
 from coartic.analysis.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
@@ -64,7 +65,7 @@ def test_a_method_that_lacks_a_task_or_failed_on_it_is_not_ranked():
     assert table.failed["one"] == 4
     by_hand = (-100 - frame.reward[frame.method == "three"]) / 100
     assert table.gap["three"] == pytest.approx(by_hand.mean())
-    with pytest.raises(coartic.CoarticError, match="no column best_known"):
+    with pytest.raises(CoarticError, match="no column best_known"):
         frames.gaps(frame.drop(columns="best_known"))
 
 
@@ -91,7 +92,7 @@ def small_frame(**changes):
 )
 def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
     for compute in (frames.ranking, lambda frame: frames.ecdf(frame, [0.1])):
-        with pytest.raises(coartic.CoarticError, match=words):
+        with pytest.raises(CoarticError, match=words):
             compute(small_frame(**changes))
 
 
@@ -105,13 +106,13 @@ def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
     ],
 )
 def test_what_is_no_frame_of_results_is_refused(compute, words):
-    with pytest.raises(coartic.CoarticError, match="no rows"):
+    with pytest.raises(CoarticError, match="no rows"):
         compute(small_frame()[:0])
-    with pytest.raises(coartic.CoarticError, match="needed is a pandas.DataFrame, not a list"):
+    with pytest.raises(CoarticError, match="needed is a pandas.DataFrame, not a list"):
         compute([1])
-    with pytest.raises(coartic.CoarticError, match="has column reward twice"):
+    with pytest.raises(CoarticError, match="has column reward twice"):
         compute(pd.concat([small_frame(), small_frame()[["reward"]]], axis=1))
-    with pytest.raises(coartic.CoarticError, match=words):
+    with pytest.raises(CoarticError, match=words):
         compute(pd.DataFrame({"best_known": [-292]}))
 
 
@@ -142,7 +143,7 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
     ],
 )  # fmt: skip
 def test_arguments_that_cannot_be_meant_are_refused(words, compute, changes, arguments):
-    with pytest.raises(coartic.CoarticError, match=words):
+    with pytest.raises(CoarticError, match=words):
         compute(small_frame(**changes), *arguments)
 
 
@@ -170,7 +171,7 @@ def test_a_task_that_a_method_lacks_is_not_reached():
     assert none.to_dict("records") == [{"method": "none", "trials": np.inf, "share": 0.0}]
     unknown = small_frame(task=["easy", "unknown"], method="a", best_known=[-300, np.nan])
     assert frames.ecdf(unknown, [0.05]).share.tolist() == [1.0]
-    with pytest.raises(coartic.CoarticError, match="no best_known"):
+    with pytest.raises(CoarticError, match="no best_known"):
         frames.ecdf(unknown.assign(best_known=np.nan), [0.05])
 
 
@@ -192,9 +193,9 @@ def test_verdicts_of_planted_means(monkeypatch):
         "above": "supported", "not above": "not supported", "below": "supported",
         "both": "supported", "one not": "not supported", "open": "undecided", "few": "undecided",
     }  # fmt: skip
-    with pytest.raises(coartic.CoarticError, match="one finding at least"):
+    with pytest.raises(CoarticError, match="one finding at least"):
         all_of(*[])
-    with pytest.raises(coartic.CoarticError, match="unknown side"):
+    with pytest.raises(CoarticError, match="unknown side"):
         mean_beyond("{}", above, 1.0, "larger")
 
 
@@ -250,9 +251,9 @@ def test_runs_are_tidy(tmp_path):
         replays = study.executed("two-armed-1", "dual-process/EC3", replay=True)
         assert of_learner.tolist() == signature.of(replays).tolist()
     assert study.signature("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
-    with pytest.raises(coartic.CoarticError, match="did you mean 'two-armed-1'"):
+    with pytest.raises(CoarticError, match="did you mean 'two-armed-1'"):
         study.executed("two-armed", "EC3")
-    with pytest.raises(coartic.CoarticError, match="did you mean 'first'"):
+    with pytest.raises(CoarticError, match="did you mean 'first'"):
         study.signature("frist")
 
 
@@ -280,5 +281,5 @@ def test_the_share_of_the_possible_gain_by_hand():
     assert ranked.gap["middle"] == pytest.approx((10.5 / 300 + 50.5 / 500 + 2 / 40) / 3, abs=1e-3)
     planted = planted_scores()
     assert frames.shares(planted)[planted.task == "nothing"].isna().all()
-    with pytest.raises(coartic.CoarticError, match="corrective_best has -290.* above best_known"):
+    with pytest.raises(CoarticError, match="corrective_best has -290.* above best_known"):
         frames.shares(planted.assign(corrective_best=-290))

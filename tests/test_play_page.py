@@ -70,6 +70,10 @@ def ticks(page, who):
     return int(found)
 
 
+def press(page, name):
+    page.get_by_role("button", name=name).click()
+
+
 def settled(page):
     """Wait until nothing is to come."""
     page.evaluate(DRAWN)
@@ -196,7 +200,7 @@ def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(opened_task
         task.radius * metre, abs=1
     )
     before = page.evaluate("player.state.goals.length")
-    page.get_by_role("button", name="Add a goal").click()
+    press(page, "Add a goal")
     after = page.evaluate("player.state.goals")
     assert len(after) == before + 1
     assert all(abs(x) < 0.6 and abs(y) < 0.6 for x, y in after)
@@ -227,7 +231,7 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
 
 def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_not(opened):
     page = settled(opened("preset=1&others="))
-    page.get_by_role("button", name="Move goal 3 now").click()
+    press(page, "Move goal 3 now")
     settled(page)
     task = changed("ascending", goals=[[6.0, 0.1], [6.0, 2.0], [5.0, 4.0]])
     practised = learn("ascending", "EC1", seed=0, trials=TRIALS).solution
@@ -268,7 +272,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     assert done.hands == "LLLR"
     assert ticks(page, "You") == done.ticks
     with page.expect_download() as download:
-        page.get_by_role("button", name="Save your trials").click()
+        press(page, "Save your trials")
     trials = pd.read_csv(download.value.path())
     assert trials.trial.max() == 3  # a drag, a hand, a key; the other key moves nothing
     task = load_task("two-armed-1")
@@ -284,7 +288,7 @@ def test_a_proven_optimum_is_shown_until_the_task_is_changed(opened):
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowUp")
     assert "Optimum" not in text(settled(page), "score")
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert ticks(settled(page), r"Optimum \(proven\)") == 292
     page.get_by_label("Task").select_option("3")  # two-armed 1, not proven
     assert "Optimum" not in text(settled(page), "score")
@@ -363,7 +367,7 @@ def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
         assert shown_condition(page) == CONDITIONS["EC1"]
         assert ticks(page, "The learner") == by_drift[0]
     changed_to(page, address, "preset=2&others=&drift=1")
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert dial.input_value() == "0"
 
 
@@ -382,7 +386,7 @@ def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back
     comes_back(page)
     page.get_by_role("radio", name="planner").check()
     assert ticks(settled(page), "Orange") == second
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert settled(page).url == state.replace("&tick=200", "")
 
 
@@ -391,7 +395,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     task = page.get_by_label("Task").locator("option:checked")
     for _ in range(3):
         assert text(page, "why") == ""
-        page.get_by_role("button", name="Add a goal").click()
+        press(page, "Add a goal")
     assert text(page, "why") == "Goals can be added while there are fewer than 6."
     labels = page.locator(".handle").evaluate_all("all => all.map(each => each.ariaLabel)")
     places = [re.search(r"at (\S+), (\S+)\. ", label).groups() for label in labels]
@@ -403,16 +407,16 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     assert task.inner_text() == "Up or down (changed)"
     page.get_by_role("slider", name="Tick").fill("400")
     for _ in range(5):
-        page.get_by_role("button", name="Remove a goal").click()
+        press(page, "Remove a goal")
     shown, last = map(int, re.findall(r"\d+", text(page, "count")))
     assert shown == last
     assert "the robot hits goal 1." in text(page, "lead")
     assert text(page, "why") == "The only goal stays; it has no next goal."
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert task.inner_text() == "Up or down"
     assert "both robots" in text(page, "lead")
     # A link to this file is of use with the file.
-    page.get_by_role("button", name="Copy link").click()
+    press(page, "Copy link")
     page.get_by_text("this machine only").get_by_text("send play.html").wait_for()
 
 
@@ -470,7 +474,7 @@ def test_it_practises_plays_and_saves_pictures(opened):
     page = opened(reduced_motion="no-preference")
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
-    page.get_by_role("button", name="Pause").click()
+    press(page, "Pause")
     page.get_by_role("slider", name="Tick").fill("100")
     page.get_by_role("slider", name="Tick").press("ArrowRight")
     page.get_by_text("102 of").wait_for()
@@ -478,7 +482,7 @@ def test_it_practises_plays_and_saves_pictures(opened):
         "stage => [stage.clientWidth, stage.clientHeight]"
     )
     with page.expect_download() as download:
-        page.get_by_role("button", name="Save PNG").click()
+        press(page, "Save PNG")
     png = download.value.path().read_bytes()
     assert png.startswith(b"\x89PNG")
     width, height = struct.unpack(">II", png[16:24])
