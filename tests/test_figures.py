@@ -74,7 +74,7 @@ def test_a_figure_has_chosen_methods_tasks_and_style(shipped, tmp_path):
     assert plot.figure.axes[0].xaxis.label.get_fontsize() == 20.0
     plot.save(tmp_path / "mine.pdf")
     assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")
-    with pytest.raises(CoarticError, match=r"a picture ends in \.svg, \.pdf, \.png"):
+    with pytest.raises(CoarticError, match=r"ends in \.svg, \.pdf, \.png; not in '\.doc'"):
         plot.save(tmp_path / "mine.doc")
     with pytest.raises(CoarticError, match="unknown method 'cma-es/bandits'.*cma-es/bandit"):
         FIGURES["ranking"](shipped, methods=["cma-es/bandits"])

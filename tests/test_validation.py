@@ -61,7 +61,6 @@ from coartic.analysis import (
     solutions_of,
     write_study,
 )
-from coartic.analysis.figures import picture
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.signatures.context_tests import posture_difference_below
 from coartic.analysis.statistics.hypotheses import (
@@ -284,11 +283,6 @@ def test_tables_and_figures_are_of_a_study(what):
         what("folder")
     with pytest.raises(CoarticError, match="needed is a study, as .* returns it, not a DataFrame"):
         what(pd.DataFrame({"reward": [-300]}))
-
-
-def test_a_picture_has_an_ending():
-    with pytest.raises(CoarticError, match=r"a picture ends in .svg, .pdf, .png; not in '.bmp'"):
-        picture(Figure(), ".bmp")
 
 
 @pytest.mark.parametrize("name", ["a" * 5000, "x\0y", 3, None])
