@@ -118,9 +118,10 @@ def test_names_and_looks_tell_methods_apart():
     assert both["mine"] != both["theirs"]
 
 
-@pytest.mark.parametrize("epoch", ["x", "", "1700000000"])
-def test_a_date_of_the_environment_changes_no_picture(traced, monkeypatch, epoch):
+def test_a_date_of_the_environment_changes_no_picture(traced, monkeypatch):
     plot = FIGURES["learning-curves"](traced)
     before = [picture(plot.figure, ending) for ending in FORMATS], for_page(plot)
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
-    assert ([picture(plot.figure, ending) for ending in FORMATS], for_page(plot)) == before
+    for epoch in ("x", "", "1700000000"):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+        after = [picture(plot.figure, ending) for ending in FORMATS], for_page(plot)
+        assert after == before, epoch
