@@ -8,16 +8,13 @@ import os
 import pkgutil
 import re
 import signal
-import subprocess
 import sys
 from functools import cache
-from pathlib import Path
 
 import pytest
 
-from tests.support.processes import apart, forget
+from tests.support.processes import ROOT, apart, forget, python
 
-ROOT = Path(__file__).parent.parent
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")
 ALLOWED = {
     "coartic": set(),
@@ -51,17 +48,22 @@ def tree_of(path):
     return ast.parse(path.read_bytes())
 
 
-@cache
-def imported(path):
-    """Full names of everything a module imports, at any depth of its code."""
+def names_in(nodes):
+    """Full names of everything that code imports."""
     names = set()
-    for node in ast.walk(tree_of(path)):
+    for node in nodes:
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
+            assert node.level == 0, f"relative import: {ast.unparse(node)}"
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
     return names
+
+
+@cache
+def imported(path):
+    """Full names of everything a module imports, at any depth of its code."""
+    return names_in(ast.walk(tree_of(path)))
 
 
 def test_imports_point_one_way():
@@ -104,18 +106,12 @@ def statements(tree):
 
 
 def test_no_imports_go_round_in_circles():
-    """Those within functions count as well."""
     modules = {module_of(path): path for path in sources()}
     imports = {}
     for module, path in modules.items():
-        names = set()
-        for node in statements(tree_of(path)):
-            if isinstance(node, ast.Import):
-                names |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                full = {f"{node.module}.{alias.name}" for alias in node.names}
-                names |= {name if name in modules else node.module for name in full}
-        imports[module] = names & {*modules} - {module}
+        names = names_in(statements(tree_of(path)))
+        homes = {name if name in modules else name.rpartition(".")[0] for name in names}
+        imports[module] = homes & {*modules} - {module}
     try:
         graphlib.TopologicalSorter(imports).prepare()
     except graphlib.CycleError as error:
@@ -255,8 +251,7 @@ assert not modules & set(coartic.__all__), "a module would hide what has its nam
 
 @pytest.mark.process
 def test_the_package_imports_what_is_asked_for():
-    """Every public name is there, under its own name whatever is imported first."""
-    subprocess.run([sys.executable, "-c", FRESH], cwd=ROOT, check=True)
+    python("-c", FRESH)
 
 
 @pytest.mark.process
@@ -268,8 +263,7 @@ def test_the_package_imports_what_is_asked_for():
     ],
 )
 def test_names_need_no_compiler(command, said, unneeded):
-    line = [sys.executable, "-X", "importtime", "-m", "coartic", command]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
+    done = python("-X", "importtime", "-m", "coartic", command)
     assert said in done.stdout
     imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
     assert not imported & ({"numba", "pandas", "matplotlib"} | unneeded)
@@ -319,7 +313,6 @@ def test_one_kinematic_module():
 
 
 def test_no_module_is_imported_but_undeclared():
-    """Every third-party import is a declared dependency."""
     declared = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     aliases = {"pydantic_core": "pydantic", "llvmlite": "numba", "click": "typer", "PIL": "pillow",
                "stable_baselines3": "stable-baselines3"}  # fmt: skip

@@ -2,7 +2,6 @@
 
 import re
 import unicodedata
-from pathlib import Path
 
 import pytest
 
@@ -12,9 +11,7 @@ from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.method_files import METHOD_NAME
 from coartic.benchmarks.registry import NAMES, built_in, registry
 from coartic.runs.method_info import MethodInfo
-from tests.support.suites import BROKEN, cell_on, edit_plan, run_and_write
-
-ROOT = Path(__file__).parent.parent
+from tests.support.suites import BROKEN, ROOT, cell_on, edit_plan, run_and_write
 
 
 def fields_of(entry):

@@ -95,7 +95,6 @@ def test_a_cluster_without_workers(distributed, tmp_path, monkeypatch):
 
 
 def test_a_glance_without_workers_is_none(address, tmp_path, monkeypatch):
-    """A scheduler may name none for a moment."""
     messages, glances = [], [{}]
     executor = Dask(address, say=messages.append)
     client = executor._client()
@@ -114,7 +113,6 @@ def test_what_is_no_executor(tmp_path, executor):
 
 
 def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
-    """What was finished before is kept."""
     monkeypatch.setattr(cluster_module, "Workers", lambda *_, **__: InProcess())
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
     with cluster:

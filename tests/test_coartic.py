@@ -139,24 +139,6 @@ def test_docstrings_say_what_goes_in_and_what_comes_out(name):
     assert "\nRaises\n------\n" in text or not inspect.signature(FUNCTIONS[name]).parameters
 
 
-@pytest.mark.parametrize(
-    ("wrong", "error", "words"),
-    [
-        *(({"seeds": [v]}, ValueError, "seed is") for v in (-1, 1.5, None, True, 2**128)),
-        *(({"seeds": v}, TypeError, "seeds is .*; it must be") for v in ("1", 3)),
-        *(({"trials": v}, ValueError, "trials is") for v in (0, 1.5, "5", True, 10**12)),
-        *(({"jobs": v}, ValueError, "jobs is") for v in (0, 1.5, None, True, 10**9)),
-        *(({"model": v}, TypeError, "must be a MotionModel") for v in (None, {})),
-        ({"model": coartic.MotionModel(step="x")}, ValueError, "model.step is 'x'; it must be"),
-        ({"model": coartic.MotionModel(max_iterations=1.5)}, ValueError, "must be a whole number"),
-        *(({"start": v}, coartic.SolutionError, "ovement") for v in ("x", [1])),
-    ],
-)  # fmt: skip
-def test_what_the_learner_cannot_use_is_refused_with_its_name(wrong, error, words):
-    with pytest.raises(error, match=words):
-        coartic.learn_many(TASK, "EC4", **{"seeds": [0], "trials": 2} | wrong)
-
-
 def test_what_is_no_solution():
     for wrong in (None, 3, Movement(1, "left", "corrective")):
         with pytest.raises(coartic.SolutionError, match="the solution is .*; needed is a list"):

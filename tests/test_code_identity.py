@@ -4,9 +4,7 @@ import ast
 import importlib
 import inspect
 import json
-import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +13,7 @@ from coartic.benchmarks import syntax
 from coartic.benchmarks.code_identity import code_of, files_of
 from coartic.method import MODULES
 from coartic.motion.compile import PACKAGE
+from tests.support.processes import pythons
 
 FILES = {name.split(".")[-1]: Path(inspect.getfile(importlib.import_module(name)))
          for name in MODULES}  # fmt: skip
@@ -53,7 +52,6 @@ def after(before, monkeypatch):
 
 
 def test_what_plans_stores_reads_and_shows_runs_does_not_count():
-    """No sentence of these makes results those of other code."""
     for file in FILES.values():
         rooms = {path.relative_to(PACKAGE).parts[0] for path in files_of(file)}
         assert not rooms & {"__init__.py", "analysis", "benchmarks", "cli", "play", "runs"}
@@ -136,18 +134,10 @@ for source in json.load(sys.stdin):
 """
 
 
-def pythons(minor):
-    """Every Python of a minor version on this machine that starts; a shim of pyenv may not."""
-    installed = (Path.home() / ".pyenv" / "versions").glob(f"3.{minor}.*/bin/python")
-    places = {shutil.which(f"python3.{minor}"), *map(str, installed)} - {None}
-    places |= {sys.executable} if sys.version_info[1] == minor else set()
-    return [place for place in places if not subprocess.run([place, "-c", ""]).returncode]
-
-
 @pytest.mark.parametrize("minor", range(11, 16))
 def test_every_version_of_python_reads_the_same_code(minor):
     sources = json.dumps([*SOURCES.values()])
-    for python in (found := pythons(minor)):
+    for python in (found := pythons().get(minor, [])):
         command = [python, "-I", "-W", "ignore", "-c", HASH, syntax.__file__]
         done = subprocess.run(command, input=sources, capture_output=True, text=True)
         assert done.stdout.split() == [*SOURCES], done.stderr

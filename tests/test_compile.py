@@ -2,19 +2,16 @@
 
 import os
 import shutil
-import subprocess
 import sys
-from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
 
-from tests.support.processes import apart, forget
+from tests.support.processes import ROOT, apart, forget, python
 
 pytestmark = pytest.mark.process
 
-ROOT = Path(__file__).parent.parent
 KERNEL = """
 from coartic.motion.compile import entry, joint_lever
 
@@ -51,13 +48,9 @@ def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
         from numba.core import config
         config.reload_config()
         print(config.CACHE_DIR, config.DISABLE_JIT)"""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": "/ours"}
-    command = [sys.executable, "-W", "error", "-c", code]
     for text in ("cache_dir: kept\ndisable_jit: 1\n", ": {{{ \0"):
         (tmp_path / ".numba_config.yaml").write_text(text, encoding="utf-8")
-        done = subprocess.run(
-            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
-        )
+        done = python("-W", "error", "-c", code, cwd=tmp_path, NUMBA_CACHE_DIR="/ours")
         assert done.stdout.split() == ["/ours", "0"]
 
 

@@ -244,7 +244,6 @@ def test_command_draws_and_writes_instances(coartic, tmp_path):
 
 
 def test_a_family_of_ones_own_is_run_by_its_file(tmp_path):
-    """Beside the shipped ones, under the name of its file; the folder is read without it."""
     shipped = FAMILY_FOLDER / "one-armed.v1.toml"
     path = tmp_path / "mine.v1.toml"
     path.write_text(shipped.read_text(encoding="utf-8"), encoding="utf-8")

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import coartic
+from coartic import CoarticError
 from coartic.analysis import frames, judging, load, pages
 from coartic.analysis.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
@@ -64,7 +65,7 @@ def test_a_method_that_lacks_a_task_or_failed_on_it_is_not_ranked():
     assert table.failed["one"] == 4
     by_hand = (-100 - frame.reward[frame.method == "three"]) / 100
     assert table.gap["three"] == pytest.approx(by_hand.mean())
-    with pytest.raises(coartic.CoarticError, match="no column best_known"):
+    with pytest.raises(CoarticError, match="no column best_known"):
         frames.gaps(frame.drop(columns="best_known"))
 
 
@@ -91,7 +92,7 @@ def small_frame(**changes):
 )
 def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
     for compute in (frames.ranking, lambda frame: frames.ecdf(frame, [0.1])):
-        with pytest.raises(coartic.CoarticError, match=words):
+        with pytest.raises(CoarticError, match=words):
             compute(small_frame(**changes))
 
 
@@ -105,18 +106,17 @@ def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
     ],
 )
 def test_what_is_no_frame_of_results_is_refused(compute, words):
-    with pytest.raises(coartic.CoarticError, match="no rows"):
+    with pytest.raises(CoarticError, match="no rows"):
         compute(small_frame()[:0])
-    with pytest.raises(coartic.CoarticError, match="needed is a pandas.DataFrame, not a list"):
+    with pytest.raises(CoarticError, match="needed is a pandas.DataFrame, not a list"):
         compute([1])
-    with pytest.raises(coartic.CoarticError, match="has column reward twice"):
+    with pytest.raises(CoarticError, match="has column reward twice"):
         compute(pd.concat([small_frame(), small_frame()[["reward"]]], axis=1))
-    with pytest.raises(coartic.CoarticError, match=words):
+    with pytest.raises(CoarticError, match=words):
         compute(pd.DataFrame({"best_known": [-292]}))
 
 
 def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
-    """As set_index(drop=False) and merges make it."""
     frame = small_frame(task=["t", "u"])
     for names in (["method", "run"], "reward"):
         named = frame.set_index(names, drop=False)
@@ -129,31 +129,22 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
 
 
 @pytest.mark.parametrize(
-    ("by", "columns", "words"),
+    ("words", "compute", "changes", "arguments"),
     [
-        ([], ["reward"], "by is empty: needed are names"),
-        (3, ["reward"], "by is 3: needed are names"),
-        (["method", "method"], ["reward"], "it names a column twice"),
-        (["reward"], ["reward"], "column reward is in by and in columns"),
+        ("by is empty: needed are names", frames.means, {}, ([], ["reward"])),
+        ("by is 3: needed are names", frames.means, {}, (3, ["reward"])),
+        ("it names a column twice", frames.means, {}, (["method", "method"], ["reward"])),
+        ("column reward is in by and in columns", frames.means, {}, (["reward"], ["reward"])),
+        ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
+        ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
+        ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
+        *(("targets are", frames.ecdf, {}, (targets,))
+          for targets in ([], 0.1, [-0.1], ["a"], [np.nan], [50])),
     ],
-)
-def test_columns_that_cannot_be_meant_are_refused(by, columns, words):
-    with pytest.raises(coartic.CoarticError, match=words):
-        frames.means(small_frame(), by, columns)
-
-
-@pytest.mark.parametrize(
-    ("changes", "targets", "words"),
-    [
-        ({"trials": [0, 9]}, [0.1], "trials has 0.0 in row 0"),
-        ({"trials": [np.nan, 9]}, [0.1], "trials has nan in row 0"),
-        ({"run": [0, None]}, [0.1], "run has nan in row 1"),
-        *(({}, targets, "targets are") for targets in ([], 0.1, [-0.1], ["a"], [np.nan], [50])),
-    ],
-)
-def test_trials_and_targets_are_checked(changes, targets, words):
-    with pytest.raises(coartic.CoarticError, match=words):
-        frames.ecdf(small_frame(**changes), targets)
+)  # fmt: skip
+def test_arguments_that_cannot_be_meant_are_refused(words, compute, changes, arguments):
+    with pytest.raises(CoarticError, match=words):
+        compute(small_frame(**changes), *arguments)
 
 
 @pytest.mark.parametrize("tasks", [[(1, 2), (1, 3)], ["x", 2], pd.Categorical([1, 2])])
@@ -167,7 +158,6 @@ def test_tasks_are_names_numbers_tuples_or_categories(tasks):
 
 
 def test_a_method_with_several_settings_has_a_row_for_each():
-    """Missing and empty are the default."""
     frame = small_frame(method="a", setting=["", "h=2"])
     frame = pd.concat([frame, small_frame(method=["b", "a"], setting=["h=1", None])])
     ranked = frames.ranking(frame.reset_index(drop=True))
@@ -177,12 +167,11 @@ def test_a_method_with_several_settings_has_a_row_for_each():
 
 
 def test_a_task_that_a_method_lacks_is_not_reached():
-    """A method that reaches nothing has a row."""
     none = frames.ecdf(small_frame(method="none", reward=np.nan), [0.05])
     assert none.to_dict("records") == [{"method": "none", "trials": np.inf, "share": 0.0}]
     unknown = small_frame(task=["easy", "unknown"], method="a", best_known=[-300, np.nan])
     assert frames.ecdf(unknown, [0.05]).share.tolist() == [1.0]
-    with pytest.raises(coartic.CoarticError, match="no best_known"):
+    with pytest.raises(CoarticError, match="no best_known"):
         frames.ecdf(unknown.assign(best_known=np.nan), [0.05])
 
 
@@ -204,9 +193,9 @@ def test_verdicts_of_planted_means(monkeypatch):
         "above": "supported", "not above": "not supported", "below": "supported",
         "both": "supported", "one not": "not supported", "open": "undecided", "few": "undecided",
     }  # fmt: skip
-    with pytest.raises(coartic.CoarticError, match="one finding at least"):
+    with pytest.raises(CoarticError, match="one finding at least"):
         all_of(*[])
-    with pytest.raises(coartic.CoarticError, match="unknown side"):
+    with pytest.raises(CoarticError, match="unknown side"):
         mean_beyond("{}", above, 1.0, "larger")
 
 
@@ -214,22 +203,18 @@ CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]
 """Values whose mean is above 0 because of the last one."""
 
 
-@pytest.mark.parametrize("side", [1, -1])
-def test_one_task_carries_no_claim(side):
+@pytest.mark.parametrize(("side", "where"), [(1, "greater"), (-1, "less")])
+def test_one_task_carries_no_claim_and_refutes_none(side, where):
     """Without it the test is that of the other tasks alone."""
-    where = {1: "greater", -1: "less"}[side]
-    every, others = (
-        judge({"": ("", "", mean_beyond("{}", side * np.array(values), 0, where))}).loc[""]
-        for values in (CARRIED, CARRIED[:-1])
-    )
+
+    def judged(values, where):
+        return judge({"": ("", "", mean_beyond("{}", side * np.array(values), 0, where))}).loc[""]
+
+    every, others = judged(CARRIED, where), judged(CARRIED[:-1], where)
     assert every.p_holm < 0.05 < every.p_without == others.p_holm
     assert every.verdict == "undecided"
     assert every.evidence.endswith(f"for it {p_value(every.p_without)}.")
-
-
-def test_one_task_refutes_no_claim():
-    opposite = judge({"": ("", "", mean_beyond("{}", CARRIED, 0, "less"))}).loc[""]
-    others = judge({"": ("", "", mean_beyond("{}", CARRIED[:-1]))}).loc[""]
+    opposite = judged(CARRIED, {"greater": "less", "less": "greater"}[where])
     assert opposite.opposite_p_holm == others.p_holm > 0.05
     assert opposite.verdict == "undecided"
 
@@ -266,9 +251,9 @@ def test_runs_are_tidy(tmp_path):
         replays = study.executed("two-armed-1", "dual-process/EC3", replay=True)
         np.testing.assert_array_equal(of_learner, signature.each(replays))
     assert study.signature("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
-    with pytest.raises(coartic.CoarticError, match="did you mean 'two-armed-1'"):
+    with pytest.raises(CoarticError, match="did you mean 'two-armed-1'"):
         study.executed("two-armed", "EC3")
-    with pytest.raises(coartic.CoarticError, match="did you mean 'first'"):
+    with pytest.raises(CoarticError, match="did you mean 'first'"):
         study.signature("frist")
 
 
@@ -296,5 +281,5 @@ def test_the_share_of_the_possible_gain_by_hand():
     assert ranked.gap["middle"] == pytest.approx((10.5 / 300 + 50.5 / 500 + 2 / 40) / 3, abs=1e-3)
     planted = planted_scores()
     assert frames.shares(planted)[planted.task == "nothing"].isna().all()
-    with pytest.raises(coartic.CoarticError, match="corrective_best has -290.* above best_known"):
+    with pytest.raises(CoarticError, match="corrective_best has -290.* above best_known"):
         frames.shares(planted.assign(corrective_best=-290))

@@ -1,13 +1,12 @@
 """Reading of recorded trials, and the kernels that get them."""
 
 import warnings
-from itertools import count
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import CONDITIONS, CoarticError, correct, learn_many, load_task, move
+from coartic import CONDITIONS, CoarticError, correct, load_task, move
 from coartic.analysis import TwoContexts, read_hits, solutions_of
 from coartic.motion.batch import robot_parameters
 from coartic.motion.trial import ALL_STOP, Requests, reach, reach_goals
@@ -56,23 +55,17 @@ WRONG = {
 
 @pytest.mark.parametrize("sentence", WRONG)
 def test_reader_says_what_is_wrong_and_where(people, tmp_path, sentence):
-    WRONG[sentence](people).to_csv(tmp_path / "people.csv", index=False)
+    frame = WRONG[sentence](people)
+    frame.to_csv(tmp_path / "people.csv", index=False)
     with pytest.raises(CoarticError, match=sentence):
         read_hits(tmp_path / "people.csv", TASK)
+    if "duration" not in frame:
+        with pytest.raises(CoarticError, match="the frame"):
+            solutions_of(TASK, frame)
 
 
 def as_text(people):
     return people.to_csv(index=False)
-
-
-def test_frames_are_refused_as_files_are(people):
-    for change in WRONG.values():
-        frame = change(people)
-        if "duration" not in frame:
-            with pytest.raises(CoarticError, match="the frame"):
-                solutions_of(TASK, frame)
-    with pytest.raises(CoarticError, match="in no trial are all 4 goals hit"):
-        solutions_of(TASK, people[people.goal < 4])
 
 
 FORMS = {
@@ -190,6 +183,8 @@ def test_reader_takes_durations_and_warns_of_small_degrees(people, tmp_path):
     timed = people.rename(columns={"ticks": "duration"})
     timed.assign(duration=timed.duration / 100).to_csv(path, index=False)
     assert read_hits(path, TASK, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
+    with pytest.raises(CoarticError, match="in no trial are all 4 goals hit"):
+        solutions_of(TASK, people[people.goal < 4])
     since_start = people.groupby(["subject", "trial"]).ticks.cumsum()
     people.assign(ticks=since_start).to_csv(path, index=False)
     with pytest.warns(UserWarning, match="from the hit before"):
@@ -240,9 +235,3 @@ def test_a_goal_is_two_finite_numbers(goal):
         move(TASK.robot, TASK.q0, TASK.q0, "right", goal, 0.1)
     with pytest.raises(ValueError, match="configuration"):
         correct(TASK.robot, TASK.q0 * np.nan, "right", (1, 2))
-
-
-@pytest.mark.parametrize("seeds", [range(10**9), count()])
-def test_the_number_of_seeds_has_a_limit(seeds):
-    with pytest.raises(ValueError, match="seeds has more than 1,000,000 entries"):
-        learn_many(TASK, "EC4", seeds=seeds, trials=1)

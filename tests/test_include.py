@@ -58,6 +58,12 @@ def parts(tmp_path_factory):
     return folder / "left", folder / "right"
 
 
+@pytest.fixture
+def left(parts, tmp_path):
+    """A copy of the left part, to be changed."""
+    return shutil.copytree(parts[0], tmp_path / "left")
+
+
 def joined(folders, out, cells=WHOLE, **options):
     """What is performed where a plan of cells includes folders."""
     whole = include_folders(planned(cells, **OPTIONS | options), folders, out)
@@ -73,7 +79,6 @@ def test_parts_make_a_whole(parts, tmp_path):
 
 
 def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
-    """Parts join to what one command makes; alone a part is no results folder."""
     command = ("run", "paper", "--tasks", "ascending", "--trials", 20, "--methods", f"EC1,{ALONE}")
     places = [tmp_path / each for each in ("first", "second", "whole", "once")]
     for place, runs in zip(places, ("0..1", "2..3"), strict=False):
@@ -98,9 +103,7 @@ def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
     )
 
 
-def test_what_no_folder_has_is_performed(parts, tmp_path):
-    """Cells of the plan, and runs of a folder that was not finished."""
-    left = shutil.copytree(parts[0], tmp_path / "left")
+def test_what_no_folder_has_is_performed(parts, left, tmp_path):
     edit(left, f"DELETE FROM results WHERE id = {OF_EC1}")
     progress = joined([left], tmp_path / "whole")
     assert (progress.present, progress.done) == (2, 1 + 3)
@@ -109,9 +112,8 @@ def test_what_no_folder_has_is_performed(parts, tmp_path):
     same_results(load(tmp_path / "whole"), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
 
 
-def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, tmp_path):
+def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, left, tmp_path):
     """Whatever it was asked for itself: nobody else's plan says how much is performed here."""
-    left = shutil.copytree(parts[0], tmp_path / "left")
     edit_plan(left, "UPDATE plan SET runs = 1000000 WHERE position = 0")
     with pytest.warns(UserWarning, match=f"left is not finished: it lacks runs of {EC1} on asc"):
         progress = joined([left], tmp_path / "more", RIGHT[2:])
@@ -123,8 +125,7 @@ def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, tmp_path):
     assert check_runs(tmp_path / "more").wrong == check_runs(tmp_path / "less").wrong == []
 
 
-def test_a_run_that_views_would_not_show(parts, tmp_path):
-    left = shutil.copytree(parts[0], tmp_path / "left")
+def test_a_run_that_views_would_not_show(left, tmp_path):
     edit(left, f"UPDATE results SET environment = 99 WHERE id = {OF_EC1}")
     for read in (load, lambda folder: joined([folder], tmp_path / "out")):
         with pytest.raises(CoarticError, match="names a row of environments that is not there"):
@@ -132,9 +133,7 @@ def test_a_run_that_views_would_not_show(parts, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_is_read_in_one_state(parts, tmp_path):
-    """A suite that begins in it meanwhile waits until it is read."""
-    left = shutil.copytree(parts[0], tmp_path / "left")
+def test_a_folder_is_read_in_one_state(left):
     with open_store(left) as store:
         before = store.ids()
         with closing(sqlite3.connect(left / RUNS_FILE, timeout=0, isolation_level=None)) as other:
@@ -164,9 +163,8 @@ CHEATS = {
 
 
 @pytest.mark.parametrize("said", CHEATS)
-def test_what_was_changed_is_not_copied(parts, tmp_path, said):
+def test_what_was_changed_is_not_copied(parts, left, tmp_path, said):
     """A joint of the arm that is not used changes no tick: the hash tells."""
-    left = shutil.copytree(parts[0], tmp_path / "left")
     edit(left, CHEATS[said])
     with pytest.raises(CoarticError, match=f"left.*run .*{said}"):
         joined([parts[1], left], tmp_path / "whole")
@@ -175,7 +173,6 @@ def test_what_was_changed_is_not_copied(parts, tmp_path, said):
 
 
 def test_two_results_of_one_run(parts, tmp_path):
-    """They are named, and nothing is copied; a downsampled one is the same result."""
     downsampled, other = (
         shutil.copytree(parts[0], tmp_path / name) for name in ("downsampled", "other")
     )
@@ -226,7 +223,6 @@ def test_what_does_not_go_together(parts, tmp_path):
 
 
 def test_what_a_folder_has_may_be_of_other_code(parts, tmp_path):
-    """Where nothing of it is missing: it is copied as it is."""
     new = replace(KNOWN[EC1], code="0123456789ab")
     ours = [replace(cell, method=new if cell.method.name == EC1 else cell.method) for cell in LEFT]
     assert joined(parts[:1], tmp_path / "whole", ours).done == 0
@@ -258,7 +254,6 @@ def test_a_stranger_beside_others(parts, tmp_path):
 
 
 def test_shipped_results(monkeypatch, tmp_path):
-    """They are those of their hash, and are read as any folder."""
     for suite in shipped.shipped_hashes():
         with shipped.open_shipped(suite) as store:
             plan = store.plan()
@@ -310,8 +305,6 @@ def packed(parts, tmp_path, monkeypatch):
 def test_results_are_packed_again_where_they_have_not_changed(
     packed, tmp_path, monkeypatch, capsys
 ):
-    """Of another code they may be, and times may differ."""
-
     def pack(folder, *options):
         monkeypatch.setattr(sys, "argv", ["shipped", *options, str(folder)])
         return pack_shipped.main(), capsys.readouterr().out

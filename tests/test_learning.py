@@ -17,6 +17,7 @@ from coartic import (
     ExplorationCondition,
     MotionModel,
     Movement,
+    SolutionError,
     execute,
     learn,
     learn_many,
@@ -32,7 +33,14 @@ from coartic.method import Information, Session
 from coartic.motion.batch import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
-from tests.support.strategies import PAPER_CELLS, make_trials, tiny_task, uneven_task
+from tests.support.strategies import (
+    PAPER_CELLS,
+    STUCK,
+    failing_task,
+    make_trials,
+    tiny_task,
+    uneven_task,
+)
 
 
 def _tenths(values):
@@ -42,16 +50,6 @@ def _tenths(values):
 
 ZERO = np.zeros(Robot().dof)
 SOON_FAILED = MotionModel(max_iterations=400)  # soon enough for the slow side
-
-
-def failing_task(goals=((1.5, 0.1),), hands="R"):
-    """The left hand starts on a stationary point: its corrective process cannot leave."""
-    return tiny_task(
-        locked_base=["x", "y"],
-        goals=goals,
-        initial_hands=hands,
-        start={"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]},
-    )
 
 
 def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED, start=()):
@@ -288,8 +286,7 @@ def test_a_trial_that_failed_stays_failed_where_the_hand_is_in_the_next_goal():
 
 
 def test_run_without_any_completed_trial():
-    task = tiny_task(locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]])
-    run = learn(task, "EC1", seed=0, trials=20)
+    run = learn(STUCK, "EC1", seed=0, trials=20)
     assert "all 20 trials" in run.reason
     assert run.reward is run.hands is run.replay_reward is run.initial_reward is None
     assert run.solution == ()
@@ -311,22 +308,35 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
 
 
 @pytest.mark.parametrize(
-    ("task", "condition", "options", "words"),
+    ("error", "words", "options"),
     [
-        ("ascending", "EC5", {}, "unknown exploration condition 'EC5'; did you mean"),
-        ("ascending", "EC3", {}, "has no left hand"),
-        (LEFT_FIRST, "EC1", {}, "only the right hand, .* starts with LRLR"),
-        ("ascending", "EC1", {"start": movements_of("R", [ZERO])}, "movements for goals"),
-        ("ascending", "EC1", {"start": movements_of("LLL", [ZERO] * 3)}, "no left hand"),
-        ("two-armed-1", "EC1", {"start": movements_of("LLLL", [ZERO] * 4)}, "the first .* left"),
-        ("ascending", "EC1", {"seeds": range(10**9)}, "seeds has more than 1,000,000 entries"),
-        ("ascending", "EC1", {"seeds": itertools.count(), "trials": 10_000}, "more than 20,000"),
+        (CoarticError, "unknown exploration condition 'EC5'; did you mean", {"condition": "EC5"}),
+        (CoarticError, "has no left hand", {"condition": "EC3"}),
+        (CoarticError, "only the right hand, .* starts with LRLR", {"task": LEFT_FIRST}),
+        (CoarticError, "movements for goals", {"start": movements_of("R", [ZERO])}),
+        (CoarticError, "no left hand", {"start": movements_of("LLL", [ZERO] * 3)}),
+        (CoarticError, "the first .* left",
+         {"task": "two-armed-1", "start": movements_of("LLLL", [ZERO] * 4)}),
+        *((SolutionError, "ovement", {"start": start}) for start in ("x", [1])),
+        *((ValueError, "seed is", {"seeds": [seed]}) for seed in (-1, 1.5, None, True, 2**128)),
+        *((TypeError, "seeds is .*; it must be", {"seeds": seeds}) for seeds in ("1", 3)),
+        (ValueError, "seeds has more than 1,000,000 entries", {"seeds": range(10**9)}),
+        (ValueError, "seeds has more than 1,000,000 entries", {"seeds": itertools.count()}),
+        (ValueError, "seeds has more than 20,000 entries",
+         {"seeds": itertools.count(), "trials": 10_000}),
+        (ValueError, "seeds has more than 20 entries",
+         {"seeds": range(21), "trials": 10_000_000}),
+        *((ValueError, "trials is", {"trials": most}) for most in (0, 1.5, "5", True, 10**12)),
+        *((ValueError, "jobs is", {"jobs": jobs}) for jobs in (0, 1.5, None, True, 10**9)),
+        *((TypeError, "must be a MotionModel", {"model": model}) for model in (None, {})),
+        (ValueError, "model.step is 'x'; it must be", {"model": MotionModel(step="x")}),
+        (ValueError, "must be a whole number", {"model": MotionModel(max_iterations=1.5)}),
     ],
-)
-def test_runs_that_cannot_be_are_refused(task, condition, options, words):
-    """More runs than memory holds among them."""
-    with pytest.raises((CoarticError, ValueError), match=words):
-        learn_many(task, condition, **{"seeds": [0], "trials": 1} | options)
+)  # fmt: skip
+def test_runs_that_cannot_be_are_refused(error, words, options):
+    usual = {"task": "ascending", "condition": "EC1", "seeds": [0], "trials": 1}
+    with pytest.raises(error, match=words):
+        learn_many(**usual | options)
 
 
 @pytest.mark.parametrize(
@@ -334,7 +344,6 @@ def test_runs_that_cannot_be_are_refused(task, condition, options, words):
     [("epsilon", 1.5), ("noise_sd", -1.0), ("noise_sd", 1e20), ("discount", 0.5)],
 )
 def test_a_condition_keeps_its_limits(field, value):
-    """A discount needs credit by subtask."""
     with pytest.raises(ValueError, match=field):
         replace(CONDITIONS["EC1"], **{field: value})
 
@@ -361,7 +370,6 @@ def test_a_copy_that_is_no_task_is_refused(update, message):
 
 
 def test_methods_of_the_learner():
-    """The condition that takes the closest hand uses the goals; a budget may end a run."""
     information = {method.name for method in METHODS if Information.GOALS in method.information}
     assert information == {"dual-process/EC2", "dual-process/custom"}
     method, parameters = METHODS[0], METHODS[0].Parameters
@@ -401,7 +409,6 @@ def own_suite(folder, line):
 
 
 def test_any_condition_is_a_setting_of_a_method(tmp_path):
-    """A suite changes fields of a condition, among them a list of drifts."""
     fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
     suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
     run_suite(str(suite), tmp_path / "results")
@@ -483,19 +490,6 @@ def test_seeds_of_numpy_are_shown_and_kept_as_numbers(seeds):
     assert [(type(run.seed), run.seed) for run in runs] == [(int, 0), (int, 1), (int, 2)]
     due = learn_many("ascending", "EC1", seeds=range(3), trials=3)
     assert [run.rewards.tolist() for run in runs] == [run.rewards.tolist() for run in due]
-
-
-@pytest.mark.parametrize(
-    ("seeds", "trials", "most"),
-    [
-        (range(10**9), 1, "1,000,000"),
-        (itertools.count(), 10_000, "20,000"),
-        (range(21), 10_000_000, "20"),
-    ],
-)
-def test_more_runs_than_memory_holds_are_refused(seeds, trials, most):
-    with pytest.raises(ValueError, match=f"seeds has more than {most} entries"):
-        learn_many("ascending", "EC1", seeds=seeds, trials=trials)
 
 
 def test_a_first_solution_in_degrees_is_hinted_at():

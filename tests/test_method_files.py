@@ -130,7 +130,6 @@ def test_a_file_is_the_same_method_wherever_it_is(coartic, tmp_path, monkeypatch
 
 
 def test_the_pages_show_the_example_as_it_is():
-    """Method and task of the how-to pages are those that the tests run."""
     pages = [ROOT / "docs" / "howto" / name for name in ("method.md", "task.md")]
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
     shown = re.findall(r"```(?:python|toml)\n(.*?)```", text, re.DOTALL)

@@ -72,7 +72,6 @@ def test_equals_every_step_many_times(robot, largest, hand):
 
 
 def test_grazing_a_goal():
-    """Goals whose rim the hand's path only just touches, or only just misses."""
     rng = np.random.default_rng(8)
     outcomes = set()
     for _ in range(2000):
@@ -118,7 +117,6 @@ def test_the_bound_keeps_its_promise(largest):
 
 
 def test_the_bound_clears_nearly_all_it_may():
-    """Of a straight approach, and of motions that turn as much as they can."""
     for u, c in ((0.01, 0.0), (-0.01, 1e-4)):
         exact = 0.5 / u if c == 0.0 else (np.sqrt(u * u + 2 * c * 0.5) - u) / c
         assert _cleared(1.0, 0.5, u, 0.0, c) == pytest.approx(exact, rel=2e-5)
@@ -253,7 +251,7 @@ def arm_of(*links, locked_base=("x", "y"), scale=1.0, radius=0.1):
 
 LONG = {
     "239 and 317 mm": ([239, 317], ("x", "y")),
-    "ten unit links on a rail": ([1] * 10, ("y",)),
+    "four links of 3 on a rail": ([3] * 4, ("y",)),
     "15, 15, 5 and 5 cm on wheels": ([15, 15, 5, 5], ()),
 }
 
@@ -278,7 +276,7 @@ def test_a_long_arm_is_named_with_a_factor_that_helps(links, locked_base):
     assert corrective_trial(helped, "R").completed
 
 
-@pytest.mark.parametrize("links", [(3, 2, 1), (0.309, 0.333), (0.1,) * 10])
+@pytest.mark.parametrize("links", [(3, 2, 1), (0.309, 0.333), (0.25,) * 4])
 @pytest.mark.parametrize("radius", [None, 1e-3])
 def test_arms_of_others_that_are_not_too_long_are_corrected(links, radius):
     radius = radius or min(0.1, sum(links) / 20)

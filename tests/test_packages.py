@@ -9,12 +9,12 @@ import sys
 import tarfile
 import tomllib
 import zipfile
-from pathlib import Path
 
 import pytest
 
 from coartic.benchmarks.registry import built_in
 from coartic.runs.shipped import open_shipped, shipped_hashes
+from tests.support.processes import pythons
 from tests.support.suites import ROOT
 
 pytestmark = pytest.mark.skipif(
@@ -35,7 +35,6 @@ def do(*command, cwd):
 
 
 def test_shipped_results_are_of_this_code():
-    """Otherwise no runs of a built-in method can include them."""
     now = {name: info.code for name, info in built_in().items()}
     for suite in shipped_hashes():
         with open_shipped(suite) as store:
@@ -87,27 +86,16 @@ def test_wheel(libraries, tmp_path):
     works(libraries, tmp_path)
 
 
-def pythons():
-    """The Pythons that are here and that pyproject.toml allows: on the path, and those of pyenv."""
-    found = {}
-    places = [Path(place) for place in os.environ.get("PATH", "").split(os.pathsep)]
-    for place in (*places, *Path.home().glob(".pyenv/versions/*/bin")):
-        for path in place.glob("python3.[0-9]*"):
-            version = path.name.removeprefix("python3.")
-            if version.isdigit() and int(version) >= 11 and "shims" not in path.parts:
-                found.setdefault(int(version), path)
-    return [found[version] for version in sorted(found)]
-
-
+PYTHONS = [paths[-1] for minor, paths in sorted(pythons().items()) if minor >= 11]
 DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
 
 
-@pytest.mark.parametrize("python", pythons(), ids=lambda path: path.name)
+@pytest.mark.parametrize("python", PYTHONS, ids=lambda path: path.name)
 @pytest.mark.parametrize("versions", ["lowest", "newest"])
 def test_the_lowest_and_the_newest_versions(built, tmp_path, python, versions):
     """Of what the package depends on directly. The lowest ones are tried on the oldest Python: of
     some there is no file for newer ones."""
-    if versions == "lowest" and python != pythons()[0]:
+    if versions == "lowest" and python != PYTHONS[0]:
         pytest.skip("the lowest versions have files for the oldest Python alone")
     _, wheel = built
     lowest = [text.replace(">=", "==") for text in DEPENDENCIES]
@@ -141,7 +129,6 @@ def test_source_distribution(built, libraries, tmp_path):
 
 
 def test_what_is_in_them(built):
-    """Of the packages all that git has, their data among it, and nothing else."""
     sdist, wheel = built
     with zipfile.ZipFile(wheel) as file:
         names = {name for name in file.namelist() if ".dist-info/" not in name}

@@ -135,7 +135,6 @@ def test_a_place_that_cannot_be_used_gets_a_sentence(said, place):
 
 
 def test_a_connection_that_fails_gets_a_sentence(tmp_path, monkeypatch):
-    """At every door of a store, whatever the reason."""
     folder = run_and_write(
         tmp_path / "good", paper_cells(tasks=["ascending"]), runs=1, trials=5
     ).folder

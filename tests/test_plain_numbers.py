@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from tests import plain_numbers
+from tests.support.processes import ROOT
 
-ROOT = Path(__file__).parents[1]
 STORED = ROOT / "docs" / "stored" / "comparison"
 
 

@@ -4,14 +4,12 @@ import inspect
 from pathlib import Path
 
 import pytest
-from typer.main import get_command
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
 from coartic.benchmarks.planning import Request, plan_suite
 from coartic.benchmarks.runner import run_suite
-from coartic.cli import app
 from tests.support.suites import ROOT, InProcess, suite_of
 
 MINE = Path(template.__file__).read_text(encoding="utf-8")
@@ -100,9 +98,8 @@ OPTIONS = {
 
 
 @pytest.mark.usefixtures("here", "in_this_process")
-def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, monkeypatch):
-    """And each option is tried."""
-    known = get_command(app).commands["run"].params
+def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, commands, monkeypatch):
+    known = commands.commands["run"].params
     assert {parameter.name for parameter in known} == {*OPTIONS, "help"} - {"help"}
     base = {"suite": ("paper",), "folder": ("--out", "out"), "tasks": ("--tasks", "ascending")}
     base |= {"methods": ("--methods", "EC1"), "runs": ("--runs", "2"), "trials": ("--trials", "20")}
@@ -138,8 +135,6 @@ def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, monkey
 
 @pytest.mark.usefixtures("here")
 def test_a_method_file_that_is_named_runs():
-    """All its methods, with what was asked for, unless some of them are named."""
-
     def methods(suite="paper", **selection):
         plan = plan_suite(
             suite, **{"tasks": ["ascending"], "method_files": ["mine.py"]} | selection

@@ -93,7 +93,6 @@ TRIALS = """(task, cases) => {
 
 @pytest.mark.parametrize("name", [*TASKS, "uneven", "metres", "millimetre"])
 def test_random_trials_are_those_of_the_package(name):
-    """13 tasks, 250 trials each: 3250."""
     task = uneven_task() if name == "uneven" else OWN.get(name) or load_task(name)
     rng = np.random.default_rng(5)
     halves = [sample(task, 125, noise, seed=7) for noise in (0.05, 0.5)]
@@ -187,7 +186,6 @@ RUNS = [
 
 
 def test_the_same_seed_learns_the_same_trial_by_trial():
-    """Runs of 1500 trials, draws included, with and without drift."""
     trials = 1500
     tasks = [OWN.get(name) or load_task(name) for name, *_ in RUNS]
     cases = [

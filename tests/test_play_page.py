@@ -31,6 +31,21 @@ def address(tmp_path_factory):
 
 
 @pytest.fixture
+def opened_task(visited, tmp_path):
+    """Opens the page of a task, with so many trials and other changes of its code."""
+
+    def open_page(task=None, trials=10_000, changes=()):
+        html = pages.play_page(*[task] if task else [])
+        for old, new in (("TRIALS = 10000;", f"TRIALS = {trials};"), *changes):
+            html = html.replace(old, new)
+        file = tmp_path / "play.html"
+        file.write_text(html, encoding="utf-8")
+        return settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
+
+    return open_page
+
+
+@pytest.fixture
 def opened(visited, address):
     """Opens the page in a state."""
 
@@ -53,6 +68,10 @@ def ticks(page, who):
     """What the page says that somebody needs."""
     (found,) = re.findall(rf"{who} (\d+) ticks", text(page, "score"))
     return int(found)
+
+
+def press(page, name):
+    page.get_by_role("button", name=name).click()
 
 
 def settled(page):
@@ -96,20 +115,24 @@ def test_it_is_one_small_file_without_addresses():
         assert f'"presets":[{{"label":"{label}"' in own.replace("\\u2020", "†")
 
 
-def median_run(runs):
-    return sorted(runs, key=lambda run: run.reward)[len(runs) // 2]
+def median_of(runs):
+    """Reward of the run that the page shows."""
+    return sorted(run.reward for run in runs)[len(runs) // 2]
 
 
-def test_coarticulation_appears_with_practice(visited, tmp_path):
-    file = tmp_path / "play.html"
-    file.write_text(pages.play_page(), encoding="utf-8")
-    page = settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
+def learned(task, condition, trials=TRIALS):
+    """Ticks that the learner needs, as the page should say."""
+    return -median_of([learn(task, condition, seed=seed, trials=trials) for seed in range(5)])
+
+
+def test_coarticulation_appears_with_practice(opened_task):
+    page = opened_task()
     trials = trials_made(page)
     assert trials == 10_000  # on every machine
     postures = []  # at the goal that they share
     for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
         runs = [learn(name, "EC1", seed=seed, trials=trials) for seed in range(5)]
-        assert ticks(page, role) == -median_run(runs).reward
+        assert ticks(page, role) == -median_of(runs)
         postures.append(np.array([run.execute().configurations[0] for run in runs]))
     learned = standardised_posture_difference(*postures)
     assert learned > 2
@@ -127,22 +150,19 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
 
 
 @pytest.mark.parametrize("rule", ["best-single-hand", "best-of-all", "RLLR"])
-def test_a_task_from_a_file_begins_with_the_hands_of_the_package(visited, tmp_path, rule):
-    """Trial 0, the learner, and the corrective process with its best hands, by each rule."""
+def test_a_task_from_a_file_begins_with_the_hands_of_the_package(opened_task, tmp_path, rule):
     file = tmp_path / "shelf.toml"
     goals = [(2.1, 3.6), (4.4, 3.6), (5.2, 0.55), (7.0, 3.6)]
     Task(name="shelf", goals=goals, initial_hands=rule).save(file)
-    task, page_file = load_task(file), tmp_path / "play.html"
+    task = load_task(file)
     trials = 1000  # after which it is not as fast as the corrective process by chance
-    html = pages.play_page(task).replace("TRIALS = 10000;", f"TRIALS = {trials};")
-    page_file.write_text(html, encoding="utf-8")
-    page = settled(visited(f"{page_file.as_uri()}#open=1", reduced_motion="reduce"))
-    runs = [learn(task, "EC4", seed=seed, trials=trials) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    page = opened_task(task, trials)
+    spent = learned(task, "EC4", trials)
+    assert ticks(page, "The learner") == spent
     best = max(hand_sequences(task), key=lambda hands: corrective_trial(task, hands).reward)
     alone = corrective_trial(task, best).reward
     assert ticks(page, "Corrective process alone") == -alone
-    fewer = median_run(runs).reward - alone
+    fewer = -spent - alone
     words = (
         f"{abs(fewer)} ticks {'fewer' if fewer > 0 else 'more'} than the corrective process alone"
     )
@@ -160,14 +180,10 @@ RING = """(canvas, { x, y, width, height }) => {  // radius of the circle, by it
 
 
 @pytest.mark.parametrize("radius", [0.01, 0.03])
-def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(visited, tmp_path, radius):
-    task, page_file = metres_task(radius), tmp_path / "play.html"
-    html = pages.play_page(task).replace("TRIALS = 10000;", "TRIALS = 100;")
-    html = html.replace("const figure = new", "const figure = window.player = new")
-    page_file.write_text(html, encoding="utf-8")
-    page = settled(visited(f"{page_file.as_uri()}#open=1", reduced_motion="reduce"))
-    runs = [learn(task, "EC1", seed=seed, trials=100) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(opened_task, radius):
+    task = metres_task(radius)
+    page = opened_task(task, 100, [("figure = new", "figure = window.player = new")])
+    assert ticks(page, "The learner") == learned(task, "EC1", 100)
     assert ticks(page, "Corrective process alone") == -corrective_trial(task, "RRR").reward
     width, height = (page.evaluate(f"player.problems[0].robot.base_size[{k}]") for k in (0, 1))
     assert (width / 0.33, width / height) == (pytest.approx(1 / 4), pytest.approx(5))
@@ -184,7 +200,7 @@ def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(visited, tm
         task.radius * metre, abs=1
     )
     before = page.evaluate("player.state.goals.length")
-    page.get_by_role("button", name="Add a goal").click()
+    press(page, "Add a goal")
     after = page.evaluate("player.state.goals")
     assert len(after) == before + 1
     assert all(abs(x) < 0.6 and abs(y) < 0.6 for x, y in after)
@@ -203,8 +219,7 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     page.get_by_role("radio", name="learner").check()
     settled(page)
     assert trials_made(page) == TRIALS
-    runs = [learn(task, "EC1", seed=seed, trials=TRIALS) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    assert ticks(page, "The learner") == learned(task, "EC1")
     # By the pointer, too, and out of reach it says so.
     box = handle.bounding_box()
     page.mouse.move(box["x"] + 22, box["y"] + 22)
@@ -216,7 +231,7 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
 
 def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_not(opened):
     page = settled(opened("preset=1&others="))
-    page.get_by_role("button", name="Move goal 3 now").click()
+    press(page, "Move goal 3 now")
     settled(page)
     task = changed("ascending", goals=[[6.0, 0.1], [6.0, 2.0], [5.0, 4.0]])
     practised = learn("ascending", "EC1", seed=0, trials=TRIALS).solution
@@ -257,7 +272,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     assert done.hands == "LLLR"
     assert ticks(page, "You") == done.ticks
     with page.expect_download() as download:
-        page.get_by_role("button", name="Save your trials").click()
+        press(page, "Save your trials")
     trials = pd.read_csv(download.value.path())
     assert trials.trial.max() == 3  # a drag, a hand, a key; the other key moves nothing
     task = load_task("two-armed-1")
@@ -273,7 +288,7 @@ def test_a_proven_optimum_is_shown_until_the_task_is_changed(opened):
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowUp")
     assert "Optimum" not in text(settled(page), "score")
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert ticks(settled(page), r"Optimum \(proven\)") == 292
     page.get_by_label("Task").select_option("3")  # two-armed 1, not proven
     assert "Optimum" not in text(settled(page), "score")
@@ -294,9 +309,8 @@ def test_the_link_holds_the_whole_state(opened, address):
     assert f"trials={trials_made(settled(page))}&" in page.url
     comes_back(page)
     assert trials_made(changed_to(page, address, "trials=200")) == 200
-    runs = [learn("two-armed-1", "EC3", seed=seed, trials=TRIALS) for seed in range(5)]
     changed_to(page, address, "preset=3&explores=EC3")
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    assert ticks(page, "The learner") == learned("two-armed-1", "EC3")
     # Entries that are no state are left out, and goals and joints far out lie nearer.
     for name in ("constructor", "toString", "__proto__"):
         changed_to(page, address, f"preset=3&who={name}&mate={name}&explores={name}&{name}=1")
@@ -327,8 +341,7 @@ def test_the_learner_is_that_of_the_python_that_the_page_shows(opened, state, fi
     page = settled(opened(state))
     condition = shown_condition(page)
     assert {name: getattr(condition, name) for name in fields} == fields
-    runs = [learn("two-armed-1", condition, seed=seed, trials=TRIALS) for seed in range(5)]
-    assert ticks(page, "The learner") == -median_run(runs).reward
+    assert ticks(page, "The learner") == learned("two-armed-1", condition)
 
 
 def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
@@ -354,7 +367,7 @@ def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
         assert shown_condition(page) == CONDITIONS["EC1"]
         assert ticks(page, "The learner") == by_drift[0]
     changed_to(page, address, "preset=2&others=&drift=1")
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert dial.input_value() == "0"
 
 
@@ -373,7 +386,7 @@ def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back
     comes_back(page)
     page.get_by_role("radio", name="planner").check()
     assert ticks(settled(page), "Orange") == second
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert settled(page).url == state.replace("&tick=200", "")
 
 
@@ -382,7 +395,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     task = page.get_by_label("Task").locator("option:checked")
     for _ in range(3):
         assert text(page, "why") == ""
-        page.get_by_role("button", name="Add a goal").click()
+        press(page, "Add a goal")
     assert text(page, "why") == "Goals can be added while there are fewer than 6."
     labels = page.locator(".handle").evaluate_all("all => all.map(each => each.ariaLabel)")
     places = [re.search(r"at (\S+), (\S+)\. ", label).groups() for label in labels]
@@ -394,16 +407,16 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     assert task.inner_text() == "Up or down (changed)"
     page.get_by_role("slider", name="Tick").fill("400")
     for _ in range(5):
-        page.get_by_role("button", name="Remove a goal").click()
+        press(page, "Remove a goal")
     shown, last = map(int, re.findall(r"\d+", text(page, "count")))
     assert shown == last
     assert "the robot hits goal 1." in text(page, "lead")
     assert text(page, "why") == "The only goal stays; it has no next goal."
-    page.get_by_role("button", name="Reset").click()
+    press(page, "Reset")
     assert task.inner_text() == "Up or down"
     assert "both robots" in text(page, "lead")
     # A link to this file is of use with the file.
-    page.get_by_role("button", name="Copy link").click()
+    press(page, "Copy link")
     page.get_by_text("this machine only").get_by_text("send play.html").wait_for()
 
 
@@ -461,7 +474,7 @@ def test_it_practises_plays_and_saves_pictures(opened):
     page = opened(reduced_motion="no-preference")
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
-    page.get_by_role("button", name="Pause").click()
+    press(page, "Pause")
     page.get_by_role("slider", name="Tick").fill("100")
     page.get_by_role("slider", name="Tick").press("ArrowRight")
     page.get_by_text("102 of").wait_for()
@@ -469,7 +482,7 @@ def test_it_practises_plays_and_saves_pictures(opened):
         "stage => [stage.clientWidth, stage.clientHeight]"
     )
     with page.expect_download() as download:
-        page.get_by_role("button", name="Save PNG").click()
+        press(page, "Save PNG")
     png = download.value.path().read_bytes()
     assert png.startswith(b"\x89PNG")
     width, height = struct.unpack(">II", png[16:24])
@@ -506,10 +519,8 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme, s
     assert accessibility.violations_count == 0, accessibility.generate_report()
 
 
-def test_without_scripts_there_is_a_picture(browser, address):
-    context = browser.new_context(java_script_enabled=False)
-    page = context.new_page()
+def test_without_scripts_there_is_a_picture(page_without_scripts, address):
+    page = page_without_scripts
     page.goto(address)
     assert page.locator(".still svg").is_visible()
     assert not page.locator(".stage").is_visible()
-    context.close()

@@ -245,7 +245,6 @@ def test_words_of_an_earlier_run_are_not_those_of_a_crash(tmp_path):
 @pytest.mark.filterwarnings("ignore:.* gives the same result")  # with any seed
 @pytest.mark.parametrize("whom", ["worker", "server"])
 def test_what_somebody_kills_is_repeated(tmp_path, whom):
-    """A process at work, or the server that forks them."""
     body = """try:
             open(__file__ + ".first", "x").close()
         except FileExistsError:  # all others wait until somebody is killed
@@ -274,7 +273,6 @@ def test_what_somebody_kills_is_repeated(tmp_path, whom):
 
 @pytest.mark.parametrize("why", ["removed", "full"])
 def test_without_a_place_for_answers_the_suite_ends(tmp_path, monkeypatch, why):
-    """And nothing is kept: no method has crashed. Repeated, the suite goes on."""
     end = {"removed": "shutil.rmtree(os.path.dirname(os.path.dirname(os.getcwd())))",
            "full": "os._exit(1)"}  # fmt: skip
     body = f"""if self.name == "test/does" and not os.path.exists(__file__ + ".over"):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from coartic.baselines.posture_based import OneGoal, PosturePlanner, TwoGoals
 from coartic.method import MethodError, Session
-from tests.support.strategies import least_cost, solve, tiny_task, uneven_task
+from tests.support.strategies import least_cost, solve, steps_from, tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
 STEP = 0.01  # m
@@ -51,7 +51,6 @@ def test_a_dense_store_gives_the_nearest_posture(task, hand):
 
 @pytest.mark.parametrize("free", [["right"], ["left", "right"]])
 def test_two_goals_give_the_shortest_way_through_both(free):
-    """With one hand, and with the best of all pairs."""
     task = bent(goals=[[5.0, 1.0], [4.0, 2.5]], hands=free)
     result, *_ = solve(TwoGoals, task, rounds=100)
     # The second posture is planned anew from where the first movement ends.
@@ -108,7 +107,7 @@ def test_the_most_promising_pair_is_the_cheapest_of_all():
              for first, second in itertools.product(*layers)]  # fmt: skip
 
     def cost(pair):
-        return np.linalg.norm(np.diff(np.vstack([task.q0, pair]), axis=0), axis=1).sum()
+        return np.linalg.norm(steps_from(task.q0, pair), axis=1).sum()
 
     found = planner.most_promising(("right", "left"), layers)
     assert cost(found) == pytest.approx(min(map(cost, every)))

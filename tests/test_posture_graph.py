@@ -13,7 +13,7 @@ from coartic.baselines.posture_graph import (
     sample_layers,
 )
 from coartic.method import MethodError, Session
-from tests.support.strategies import changed
+from tests.support.strategies import changed, steps_from
 
 
 def cheapest(task, layers, hands):
@@ -32,8 +32,7 @@ def cheapest(task, layers, hands):
 
 
 def length_of(task, configurations):
-    steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
-    return np.linalg.norm(steps, axis=1).sum()
+    return np.linalg.norm(steps_from(task.q0, configurations), axis=1).sum()
 
 
 @pytest.mark.parametrize("name", ["two-armed-2", "two-armed-1", "ascending"])
@@ -43,7 +42,7 @@ def test_chains_are_the_cheapest(name):
     chains = dict(chains_of(task, layers))
     assert len(chains) == len(task.hands) ** len(task.goals)
     for hands, configurations in chains.items():
-        steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
+        steps = steps_from(task.q0, configurations)
         assert length_of(task, configurations) == pytest.approx(cheapest(task, layers, hands))
         for goal, hand in enumerate(hands):
             (other,) = {"left", "right"} - {hand}

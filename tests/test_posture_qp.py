@@ -11,7 +11,7 @@ from coartic.baselines.controllers import Aim
 from coartic.baselines.posture_qp import FACES, METHODS, CurrentGoal, GoalsAhead, PostureController
 from coartic.method import MethodError, Session, outline_of
 from coartic.robot import directions
-from tests.support.strategies import TIED, least_cost, solve, tiny_task
+from tests.support.strategies import TIED, least_cost, solve, steps_from, tiny_task
 
 ROBOT = Robot()
 ANGLES = 2 * np.pi * np.arange(FACES) / FACES
@@ -43,7 +43,6 @@ def stated(rows, least, preferred):
 
 @pytest.mark.parametrize(("far", "preferred", "bind"), [(0.5, 0.3, False), (4.0, 1.0, True)])
 def test_both_levels_of_a_disc_are_as_another_solver_has_them(far, preferred, bind):
-    """With and without active limits."""
     moved = bound = 0
     for rows, least, wanted in problems(20, 4, far, preferred):
         short, nearest = stated(rows, least, wanted)
@@ -66,14 +65,13 @@ def test_a_failed_solve_is_an_outcome():
 
 
 def test_subgoals_of_lower_priority_coarticulate():
-    """Steps within m, locks kept, every goal hit without correction."""
     task = load_task("ascending")
     assert [solve(method, task)[1].reward for method in METHODS] == [-318, -293]
     task = load_task("two-armed-1")
     result, execution, session = solve(CurrentGoal, task, period=20)
     assert execution.corrections == 0
     for q, movement in zip([task.q0, *execution.configurations], result.solution, strict=False):
-        steps = np.diff(np.vstack([q, movement.waypoints]), axis=0)
+        steps = steps_from(q, movement.waypoints)
         assert np.linalg.norm(steps, axis=1).max() <= 20 * PAPER.step * (1 + 1e-9)
         assert (movement.waypoints[:, 1] == task.q0[1]).all()
     assert min(session.meter.jacobians, session.meter.solver_iterations) > 0
@@ -134,7 +132,7 @@ def test_postures_make_the_way_through_all_discs_shortest(name):
     task = load_task(name)
     aims = tuple(Aim("right", goal) for goal in range(len(task.goals)))
     postures = controller(task).find_postures(task.q0, aims, {})
-    steps = np.diff(np.vstack([task.q0, *postures]), axis=0)
+    steps = steps_from(task.q0, postures)
     hands, every = ["right"] * len(aims), np.ones(steps.shape, bool)
     shortest = least_cost(task, hands, every, [steps.ravel()], radius=task.radius)
     assert all(miss(q, task, "right", goal) <= task.radius for goal, q in enumerate(postures))

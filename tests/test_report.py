@@ -11,7 +11,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, Task, load_task
+from coartic import CoarticError, load_task
 from coartic.analysis.report import about, render
 from coartic.analysis.report.about import attempt, limits
 from coartic.analysis.report.build import stamp, write_report
@@ -19,7 +19,7 @@ from coartic.analysis.report.player import methods_played, player
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.study import Study
 from tests.support.made_up import runs_of, study_of
-from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write, suite_of
+from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write
 
 
 @pytest.fixture(scope="module")
@@ -27,20 +27,14 @@ def tables_by_name(traced):
     return {name: table(traced) for name, table in TABLES.items()}
 
 
-def test_every_row_names_runs_of_the_folder(traced, tables_by_name):
-    runs_of_the_folder = set(traced.runs.run_id)
+def test_every_row_names_runs_of_the_folder_from_which_its_numbers_are(traced, tables_by_name):
+    rewards = traced.runs.set_index("run_id").reward.astype(float)
     for name, table in tables_by_name.items():
         assert table.index.is_unique, name
         for row, run_ids in table.run_ids.items():
-            assert set(run_ids.split()) <= runs_of_the_folder, (name, row)
+            assert set(run_ids.split()) <= {*rewards.index}, (name, row)
     assert sum(len(table) > 0 for table in tables_by_name.values()) >= 8
-
-
-def test_numbers_are_made_again_from_the_runs(traced, tables_by_name):
-    rewards = traced.runs.set_index("run_id").reward.astype(float)
-    table = tables_by_name["methods"]
-    assert len(table) > 5
-    for row, values in table.iterrows():
+    for row, values in tables_by_name["methods"].iterrows():
         of_row = rewards[values.run_ids.split()].dropna()
         assert values.reward == pytest.approx(of_row.mean(), abs=1e-9), row
         assert values.reward_sd == pytest.approx(of_row.std(), abs=1e-9, nan_ok=True), row
@@ -71,7 +65,8 @@ def test_the_folder_below_is_named_where_there_are_no_results(traced, coartic):
     assert (code, f"did you mean {traced.folder}?" in error) == (2, True), error
 
 
-def test_the_commonest_reasons_are_said(traced):
+def test_the_commonest_reasons_and_few_runs_are_said(traced):
+    """Fewer than the paper's twenty."""
     reasons = ["rare", *["often"] * 4, *["twice"] * 2, *["thrice"] * 3]
     runs = traced.runs.reset_index(drop=True)
     runs.loc[: len(reasons) - 1, "status"] = "crashed"
@@ -79,12 +74,9 @@ def test_the_commonest_reasons_are_said(traced):
     reported = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
     said = ["4 × often", "3 × thrice", "2 × twice", "1 for other reasons"]
     assert (reported["failed"], reported["reasons"]) == (10, said)
-
-
-@pytest.mark.parametrize(("count", "few"), [(19, 19), (20, 0)])
-def test_fewer_runs_than_the_papers_twenty_are_few(count, few):
-    runs = runs_of("ascending", "dual-process/EC1", [-300] * count, commit="c0de")
-    assert limits(study_of(runs))["few"] == few
+    for count, few in ((19, 19), (20, 0)):
+        runs = runs_of("ascending", "dual-process/EC1", [-300] * count, commit="c0de")
+        assert limits(study_of(runs))["few"] == few
 
 
 def test_p_is_small_below_a_thousandth():
@@ -119,7 +111,6 @@ def test_what_pdflatex_cannot_print_is_for_xelatex(traced):
 
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-x", "@SUM(1)"])
 def test_no_text_is_a_formula_of_a_spreadsheet(text):
-    """Numbers stay numbers."""
     frame = pd.DataFrame(
         {"method": [text, "a=b"], "reward": [-1.5, -2], "run_ids": ["", "x"]},
         index=pd.Index([f"{text} row", "other"], name="row"),
@@ -139,7 +130,6 @@ def test_a_report_is_not_written_through_a_link(traced, tmp_path):
 
 
 def test_a_page_stands_alone(report):
-    """Every id is there once, every reference has its id, and ink is the page's."""
     text = (report / "report.html").read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!#|data:,|https://doi\.org|tables/|figures/)', text)
     ids = re.findall(r'\bid="([^"]+)"', text)
@@ -217,22 +207,7 @@ def test_tables_compile(tables_by_name, tmp_path):
     assert done.returncode == 0, done.stdout[-2000:]
 
 
-def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):
-    """Two tasks, each with goal 2 in two places: six pairs that share goal 1; a task that is the
-    beginning of another one shares no context with it."""
-    moved = 'tasks = ["ascending", "descending"]\nmethods = ["dual-process/EC1"]\n[blocks.move]\n'
-    cells = suite_of(tmp_path, moved + "goal = 2\nby = [[0.0, 0.0], [0.0, 0.5]]")
-    alone = Task(name="alone", goals=cells[0].task.goals[:1], hands=["right"])
-    cells.append(cell_on(alone, cells[0].method))
-    seen = run_and_write(tmp_path / "moved", cells=cells, runs=2, trials=30)
-    contexts = TABLES["contexts"](seen)
-    assert contexts.index.is_unique
-    assert len(contexts) == 6
-    write_report(seen, tmp_path / "report", for_paper=False)
-
-
 def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
-    """The page names it in its place, the command names it and exits with 1."""
     cells = cells_of("paper", tasks=["ascending"], methods=["EC1"])
     run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
 

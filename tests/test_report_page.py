@@ -188,11 +188,9 @@ OVERFLOWS = """[...document.querySelectorAll("main *")].filter(each => each.chec
     .map(each => each.outerHTML.slice(0, 80))"""
 
 
-def test_without_scripts_all_is_there(browser, address):
-    context = browser.new_context(java_script_enabled=False)
-    page = context.new_page()
+def test_without_scripts_all_is_there(page_without_scripts, address):
+    page = page_without_scripts
     page.goto(address)
     assert page.locator(".still svg").is_visible()
     assert page.locator("#table-methods tbody tr").count() > 8
     assert not page.locator("#methods-search").is_visible()
-    context.close()

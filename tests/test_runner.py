@@ -29,7 +29,7 @@ from coartic.method import Meter
 from coartic.motion.batch import SLOTS
 from coartic.runs.plan import Job, run_seed
 from coartic.runs.record import Outcome, Times, movement_from, too_long
-from tests.support.strategies import tiny_task
+from tests.support.strategies import STUCK, tiny_task
 from tests.support.suites import (
     BROKEN,
     KNOWN,
@@ -54,19 +54,7 @@ class Nobody(InProcess):
 
 
 LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
-
-
 ALONE = cell_on(load_task("ascending"), KNOWN["corrective-alone/given"])
-
-
-def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
-    tables = []
-    for number, executor in enumerate((InProcess(), Nobody())):
-        options = {"runs": SLOTS + 2, "trials": 3, "executor": executor}
-        tables.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
-    assert (tables[0].status == "ok").all()
-    assert tables[0].result.tolist() == tables[1].result.tolist()
-    assert [set(runs.together) for runs in tables] == [{1, 2, SLOTS}, {1}]
 
 
 class Forges(InProcess):
@@ -81,16 +69,19 @@ class Forges(InProcess):
             yield job, outcomes
 
 
-def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):
-    """Of runs side by side each is executed by itself; those alone are performed again."""
-    forged, honest = (
-        run_and_write(tmp_path / each.__name__, [LEARNER], runs=SLOTS, trials=3, executor=each())
-        for each in (Forges, InProcess)
+def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
+    """Where processes end all runs are, and what is no solution is that of one run alone."""
+    options = {"runs": SLOTS + 2, "trials": 3}
+    honest, lost, forged = (
+        run_and_write(tmp_path / each.__name__, [LEARNER, ALONE], executor=each(), **options).runs
+        for each in (InProcess, Nobody, Forges)
     )
-    assert forged.runs.result.tolist() == honest.runs.result.tolist()
-    assert (forged.runs.status == "ok").all()
-    again = forged.runs.together == 1
-    assert again[again].index.tolist() == [5, 7]
+    assert (honest.status == "ok").all()
+    assert (forged.status == "ok").all()
+    assert honest.result.tolist() == lost.result.tolist() == forged.result.tolist()
+    assert [set(runs.together) for runs in (honest, lost)] == [{1, 2, SLOTS}, {1}]
+    again = forged.together == 1
+    assert again[again].index.tolist() == [5, 7, len(forged) - 1]  # the last is the planner's
 
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
@@ -129,7 +120,6 @@ def test_long_runs_begin_first(tmp_path):
 
 @pytest.mark.process
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
-    """In this process and in two others: the same but for the timings."""
     same_results(run_and_write(tmp_path, executor=Local(2)), results)
 
 
@@ -168,12 +158,6 @@ def test_run_ids_name_what_the_run_depends_on():
     assert len({base, *others}) == 8
 
 
-STUCK = tiny_task(
-    name="stuck", locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]], initial_hands="R"
-)
-"""The corrective process cannot leave where it starts."""
-
-
 def test_failures_are_kept_as_data(tmp_path):
     policy = STUCK.model_copy(update={"name": "policy", "initial_hands": "best-of-all"})
     learner = KNOWN["dual-process/EC1"]
@@ -189,7 +173,6 @@ def test_failures_are_kept_as_data(tmp_path):
 
 
 def test_learner_columns_are_the_learners(tmp_path):
-    """A method's details never pass for columns that mean something else."""
     methods = registry([BROKEN])
     cell = cell_on(load_task("ascending"), methods["test/pretender"])
     study = run_and_write(tmp_path, [cell], runs=1)
@@ -269,7 +252,6 @@ def test_the_runs_of_a_batch_share_its_time():
 
 
 def test_a_solution_that_misses_a_goal_is_infeasible():
-    """Whatever the method says."""
     job = Job(cell_on(STUCK, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.outcome.status, run.scores) == ("infeasible", {})
@@ -283,8 +265,8 @@ def test_ten_thousand_movements_are_not_too_many():
 
 def test_robots_of_different_size_share_a_table(tmp_path):
     small = tiny_task(
-        name="small", robot={"left_links": [2.0], "right_links": [1.0] * 8},
-        start={"left": [0.1], "right": [0.1] * 8}, goals=[[3.0, 1.0]], initial_hands="R",
+        name="small", robot={"left_links": [2.0], "right_links": [2.0] * 2},
+        start={"left": [0.1], "right": [0.1] * 2}, goals=[[3.0, 1.0]], initial_hands="R",
     )  # fmt: skip
     cells = [cell_on(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
     study = run_and_write(tmp_path, cells, trials=20)

@@ -158,7 +158,6 @@ def test_of_planners_the_best_alone_has_a_curve(study):
 
 
 def test_tasks_of_one_title_have_their_names_besides():
-    """In tables and figures; a changed task has its change besides."""
     up, same = (load_task("ascending").model_copy(update=changes) for changes in
                 ({}, {"name": "copied", "radius": 0.2}))  # fmt: skip
     changed = up.model_copy(update={"name": "ascending.radius-0.3", "radius": 0.3})

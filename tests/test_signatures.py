@@ -68,7 +68,6 @@ def test_the_smallest_p_is_that_of_the_clearest_case():
 
 
 def test_more_than_another_by_brute_force():
-    """Every division of five runs and of four in two contexts, counted one by one."""
     draw = rng(6)
     method = draw.standard_normal((3, 2)), draw.standard_normal((2, 2)) + 2.0
     other = draw.standard_normal((2, 2)), draw.standard_normal((2, 2)) + 0.5
@@ -104,7 +103,6 @@ def test_drawn_tests_count_what_was_seen():
 
 
 def test_posture_difference_below_a_bound_by_brute_force():
-    """Every bootstrap sample of three runs and of two, counted one by one."""
     first, second = rng(12).standard_normal((3, 2)), rng(13).standard_normal((2, 2)) + 1.5
     reached = [
         distance_of_means(a, b) >= 2.0 * math.sqrt((((a - a.mean(0)) ** 2).sum()
@@ -135,7 +133,6 @@ def test_pairs_of_contexts():
 
 
 def test_permutations_by_brute_force():
-    """Every division of seven runs, counted one by one."""
     draw = rng(11)
     first, second = draw.standard_normal((3, 2)), draw.standard_normal((4, 2)) + 0.8
     pool = np.concatenate([first, second])
@@ -244,7 +241,6 @@ def test_signs_are_one_number_a_run():
 
 
 def test_choice_in_isolation():
-    """Each hand beside its goal: the near one is the isolated choice."""
     start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
     task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
     some = tuple(corrective_trial(task, hands) for hands in ("RL", "LR", "RR"))
@@ -407,7 +403,9 @@ def test_p_of_shared_goals_is_corrected_by_method():
         for label, count in ((EC1, 3), (RANDOM_SEARCH, 2))
         for place, task in enumerate(tasks[:count])
     ]
-    table = TABLES["contexts"](study_of_solutions(cells)).set_index("method")
+    table = TABLES["contexts"](study_of_solutions(cells))
+    assert table.index.is_unique
+    table = table.set_index("method")
     assert table.p_holm[EC1].tolist() == pytest.approx([6 * 2 / 70] * 6)
     assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 70] * 2)
 

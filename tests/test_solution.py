@@ -22,7 +22,6 @@ from tests.support.strategies import make_trials, posture, tiny_task
 
 
 def test_no_way_is_followed_without_end():
-    """Nobody waits for a hand that is sent to the end of the world and back."""
     far = 0.9 * MOST_STEPS * PAPER.step
     task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
     out, back = planned(posture(far), posture(far)), planned(posture(far), posture(0.0))
@@ -73,7 +72,6 @@ def test_solutions_that_break_the_rules(movements, words):
 
 
 def test_a_base_that_a_solver_moves_a_little_is_held():
-    """In movements, on paths and in trials; elsewhere a target stays as it is."""
     task = load_task("two-armed-1")
     due = corrective_trial(task, "LRLR")
     exact = due.configurations
@@ -114,7 +112,6 @@ def test_a_goal_is_hit_by_one_hand():
 @pytest.mark.parametrize("field", ["goal", "hand", "kind"])
 @pytest.mark.parametrize("value", [np.zeros(10), None, [1], {}])
 def test_what_is_no_field_of_a_movement_is_named(field, value):
-    """Such as a posture in the place of the kind."""
     movements = corrective_trial("ascending", "RRR").movements
     with pytest.raises(CoarticError, match=f"{field} of a movement is .*; it must be a "):
         execute("ascending", [replace(movements[0], **{field: value}), *movements[1:]])

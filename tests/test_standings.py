@@ -23,7 +23,6 @@ from tests.support.made_up import study_of_rewards as study
 
 
 def test_which_tasks_are_ranked_does_not_depend_on_the_corrective_process():
-    """One that it cannot do, and one on which nothing is better, have gaps, and no targets."""
     behind = Task(name="behind", goals=[(-2.0, 0.1), (2.0, 2.0)], locked_base=("x", "y"),
                   hands=["right"])  # fmt: skip
     tasks = [load_task("ascending"), behind]
@@ -79,7 +78,6 @@ def test_a_method_that_makes_one_trial_does_not_use_its_reward():
 
 
 def test_crossings_by_brute_force():
-    """Budgets read off every run and target, one by one."""
     rng = np.random.default_rng(5)
     spends = [rng.lognormal(3, 1, (runs, 20)).round() for runs in (6, 9)]
     spends[1][rng.random(spends[1].shape) < 0.3] = math.inf
@@ -186,7 +184,6 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
 
 
 def test_the_ranking_figure_has_every_name_gap_and_interval():
-    """Also of methods at the optimum and far away."""
     rewards = {"best": -292, "far": -3000, "dual-process/EC1": -305}
     runs = {("ascending", name): [reward] for name, reward in rewards.items()}
     seen = study(runs | {("ascending", "spread"): [-294, -296, -299, -301]})
@@ -220,7 +217,6 @@ ON_ONE = {("ascending", "mine"): [-300, -301, -302]}
 
 
 def test_what_a_method_did_not_run_on_leaves_it_its_gap_there():
-    """And in running times what it ran on."""
     seen = study(LEARNER | CMA | ON_ONE)
     ranked = TABLES["ranking"](seen)
     assert ranked.index.tolist()[:2] == ["mine", "cma-es/bandit"]

@@ -27,7 +27,7 @@ from coartic.benchmarks.worker import fail
 from coartic.runs import store as store_module
 from coartic.runs.record import Score
 from coartic.runs.store import FORMAT, RUNS_FILE, Store, explain_errors, open_store, writing
-from tests.support.strategies import tiny_task
+from tests.support.strategies import failing_task, tiny_task
 from tests.support.suites import (
     KNOWN,
     Failing,
@@ -41,13 +41,9 @@ from tests.support.suites import (
     same_results,
 )
 
-STUCK = tiny_task(
-    name="stuck", locked_base=["x", "y"], goals=[[1.5, 0.1]], initial_hands="R",
-    start={"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]},
-)  # fmt: skip
 NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
 CELLS = [
-    cell_on(STUCK, KNOWN["dual-process/EC4"], epsilon=0.5),
+    cell_on(failing_task(), KNOWN["dual-process/EC4"], epsilon=0.5),
     cell_on(NEAR, KNOWN["posture-qp/current-goal"]),
 ]
 ONE = paper_cells(tasks=["ascending"])
@@ -71,6 +67,12 @@ def written(tmp_path_factory):
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     return run_and_write(tmp_path_factory.mktemp("undisturbed"), ONE, **FEW)
+
+
+@pytest.fixture
+def copied(undisturbed, tmp_path):
+    """The file of a copy of these runs, to be changed."""
+    return shutil.copy(undisturbed.folder / RUNS_FILE, tmp_path / RUNS_FILE)
 
 
 def plain(run):
@@ -402,12 +404,11 @@ def behind_a_link(path):
         (restored, "was restored from a dump.*copy the file itself"),
     ],
 )
-def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, words):
+def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words):
     def content():
         return {path: path.is_file() and path.read_bytes() for path in tmp_path.iterdir()}
 
-    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
-    spoil(tmp_path / RUNS_FILE)
+    spoil(copied)
     before = content()
     for use in (load, lambda folder: run_and_write(folder, ONE, **FEW)):
         with pytest.raises(CoarticError, match=words) as caught:
@@ -422,9 +423,8 @@ def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, w
     ["ANALYZE", "PRAGMA optimize = 0xfffe", "VACUUM", "CREATE INDEX i ON results (reward)",
      "CREATE VIEW mine AS SELECT 1", "CREATE TABLE notes (text)"],
 )  # fmt: skip
-def test_what_other_programs_add_does_no_harm(undisturbed, tmp_path, statement):
-    shutil.copytree(undisturbed.folder, tmp_path, dirs_exist_ok=True)
-    with closing(sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)) as db:
+def test_what_other_programs_add_does_no_harm(copied, undisturbed, tmp_path, statement):
+    with closing(sqlite3.connect(copied, isolation_level=None)) as db:
         db.execute(statement)
     same_results(load(tmp_path), undisturbed)
     assert check_runs(tmp_path).wrong == []
@@ -453,13 +453,12 @@ def read_all(folder):
         "seed = 'x'",
     ],
 )
-def test_a_value_that_no_run_can_have(undisturbed, tmp_path, change):
+def test_a_value_that_no_run_can_have(copied, tmp_path, change):
     """SQLite refuses it; where it was made not to check, the check of the folder finds it."""
-    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
     statement = f"UPDATE results SET {change} WHERE run = 0"
     with pytest.raises(sqlite3.IntegrityError, match="CHECK"):
-        sql(statement)(tmp_path / RUNS_FILE)
-    with closing(sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)) as db:
+        sql(statement)(copied)
+    with closing(sqlite3.connect(copied, isolation_level=None)) as db:
         db.execute("PRAGMA ignore_check_constraints = ON")
         db.execute(statement)
     assert "Damage: CHECK constraint failed in results." in check_runs(tmp_path).wrong
@@ -497,10 +496,9 @@ def test_a_value_that_no_run_can_have(undisturbed, tmp_path, change):
         f"learning SET rewards = x'{zlib.compress(bytes(7)).hex()}'",
     ],
 )
-def test_content_of_another_kind_is_one_sentence(undisturbed, tmp_path, change):
+def test_content_of_another_kind_is_one_sentence(copied, tmp_path, change):
     """Whatever cannot be read, the check of the folder finds as well, in words."""
-    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
-    sql(f"UPDATE {change}")(tmp_path / RUNS_FILE)
+    sql(f"UPDATE {change}")(copied)
     with pytest.raises(CoarticError) as caught:
         read_all(tmp_path)
     assert str(tmp_path) in str(caught.value)
@@ -518,7 +516,6 @@ def test_a_folder_that_only_its_owner_can_put_right(tmp_path):
 
 
 def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, tmp_path):
-    """Only its own rows are, and only what SQLite cannot use is to be moved away."""
     for error in (ValueError("another folder"), MemoryError(), CoarticError("the disk is full")):
         with pytest.raises(type(error)) as caught, open_store(undisturbed.folder):
             raise error

@@ -107,7 +107,6 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
 
 
 def test_ablations_of_the_learner_are_methods_of_their_own():
-    """With the information that they use."""
     for name, entry in KNOWN.items():
         if name.startswith("dual-process/") and name != "dual-process/custom":
             condition = EVERY_CONDITION[name.partition("/")[2]]

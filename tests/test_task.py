@@ -3,19 +3,14 @@
 import ast
 import math
 import re
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from coartic import (
-    CONDITIONS,
     CoarticError,
-    ExplorationCondition,
     NotApplicableError,
-    Optimiser,
     Robot,
     Start,
     Task,
@@ -113,22 +108,6 @@ def test_a_wrong_task_is_refused_in_a_sentence(wrong, words):
     assert "pydantic" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (partial(Robot, links=(1, 1)), r"Robot: links is an unknown key; did you mean 'left_l"),
-        (partial(ExplorationCondition, "x", ("right",), True, True, "all"),
-         r"ExplorationCondition: hand_exploration is 'all'; it sh"),
-        (partial(replace, CONDITIONS["EC4"], epsilon=math.nan), "is nan; it should be a finite"),
-        (partial(Optimiser.Parameters, trials=0), "Parameters: trials is 0; it should be greater"),
-        (partial(Optimiser.Parameters, half_width=math.nan), "is nan; it should be a finite"),
-    ],
-)  # fmt: skip
-def test_what_else_is_made_of_wrong_arguments_says_so_in_a_sentence(make, words):
-    with pytest.raises(ValueError, match=words):
-        make()
-
-
 LISTS = {
     Task: ["hands", "locked_base", "goals"],
     Start: ["base", "left", "right"],
@@ -170,7 +149,6 @@ def test_reach_of_the_corrective_process():
 
 
 def test_inner_reach():
-    """An arm of links 3 and 1 cannot reach within 2 of its shoulder."""
     content = {"robot": {"right_links": [3.0, 1.0]}, "hands": ["right"], "goals": [[1.0, 0.1]],
                "start": {"left": [0.0] * 4, "right": [0.0, 1.0]}}  # fmt: skip
     with pytest.raises(TaskError, match="goals\\[0\\] \\(1, 0.1\\) is out of reach"):

@@ -48,19 +48,6 @@ def test_a_film_and_a_picture(tmp_path):
         mine.animate(tmp_path / "mine.gif")
 
 
-@pytest.mark.parametrize(
-    ("hands", "targets", "words"),
-    [
-        ("RRR", np.zeros((2, 10)), "a row for each of the 3"),
-        ("RX", np.zeros((2, 10)), "hands is 'RX'"),
-        ("RR", "x", "targets"),
-    ],
-)
-def test_movements_that_cannot_be_are_refused(hands, targets, words):
-    with pytest.raises((CoarticError, ValueError), match=words):
-        movements_of(hands, targets)
-
-
 def test_rows_of_a_trajectory_by_hand():
     """A goal hit at the start, two lines of 3 and 2 steps, q + k m (target - q)/distance."""
     task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]])

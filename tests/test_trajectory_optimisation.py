@@ -22,7 +22,7 @@ from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Session
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
-from tests.support.strategies import changed, least_cost, solve
+from tests.support.strategies import changed, least_cost, solve, steps_from
 
 ORDERS = {"acceleration": 2, "jerk": 3, "hand-jerk": 3}
 SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))
@@ -76,10 +76,10 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     plan = problem.solve(instance, chain)
     assert plan.converged, plan.reason
     free, square = ~instance.held, cost == "squared-displacement"
-    start = np.diff(np.vstack([task.q0, chain]), axis=0)[free]
+    start = steps_from(task.q0, chain)[free]
     start += 0.1 * np.random.default_rng(1).standard_normal(start.shape)
     least = least_cost(task, hands, free, [start], radius=task.radius, square=square)
-    moved = np.diff(np.vstack([task.q0, plan.configurations]), axis=0)
+    moved = steps_from(task.q0, plan.configurations)
     squares = (moved**2).sum(axis=1)
     assert plan.cost <= least + 1e-5
     assert plan.cost == pytest.approx((squares if square else np.sqrt(squares)).sum(), abs=1e-5)
@@ -252,7 +252,6 @@ def test_the_rest_of_a_piece_lies_ahead():
 
 
 def test_of_too_many_hand_sequences_a_beam_is_planned():
-    """As many as are asked for, as if all were; all where there are no more."""
     task = small_task(goals=((2.6, 1.0), (3.2, -0.4), (1.2, 1.4)))
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}

@@ -239,7 +239,6 @@ def test_a_trial_is_the_references(door, name):
 
 @pytest.mark.parametrize("name", TASKS)
 def test_trials_differ(name):
-    """Some fail, some are corrected more than others."""
     rewards = [case.due.reward for case in cases(name)]
     assert (None in rewards) == (name != "two-armed-2")
     assert len({*rewards}) >= 8

@@ -46,7 +46,6 @@ def test_random_search_begins_with_the_corrective_process_and_keeps_its_best_tri
 
 
 def test_random_search_with_every_hand_sequence():
-    """Each sequence has its corrective trial and as many random trials; the best of all is kept."""
     task = load_task("two-armed-2")
     result, _, session = solve(RandomSearchHands, task, trials=165)
     assert session.meter.trials == 165
@@ -117,7 +116,6 @@ def test_trials_made_together_are_those_made_one_by_one(task):
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_sequences_that_cannot_be_completed_are_left(method):
-    """The solution is that of the best trial."""
     result, execution, session = solve(method, SECOND_FOR_THE_RIGHT, trials=150)
     assert session.meter.trials == 150
     assert session.rewards.count(None) == session.meter.failed_trials == 2
@@ -173,7 +171,6 @@ def test_without_a_trial_that_hits_every_goal_it_is_infeasible(method):
 
 
 def test_a_single_joint_to_explore():
-    """One link, the base locked: CMA-ES in one dimension."""
     task = tiny_task(
         hands=["right"],
         goals=[[0.5, 1.1]],

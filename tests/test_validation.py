@@ -6,6 +6,7 @@ import itertools
 import os
 import re
 import traceback
+from dataclasses import replace
 from functools import partial
 from inspect import isfunction
 from pathlib import Path
@@ -62,7 +63,6 @@ from coartic.analysis import (
     solutions_of,
     write_study,
 )
-from coartic.analysis.figures import picture
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.signatures import measures, two_contexts
 from coartic.analysis.signatures.context_tests import posture_difference_below
@@ -81,10 +81,12 @@ from coartic.cli.arguments import value_in
 from coartic.internal.text import RENAMED, did_you_mean
 from coartic.method import Information, Session, outline_of
 from coartic.motion.trial import reach_goals
+from coartic.runs.record import movement_data
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
 from coartic.tasks.optima import essence
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
+from tests.support.strategies import make_trials
 from tests.support.suites import KNOWN, ROOT
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
@@ -290,11 +292,6 @@ def test_tables_and_figures_are_of_a_study(what):
         what(pd.DataFrame({"reward": [-300]}))
 
 
-def test_a_picture_has_an_ending():
-    with pytest.raises(CoarticError, match=r"a picture ends in .svg, .pdf, .png; not in '.bmp'"):
-        picture(Figure(), ".bmp")
-
-
 @pytest.mark.parametrize("name", ["a" * 5000, "x\0y", 3, None])
 def test_a_folder_that_cannot_be(name):
     with pytest.raises(CoarticError, match="cannot be used: |(3|None): needed is a text") as caught:
@@ -330,6 +327,9 @@ def test_a_renamed_method_is_known_by_its_present_id():
     assert meant == "; its present id is 'posture-qp/goals-ahead'"
     assert did_you_mean("optimum/branch-and-bound", present).endswith("'optimum/search'")
     assert did_you_mean("guesses", ["guessing"]) == "; did you mean 'guessing'?"
+
+
+OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML file"
 
 
 @pytest.mark.parametrize(
@@ -371,7 +371,16 @@ def test_a_renamed_method_is_known_by_its_present_id():
         (["report", "nowhere"], "there is no folder nowhere"),
         (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
         (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),
-        (["draw", "ascending", "--out", "x.bmp"], ".bmp"),
+        (["play", "--out", "x.txt"], "the name must end in .html"),
+        (["animate", "1a2b", "--out", "x.txt"], "the name must end in .gif or .mp4"),
+        (["draw", "ascending", "--out", "x.txt"], "the name must end in .svg or .pdf or .png"),
+        (["new", "my-search", "--out", "x.txt"], "the name must end in .py"),
+        (["run", "comparison", "--tasks", "arm.urdf"], OF_ANOTHER_PROGRAM),
+        *(
+            ([command, "arm.urdf"], OF_ANOTHER_PROGRAM)
+            for command in ("check", "draw", "play", "list")
+        ),
+        (["run", "paper", "--seed", "-1"], "it should be at least 0"),
     ],
 )
 def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, coartic):
@@ -384,7 +393,9 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
     assert not [*tmp_path.iterdir()]
 
 
+Trials = coartic.Optimiser.Parameters
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
+UNMASKED = "has masked entries; needed are numbers without a mask"
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
@@ -507,7 +518,6 @@ def is_ours(error):
 
 @pytest.mark.parametrize(("call", "usual"), CALLS)
 def test_no_wrong_argument_gets_an_error_of_python(call, usual):
-    """A movement's fields are arguments, too."""
     assert refused_by_us(partial(call, **usual))[0]
     hints = inspect.signature(call).parameters
     for name, value in itertools.product(usual, ODD):
@@ -548,9 +558,21 @@ def test_all_functions_are_called_wrongly():
         (lambda: parse_task({}, source=5, reach=1), "source is 5"),
         (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
         (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
-        (lambda: Movement(1, "right", "planned", MASKED), "target has masked entries"),
-        (lambda: Movement(1, "right", "path", waypoints=[MASKED]), "waypoints has masked"),
-        (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), "p_values has masked entries"),
+        (lambda: Movement(1, "right", "planned", MASKED), f"target {UNMASKED}"),
+        (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints {UNMASKED}"),
+        (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), f"p_values {UNMASKED}"),
+        *(
+            (call, UNMASKED)
+            for call in (
+                lambda: movement_data(Movement(1, "right", "planned", MASKED)),
+                lambda: movements_of("RRR", np.ma.array([MASKED] * 3)),
+                lambda: make_trials(TASK, "RRR", np.ma.masked_equal(np.zeros((1, 3, 10)), 0.0)),
+                lambda: make_trials(TASK, "RRR", [[MASKED] * 3]),
+                lambda: move(ROBOT, TASK.q0, MASKED, "right", (5, 1), 0.1),
+                lambda: mean([1.0, 2.0, np.ma.masked]),
+                lambda: other_tasks({"family": [MASKED]}),
+            )
+        ),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
         (lambda: interval({}, "gap"), "the row has no numbers gap, gap_low, gap_high"),
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
@@ -564,6 +586,20 @@ def test_all_functions_are_called_wrongly():
             "^ExplorationCondition: direction is 'stay', which nothing goes by",
         ),
         (lambda: judge(), "judge: missing a required argument: 'claims'"),
+        (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
+        (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),
+        (lambda: movements_of("RR", "x"), "targets"),
+        (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
+        (
+            lambda: ExplorationCondition("x", ("right",), True, True, "all"),
+            "ExplorationCondition: hand_exploration is 'all'; it sh",
+        ),
+        (
+            lambda: replace(coartic.CONDITIONS["EC4"], epsilon=np.nan),
+            "is nan; it should be a finite",
+        ),
+        (lambda: Trials(trials=0), "Parameters: trials is 0; it should be greater"),
+        (lambda: Trials(half_width=np.nan), "is nan; it should be a finite"),
     ],
 )
 def test_what_was_taken_silently_or_badly_has_a_sentence(call, words):

@@ -2,11 +2,9 @@
 
 import json
 import math
-import os
 import re
 import shutil
 import sqlite3
-import subprocess
 import sys
 import zlib
 from contextlib import closing
@@ -29,6 +27,7 @@ from coartic.runs.plan import Cell, Job
 from coartic.runs.record import PARTS, Outcome, Run, Score
 from coartic.runs.store import RUNS_FILE, writing
 from coartic.tasks.task import hands_of
+from tests.support.processes import python
 from tests.support.strategies import tiny_task, uneven_task
 from tests.support.suites import edit, edit_plan, moved
 
@@ -97,7 +96,6 @@ def edited(true_folder, tmp_path, statement):
 
 @pytest.mark.parametrize("damage", ["zeros", "no UTF-8"])
 def test_a_damaged_file_is_told_from_a_wrong_one(true_folder, tmp_path, coartic, damage):
-    """The command says what is the matter, whichever page or text it is."""
     whole, size = (true_folder / RUNS_FILE).read_bytes(), 4096
     if damage == "zeros":
         starts = range(size, len(whole), 2 * size)
@@ -297,8 +295,5 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
 @pytest.mark.process
 @pytest.mark.parametrize("kernel", ["Haswell", "Prescott"])
 def test_a_folder_is_sound_under_other_kernels_of_blas(true_folder, kernel):
-    """As in another lab, whose processor has them."""
-    command = [sys.executable, checker.__file__, true_folder]
-    environment = {**os.environ, "OPENBLAS_CORETYPE": kernel}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, "Nothing differs" in done.stdout) == (0, True)
+    done = python(checker.__file__, true_folder, OPENBLAS_CORETYPE=kernel)
+    assert "Nothing differs" in done.stdout

@@ -4,10 +4,21 @@ import contextlib
 import importlib.util
 import multiprocessing
 import os
+import subprocess
 import sys
 import time
 import warnings
 from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def python(*arguments, cwd=None, fails=False, **environment):
+    """Output and end of Python on this code, in a process of its own."""
+    command, env = [sys.executable, *arguments], os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=cwd, env=env | environment, capture_output=True, text=True)
+    assert fails == bool(done.returncode), done.stderr
+    return done
 
 
 def processes():
@@ -57,6 +68,19 @@ def apart(what, *arguments):
 
 def _say(answers, what, arguments):
     answers.send(what(*arguments))
+
+
+def pythons():
+    """Pythons of this machine by their minor version: this one, and those on the path and of pyenv,
+    but no shims, which need not start."""
+    found = {sys.version_info[1]: [Path(sys.executable)]}
+    places = map(Path, os.environ.get("PATH", "").split(os.pathsep))
+    for place in (*places, *Path.home().glob(".pyenv/versions/*/bin")):
+        for path in place.glob("python3.[0-9]*"):
+            minor = path.name.removeprefix("python3.")
+            if minor.isdigit() and "shims" not in path.parts:
+                found.setdefault(int(minor), []).append(path)
+    return found
 
 
 def program(path):

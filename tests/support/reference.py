@@ -175,13 +175,11 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
                 iterations += spent
             p = preferred_posture(task, condition, q, number, hand, values, targets)
             has_target = (state, hand) in targets
-            if trial == 0 and start:
-                target = start[number].target
-                result = move(task.robot, q, target, hand, goal, task.radius, model=model)
-                q, total, hit = result.q, total - result.ticks, result.hit
-                ticks += result.ticks
-            elif has_target:
-                target = _explore(task, condition, q, hand, targets[state, hand], rng, drift, p)
+            if has_target or (trial == 0 and start):
+                if has_target:
+                    target = _explore(task, condition, q, hand, targets[state, hand], rng, drift, p)
+                else:
+                    target = start[number].target
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks

@@ -54,6 +54,16 @@ def tiny_task(**changes):
     return parse_task({key: value for key, value in content.items() if value is not None}, "tiny")
 
 
+STUCK = tiny_task(name="stuck", locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]])
+"""The corrective process cannot leave where it starts."""
+
+
+def failing_task(goals=((1.5, 0.1),), hands="R"):
+    """The left hand starts on a stationary point: its corrective process cannot leave."""
+    start = {"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]}
+    return tiny_task(goals=goals, initial_hands=hands, locked_base=["x", "y"], start=start)
+
+
 def uneven_task(left=(1.0,), right=(0.5, -0.5, 0.2, 1.0), base=(0.0, 0.0), **changes):
     """As :func:`tiny_task`, for an uneven robot, whose arms start with these joints (rad); with
     three goals for both hands unless others are given."""
@@ -119,6 +129,11 @@ def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):
 def make_trials(task, hands, targets, model=PAPER):
     """Trials in a session of their own."""
     return Session(task, 0, OPTIMISER_INFORMATION, model=model).trials(hands, targets)
+
+
+def steps_from(q, configurations):
+    """Changes of the joints from one posture to the next, beginning with ``q``."""
+    return np.diff(np.vstack([q, *configurations]), axis=0)
 
 
 def least_cost(task, hands, moving, starts, *, radius, square=False):

@@ -4,7 +4,6 @@ import contextlib
 import os
 import sqlite3
 from contextlib import closing
-from pathlib import Path
 
 import pandas as pd
 
@@ -18,8 +17,8 @@ from coartic.benchmarks.runner import perform
 from coartic.benchmarks.worker import fail, perform_job
 from coartic.runs.plan import Job, cell_of
 from coartic.runs.store import RUNS_FILE
+from tests.support.processes import ROOT
 
-ROOT = Path(__file__).parents[2]
 BROKEN = ROOT / "tests" / "methods" / "broken.py"
 KNOWN = registry()
 
