@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Provenance, Start, Task, parse_task
     from coartic.trajectories import Trajectory, trajectory
 
-__version__ = "3.0.0"
+__version__ = "4.0.0"
 
 __all__ = [
     "ABLATIONS",
