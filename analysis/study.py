@@ -399,6 +399,7 @@ class Study:
         """
         return self.executed(task, method, replay=replay).configurations
 
+    @checked_arguments
     def signature(self, name: str, *, replay: bool = False) -> pd.Series:
         """Return a signature of coarticulation of every run.
 

@@ -463,7 +463,6 @@ CALLS = (
         measures.other_arm, measures.ticks_slower)),
     (measures.isolated_reaches, {"task": TASK, "q": np.tile(TASK.q0, (3, 1)), "goals": [1, 2, 3],
                                  "hands": [1, 1, 1]}),
-    (measures.preshaping, {"task": TASK, "run": TRIAL, "initial": TRIAL}),
     (measures.other, {"hand": "left"}),
     (two_contexts.movable, {"task": TASK, "hand": "right"}),
     (two_contexts.motor_equivalence, {"difference": np.ones(10),

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from coartic import Execution, Hand, Task
 from coartic.analysis.solutions import Solutions, initial_solution
@@ -33,7 +33,7 @@ def other(hand: Hand) -> Hand:
 
 @checked_arguments
 def isolated_reaches(
-    task: Task, q: Array, goals: NDArray[np.int64], hands: NDArray[np.int64]
+    task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
 ) -> tuple[Array, Array]:
     """Return r(q, g, h) and R(q, g, h), the ticks and ends of reaches by the corrective process.
 
@@ -42,7 +42,7 @@ def isolated_reaches(
     task : Task
     q : ndarray, shape (..., dof)
         Configurations at the start, length unit and rad.
-    goals, hands : ndarray of int, shapes that broadcast to (...)
+    goals, hands : array_like of int, shapes that broadcast to (...)
         Numbers of goals, from 1, and places of hands in HANDS.
 
     Returns
@@ -51,20 +51,19 @@ def isolated_reaches(
         Ticks, 0 if the hand is within the goal at the start, NaN if the reach ends without a hit;
         and configurations at the end.
     """
-    q = np.asarray(q)
+    q, numbers = np.asarray(q), 1 + np.arange(len(task.goals))
     shape = q.shape[:-1]
     try:
-        of_reaches = [np.broadcast_to(each, shape).ravel() for each in (goals, hands)]
-        centres = task.goal_array[np.subtract(of_reaches[0], 1, dtype=np.uint64, casting="unsafe")]
-    except (ValueError, IndexError) as error:
-        raise ValueError(
-            f"goals are 1 to {len(task.goals)}, a goal and a hand for each q: {error}"
-        ) from None
+        fit = np.broadcast_shapes(np.shape(goals), np.shape(hands), shape) == shape
+    except ValueError:
+        fit = False
+    if not fit or not np.isin(goals, numbers).all():
+        raise ValueError(f"needed are goals from 1 to {len(numbers)} and hands for q of {q.shape}")
     reached = reach_goals(
         task.robot,
         q.reshape(-1, q.shape[-1]),
-        of_reaches[1],
-        centres,
+        np.broadcast_to(hands, shape).ravel(),
+        task.goal_array[np.broadcast_to(goals, shape).ravel() - 1],
         task.radius,
         locked_base=task.locked_base,
     )
@@ -116,7 +115,6 @@ def ticks_slower(runs: Solutions) -> Array:
     return slower
 
 
-@checked_arguments
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     """Return the share of the way to its next goal that the idle hand covers, shape ``(G,)``.
 
