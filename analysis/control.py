@@ -140,9 +140,11 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 @checked_arguments
 def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> str:
-    """Return a suite of random search for the hands with which methods end that have no control.
+    """Return a suite of random search, the control of signatures, where the study lacks it.
 
-    Run it with the folder of the study included, and all signatures have a control.
+    For each method that may select its solution by rewards (:func:`selects`) it has random search,
+    as many trials as the method's, with each hand sequence in a tenth or more of the method's
+    solved runs that has no control. Run it with the folder of the study included.
 
     Parameters
     ----------

@@ -90,6 +90,7 @@ def cached(
 ) -> Callable[Concatenate[Study, Asked], Computed]:
     """Make a function of a study keep its result for each study and its other arguments.
 
+    Every call returns the same object, which callers must not change; arguments must be hashable.
     The function raises CoarticError for an object that is no study, and for an argument of another
     kind than its hint says.
     """
@@ -354,7 +355,7 @@ class Study:
         Returns
         -------
         Solutions
-            Of the first 500 solved runs.
+            Executions of the first 500 solved runs.
 
         Raises
         ------
@@ -456,8 +457,8 @@ class Study:
 def one_by_one(study: Study) -> dict[str, Task]:
     """Return the tasks that a report shows one by one, by name.
 
-    More than eight instances of families are left out. The name of a changed task begins with the
-    name of its task and a dot.
+    Instances of families are among them only if there are at most eight in all. The name of a
+    changed task begins with the name of its task and a dot.
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     left_out = drawn if len(drawn) > 8 else ()

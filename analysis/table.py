@@ -40,8 +40,11 @@ class Column(NamedTuple):
 
 
 def _column_of(text: str) -> Column:
-    """Return a column from its text: ``gap[]: gap (%) .1``, ``task``, or ``least_p: -`` for a
-    column without a heading, which only the CSV file has."""
+    """Parse the text of a column: its name and ending, then ``: heading`` and ``.digits``.
+
+    Examples: ``gap[]: gap (%) .1``; ``reward± .1`` and ``task``, whose heading is the name;
+    ``least_p: -``, which only the CSV file has. Endings: see :class:`Column`.
+    """
     name, dot, digits = text.rpartition(" .")
     name, _, header = (name if dot else text).partition(": ")
     ending = next((each for each in ("[]", "±", "*") if name.endswith(each)), "")
@@ -110,7 +113,8 @@ class TableFrame(pd.DataFrame):
 
 @cached
 def _rows_of(study: Study, table: Table) -> pd.DataFrame:
-    """Return the rows of a table by their names."""
+    """Return a table as a DataFrame: a row for each name, and only the columns of the table, with
+    ``_low``, ``_high`` and ``_sd`` written out. Its ``attrs`` are those of :func:`_shown_names`."""
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
@@ -144,7 +148,8 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:
-    """Return which rows of a table are of settings and ablations whose method has a row, too."""
+    """Return for each row of a table True if it is of a setting or ablation whose method has a
+    row."""
     label = frame.method if "method" in frame else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
 
@@ -171,5 +176,5 @@ def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
 
 
 def run_ids(*parts: pd.DataFrame) -> Row:
-    """Return the ids of some runs."""
+    """Return the entry ``run_ids`` of a row: the ids of all runs in the parts, as one text."""
     return {"run_ids": " ".join(run_id for runs in parts for run_id in runs.run_id)}

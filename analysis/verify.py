@@ -69,7 +69,7 @@ UNCHECKED = (
 
 
 def need(holds: Any, words: str) -> None:
-    """Raises ValueError with these words where something does not hold."""
+    """Raise ValueError with these words unless something holds."""
     if not holds:
         raise ValueError(words)
 
@@ -82,7 +82,8 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in ran
 
 
 def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
-    """Cosine and sine of angles in rad: less k quarters of a turn (π/2), by the Taylor series."""
+    """Return cosine and sine of angles, rad, by the Taylor series of what is left after k quarters
+    of a turn (π/2)."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
     z, k = x * x, quarters.astype(np.int64)
@@ -99,7 +100,8 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
-    """x and y of the hand, for configurations in columns. On paths, by NumPy's cosine and sine."""
+    """Return x and y of the hand for configurations in the columns of ``q``; on paths by NumPy's
+    cosine and sine."""
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
     angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
@@ -110,7 +112,8 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 
 
 def stored_task(definition: str, model: str) -> Any:
-    """A task as it is stored, with the constants of movement, and what follows from both."""
+    """Return a task from its stored JSON, with its constants of movement (``model``), start
+    (``q0``), locked base coordinates and arms."""
     need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
@@ -137,8 +140,8 @@ class MoveRow(NamedTuple):
 
 
 def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """The points of a straight movement, in columns; ``most`` of them and one more. The last is
-    the target, also of a longer movement."""
+    """Return the points of a straight movement as columns, at most ``most`` and one more. The last
+    is the target, also of a longer movement."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
@@ -149,8 +152,8 @@ def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Float
 
 
 def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """The points of a path, in columns; ``most`` of them and one more. Point k lies k steps along
-    it, the last at its end."""
+    """Return the points of a path as columns, at most ``most`` and one more. Point k lies k steps
+    along the path, and the last point of a path that is not longer lies at its end."""
     corners = np.array([q, *waypoints])
     ends = np.append(0.0, np.cumsum(np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))))
     last = math.ceil(ends[-1] / model.step)
@@ -163,8 +166,8 @@ def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Fl
 
 
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
-    """Make a movement from q: where it stops, after how many ticks, and whether that is a hit.
-    One of more ticks than are stored ends a tick after these."""
+    """Return where a movement from ``q`` stops, after how many ticks, and whether this is a hit. A
+    movement of more ticks than are stored stops one tick after these."""
     _, goal, hand, kind, most, corners = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
     points = path(q, corners, model, most) if on_path else line(q, corners[-1], model, most)
@@ -181,8 +184,8 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 
 
 def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
-    """Reward, hands, corrections made, and travel of the arms not chosen, from hit to hit, in rad.
-    Raises ValueError where a movement breaks a rule or takes other ticks than are stored."""
+    """Return reward, hands, corrections made, and joint travel of the arms not chosen, from hit to
+    hit, rad. Raises ValueError if a movement breaks a rule or takes other ticks than are stored."""
     _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
@@ -208,7 +211,7 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
 
 
 def _check_rules(task: Any, movements: list[MoveRow]) -> None:
-    """Raises ValueError where movements break a rule, whatever comes of them."""
+    """Raise ValueError if movements break a rule that is checked without making the movements."""
     goals = [movement.goal for movement in movements]
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
     need(goals == sorted(goals), f"its goals are out of order: {goals}")
@@ -224,7 +227,7 @@ def _check_rules(task: Any, movements: list[MoveRow]) -> None:
 
 
 class Report(NamedTuple):
-    """Result of the check."""
+    """Result of :func:`check_runs`."""
 
     runs: int  # checked
     movements: int  # executed
@@ -233,7 +236,11 @@ class Report(NamedTuple):
 
 
 def check_runs(folder: Path) -> Report:
-    """Check all runs of a folder, asked for last or not. sqlite3.Error: it cannot be read."""
+    """Recompute all stored runs, check cells and plan; report what differs or is unchecked.
+
+    Runs that the last plan does not ask for are among them. Raises sqlite3.Error if the folder
+    cannot be read.
+    """
     with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:
         db.row_factory = sqlite3.Row
         return _check_all(db)
@@ -285,8 +292,8 @@ def _check_all(db: sqlite3.Connection) -> Report:
 
 
 def _check_identity(row: Any) -> None:
-    """Raises ValueError where a run is not that of its cell: its id is a hash of the cell, the seed
-    of the suite and the number of the run, and ends with the hash of the code."""
+    """Raise ValueError if a run is not that of its cell: its id is a hash of the cell, the seed of
+    the suite and the number of the run, and ends with the hash of the code."""
     suite_seed, run = row["suite_seed"], row["run"]
     digits = hashlib.sha256(f"{row['digest']} {suite_seed} {run}".encode()).hexdigest()[:16]
     need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
@@ -347,15 +354,15 @@ def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
 
 
 def hash_of(content: Any) -> str:
-    """SHA-256 of plain data."""
+    """Return the SHA-256 of plain data, in hexadecimal digits."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), default=repr)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _check_rewards(row: Any) -> bytes:
-    """The rewards of a run as bytes: the best one, then by how much each trial is worse, plus 1, or
-    0 without a reward; all lowest bytes come first, then the next. Raises ValueError for damage,
-    and for another best trial."""
+    """Return the rewards of a run as bytes: the best reward, then by how much each trial is worse,
+    plus 1, or 0 without a reward; all lowest bytes come first, then the next. Raises ValueError for
+    damage, and for another best trial."""
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
         content = zlib.decompressobj().decompress(row["rewards"] or EMPTY, size + 1)
@@ -373,7 +380,8 @@ def _check_rewards(row: Any) -> bytes:
 
 
 def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
-    """The movements of a run by the solution that they belong to, and all as they are stored."""
+    """Return the movements of a run by part (solution, initial, replay), and a list of all
+    movements as stored, which the hash of the result covers."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
     stored: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements

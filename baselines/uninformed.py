@@ -49,13 +49,14 @@ class Attempts:
         self._targets: Array = np.empty(0)
 
     def by_correction(self, hands: str) -> Trials:
-        """Make one trial by **A** alone."""
+        """Make one trial without targets: the corrective process reaches each goal with the given
+        hand."""
         shape = (1, self._session.goals_count, self._session.dof)
         return self.by_targets(hands, np.full(shape, np.nan))
 
     def around(self, hands: str, values: Array) -> Trials:
-        """Make trials with one hand sequence and targets ``(N, n)`` for the n explored joints of
-        all goals; the other joints keep still."""
+        """Make N trials with one hand sequence; ``values`` ``(N, n)`` are targets of the n explored
+        joints of all goals. The other joints have no target and keep still."""
         targets = np.full((len(values), *self.explored.shape), np.nan)
         targets[:, self.explored] = values
         return self.by_targets(hands, targets)
@@ -63,10 +64,10 @@ class Attempts:
     def by_targets(
         self, hands: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
-        """Make trials with one hand sequence or one each, and targets of shape ``(N, G, dof)``.
+        """Make N trials with targets of shape ``(N, G, dof)`` and one hand sequence, or a hand
+        sequence for each trial; remember the best trial, and return the results of all.
 
-        With ``until`` (N,) the last trial is the first whose reward exceeds its entry; trials after
-        it are not made.
+        ``until``, shape ``(N,)``: the last trial made is the first whose reward exceeds its entry.
         """
         trials = self._session.trials(hands, targets, until=until)
         rewards = trials.rewards
@@ -80,7 +81,8 @@ class Attempts:
         return trials
 
     def result(self, **details: Any) -> Result:
-        """The best trial's movements; MethodError where no trial hit every goal."""
+        """Return the movements of the best trial, with its number and ``details``. Raises
+        MethodError if no trial hit every goal."""
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
         if not self.hands:

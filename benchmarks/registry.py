@@ -80,8 +80,8 @@ def current_code(where: str, name: str) -> str:
 
 
 def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) -> None:
-    """Add methods by id. Raises CoarticError for an id that is reserved or taken, or that differs
-    from another name in case alone."""
+    """Add methods to ``registered`` by id. Raises CoarticError for an id that is reserved or taken,
+    or that differs from another name in case alone."""
     for info in infos:
         names = (*registered, *EVERY_CONDITION, *NAMES)
         why = ""
@@ -111,8 +111,9 @@ def methods_named(name: str, registered: Registry) -> list[str]:
 
 
 def _methods_of_file(path: Path) -> Iterator[MethodInfo]:
-    """Yield the methods of a file, which is imported in a separate process. Raises CoarticError for
-    a file that cannot be used."""
+    """Yield a MethodInfo for each method of a file, which a separate process imports; ``READERS``
+    keeps the function that asks this process. Raises CoarticError for a file that cannot be
+    used."""
     shown = plain(str(path), LONGEST_LINE)
     check_file(path)
     if path.suffix != ".py":

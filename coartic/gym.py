@@ -271,7 +271,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
     def step(
         self, actions: ArrayLike
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Reach for the next goal of each trial, and start again those that have ended."""
+        """Reach for the next goal of each trial, and start again those that have ended; return
+        observations, rewards, which trials have ended, False for each (none is truncated) and
+        infos."""
         state = self.state
         if not state.going.all():
             raise ResetNeeded("no trial goes on: reset first")
@@ -320,7 +322,8 @@ class TaskEnv(Recorded, gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin a trial."""
+        """Begin a trial of a task drawn with the seed; return observation and info. Raises
+        ValueError for any option."""
         super().reset(seed=_whole_seed(seed))
         _check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
@@ -329,7 +332,8 @@ class TaskEnv(Recorded, gymnasium.Env):
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Reach for the next goal. Raises ResetNeeded where the trial has ended."""
+        """Reach for the next goal; return observation, reward, whether the trial has ended, False
+        (no trial is truncated) and info. Raises ResetNeeded if the trial had ended before."""
         state = self.robots.state
         if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")

@@ -182,7 +182,8 @@ class Robot:
         return slice(arm.first, arm.first + len(arm.links))
 
     def reach(self, hand: Hand) -> tuple[float, float]:
-        """Return the least and the largest distance of a hand from its shoulder, length unit."""
+        """Return the least and the largest distance of a hand from its shoulder, length unit, by
+        the lengths of the links alone: joints have no limits."""
         links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 

@@ -55,7 +55,7 @@ class Trajectory:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Hand chosen for each goal."""
+        """Hand for each goal, as names; ``execution.hands`` has letters."""
         return hands_of(self.execution.hands)
 
     @property
@@ -108,8 +108,8 @@ class Trajectory:
         return frame
 
     def plot(self) -> Figure:
-        """Draw the robot at the start (pale) and at each hit, with the path of the hand that
-        hits."""
+        """Return a figure of the robot at the start (pale) and at each hit, with the path of the
+        hand that hits."""
         from matplotlib.figure import Figure
 
         from coartic.drawing import box, circle_goals, draw_robot, number_goals

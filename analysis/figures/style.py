@@ -76,7 +76,8 @@ Look = dict[str, Any]
 
 
 def look_of(names: tuple[str, str], bold: bool) -> Look:
-    """Return the look of lines and marks by the names of a colour and a dash."""
+    """Return the look of lines and marks by the names of a colour and a dash; ``bold``: with a
+    wider line and larger marks."""
     color, dash = names
     sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
     return {"color": _COLORS[color], "linestyle": _DASHES[dash], **sizes}
@@ -167,7 +168,7 @@ def means(
     bars: float | None = 0.8,
     **line: Any,
 ) -> None:
-    """Draw means with their intervals, a line for each group.
+    """Draw means as points with their intervals, a line for each group, without a legend.
 
     Parameters
     ----------
@@ -185,7 +186,7 @@ def means(
     shift : float
         Distance by which each line is moved to the right of the line before, in units of ``x``.
     bars : float, optional
-        Width of the intervals, points.
+        Line width of the intervals, points; None is Matplotlib's line width and hides nothing.
     **line
         Look of the line and its marks: arguments of Matplotlib's ``plot``.
 

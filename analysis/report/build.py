@@ -45,10 +45,10 @@ def write_report(
     """Write a report into ``folder``, in the place of an earlier report.
 
     ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF. ``watch`` is called with
-    the title of each section before it is made. Returns the paths of the
-    files, and the errors of parts that could not be made, by the name of the part. Raises
-    CoarticError if the folder holds the results themselves, the report of other results, or other
-    files.
+    the title of each section before it is made, and again with ``TITLE, for print`` before its
+    files of figures. Returns the paths of the files below ``folder``, and the errors of parts that
+    could not be made, by the name of the part. Raises CoarticError if the folder holds the results
+    themselves, the report of other results, or other files.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
@@ -139,7 +139,8 @@ def page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str
     """Return the page in HTML, which needs no other file and no network.
 
     ``home`` is the path from the page's folder to the results. ``failures`` gets the errors of
-    parts that could not be made.
+    parts that could not be made, by the name of the part; ``watch`` is called with each section's
+    title.
     """
     sections = []
     for section in about.visible_sections(study):

@@ -68,10 +68,11 @@ def list_own(study: Study) -> Rows:
 def difference_of_gaps(
     first: pd.DataFrame, first_is_exact: bool, second: pd.DataFrame, second_is_exact: bool
 ) -> Estimate:
-    """Return the mean gap of some runs less that of others, means over their tasks.
+    """Return the mean gap of the first runs less that of the second, each a mean over its own
+    tasks.
 
-    The interval is for other runs of both methods on the same tasks; gaps of deterministic methods
-    are exact.
+    Tasks are not matched: give both the same tasks. The interval is for other runs of both methods
+    on these tasks; gaps of deterministic methods are exact, and two exact gaps have no interval.
     """
     exact, weights, drawn = 0.0, list[float](), list[Array]()
     for sign, runs, is_exact in ((1, first, first_is_exact), (-1, second, second_is_exact)):

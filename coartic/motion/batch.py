@@ -34,14 +34,14 @@ GOING = 0.0
 
 
 def _links_for(robot: Robot) -> int:
-    """Links for which kernels are compiled: four, eight, or those of an arm that has more, so that
-    all robots of a family share their machine code."""
+    """Return the number of links of an arm for which kernels are compiled: four, eight, or those of
+    an arm that has more, so that all robots of a family share their machine code."""
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
 def width_of(robot: Robot) -> int:
-    """Figures of a configuration in records: of the robot's, and then zeros, as many as with two
-    arms of :func:`_links_for`, so that kernels are compiled once for a number of links."""
+    """Return the number of entries of a configuration in records: those of the robot, then zeros up
+    to two arms of :func:`_links_for`, so that kernels are compiled once for a number of links."""
     return BASE_DOF + 2 * _links_for(robot)
 
 
@@ -145,8 +145,8 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
 
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
-    """Return the rows of arms with this number of links, and which rows a correction and a movement
-    need.
+    """Return the type of the record of all rows, for arms with this number of links, and the slices
+    of rows that a correction and a movement need.
 
     Shorter arms end in links of length 0.
     """
@@ -188,7 +188,7 @@ def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
 
 @inlined
 def _copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
-    """Copy the base and an arm's joints of a configuration into a slot."""
+    """Copy the base and the joints of ``arm`` from configuration ``q`` into column ``slot``."""
     row[0, slot] = q[0]
     row[1, slot] = q[1]
     for k in range(len(row) - BASE_DOF):
@@ -222,7 +222,7 @@ def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
 
 @inlined
 def store(at: Any, slot: int, q: Any) -> None:
-    """Store the arm of a slot in ``q``."""
+    """Copy the base and the joints of the arm in a slot into configuration ``q``."""
     q[0] = at.q[0, slot]
     q[1] = at.q[1, slot]
     for k in range(at.links[slot]):
@@ -231,7 +231,8 @@ def store(at: Any, slot: int, q: Any) -> None:
 
 @inlined
 def compact(rows: Any, slot: int, last: int) -> None:
-    """Compact: move rows of the last slot into a slot that has ended."""
+    """Copy column ``last`` of ``rows`` (quantities, slots) over column ``slot``, whose run has
+    ended."""
     if slot != last:
         for row in range(len(rows)):
             rows[row, slot] = rows[row, last]
@@ -239,7 +240,8 @@ def compact(rows: Any, slot: int, last: int) -> None:
 
 @inner
 def padded_count(count: int) -> int:
-    """Slots in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
+    """Return the number of slots in the vectors that hold ``count`` slots: the last slots, of no
+    run, are worked on as well.
 
     A loop over whole vectors leaves no slots over that would be worked on one by one.
     """

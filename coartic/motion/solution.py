@@ -238,7 +238,7 @@ def execute_many(
 
 
 Plan = list[list[Movement]]
-"""The movements of a solution, goal by goal."""
+"""The movements of a solution, goal by goal; the plan of a suite is another thing."""
 
 
 def _has_path(plan: Plan) -> bool:
@@ -247,10 +247,10 @@ def _has_path(plan: Plan) -> bool:
 
 
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return straight movements to a goal as the kernel takes them, up to the first that **A**
-    finds.
+    """Return the movements to a goal before the first without a target, as the kernel takes them.
 
-    None comes first where no movement is made at once: the hand may be in the goal already.
+    **A** finds the target of that movement. None comes first if no movement is made at once: the
+    hand may be in the goal already.
     """
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -261,7 +261,7 @@ def _with_targets(movements: list[Movement]) -> list[Movement | None]:
 
 
 def _make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
-    """Execute plans without paths side by side."""
+    """Return the executions of plans without paths, made side by side."""
     if not plans:
         return []
     given = [[_with_targets(movements) for movements in plan] for plan in plans]
@@ -285,8 +285,8 @@ def movements_in(
     """Return the movements of N trials from the accounts of their goals, up to the first goal
     missed.
 
-    ``given`` has the movements to given targets, by trial and goal, as the kernel takes them: of
-    those made, their kinds.
+    ``given`` has the movements to given targets, by trial and goal, as :func:`_with_targets`
+    returns them; the movements returned have their kinds.
     """
     names = ("hand", "hit", "ticks", "corrections", "moved")
     columns = [accounts[name].tolist() for name in names]
@@ -313,7 +313,7 @@ def movements_in(
 
 
 def _make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
-    """Execute a plan that has paths, one movement after the other."""
+    """Return the execution of a plan with paths, made one movement after the other."""
     count_trials(1)
     task, q = compiled.task, compiled.starts[0]
     model = compiled.model.for_radius(task.radius)
@@ -353,7 +353,10 @@ def _make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
 def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
-    """Return the execution of a plan from the movements made and the accounts of its goals."""
+    """Return the execution of a plan, up to the goal that failed, with totals and the reason.
+
+    ``movements`` are as made; ``goals`` are the accounts of the goals.
+    """
     hits = sum(goals["hit"].tolist())
     # The place of the hand is known before the first movement, and where that leads.
     checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
@@ -388,7 +391,8 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
-    """Group movements by goal, checked against the task."""
+    """Return the movements of a solution in a list for each goal. Raises SolutionError for a
+    solution that breaks the task's rules."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
             f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
@@ -421,8 +425,8 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_movement(task: Task, movement: Movement) -> Movement:
-    """The movement, if it has what its kind needs and leads to configurations that the task allows;
-    a path with its target. Raises SolutionError or ValueError."""
+    """Return the movement, a path with its target. Raises SolutionError or ValueError if the
+    movement lacks what its kind needs or leads to a configuration that the task does not allow."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
@@ -448,8 +452,8 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 
 
 def _check_point(task: Task, point: Any) -> Array:
-    """The point, with its base held (:func:`_hold_base`). Raises ValueError for what is no
-    configuration of the robot, and where it moves a locked base coordinate."""
+    """Return the configuration, with locked base coordinates put back (:func:`_hold_base`). Raises
+    ValueError for what is no configuration of the robot, or moves a locked base coordinate."""
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:

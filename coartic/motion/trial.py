@@ -75,8 +75,8 @@ TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 
 @cache
 def account_type(width: int, moves: int = 1) -> np.dtype[np.void]:
-    """Return the type of the account of a goal, with ``moves`` movements and configurations of
-    ``width`` figures."""
+    """Return the type of the account of a goal, with ``moves`` movements to targets and
+    configurations of ``width`` entries."""
     fields = {
         "q": (np.float64, width),  # where the robot is in the end, length unit and rad
         "target": (np.float64, (moves, width)),  # of each movement; as given where it is not made
@@ -98,14 +98,15 @@ def account_type(width: int, moves: int = 1) -> np.dtype[np.void]:
 
 @inlined
 def set_off(run: Any, q: Any) -> None:
-    """Put a run at the start of a trial."""
+    """Put a run at configuration ``q``, where its trial starts."""
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
 
 
 @inlined
 def begin(run: Any, goal: Any) -> None:
-    """Phase 1, *begin*: set the goal of a run. If it aims at nothing, its hand is checked."""
+    """Phase 1, *begin*: set the next goal of a run, whose trial may have ended. Without a target
+    the run only checks whether its hand is in the goal."""
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
     run.action = CHECK if run.going else IDLE
@@ -114,7 +115,7 @@ def begin(run: Any, goal: Any) -> None:
 
 @inlined
 def aim(run: Any, target: Any) -> None:
-    """Phase 2, *aim*, at a given target: a joint without one (NaN) stays where it is."""
+    """Phase 2, *aim*: set the target of a run; a joint whose entry is NaN stays where it is."""
     for j in range(len(target)):
         if not math.isnan(target[j]):
             run.target[j] = target[j]
@@ -137,16 +138,16 @@ def move(count: int, robot: Any, batch: Any) -> None:
 
 @inlined
 def correct(count: int, robot: Any, batch: Any) -> None:
-    """Phase 4, *correct*: have **A** finish missed goals. ``target`` and ``ticks`` become what its
-    movements have. A preferred posture has its place in
-    :func:`coartic.motion.movement.descend_to_goals`."""
+    """Phase 4, *correct*: have the corrective process **A** find configurations that hit missed
+    goals, and move the runs there: their ``target`` and ``ticks`` become those of these movements.
+    A preferred posture has its place in :func:`coartic.motion.movement.descend_to_goals`."""
     find_corrections(count, robot, batch)
     make_corrections(count, robot, batch)
 
 
 @inlined
 def make_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Move to what **A** has found."""
+    """Move the runs for which **A** converged to the configurations that it found."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -154,8 +155,8 @@ def make_corrections(count: int, robot: Any, batch: Any) -> None:
 
 @inlined
 def account(run: Any, goal: Any) -> None:
-    """Phase 5, *account*: note the result of a goal, whose account has ``target`` and ``moved`` of
-    its movements to targets already."""
+    """Phase 5, *account*: write the result of a run into the account ``goal`` of its goal, which
+    has ``target`` and ``moved`` of the movements to targets already."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = run.ticks
@@ -194,7 +195,8 @@ def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
 
 @inlined
 def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
-    """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
+    """Have **A** find a ``target`` that hits the goal for each run that missed it, with kernel
+    ``descend``; ``converged`` of a run becomes True if **A** found a target."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -209,13 +211,14 @@ def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
 
 @shared
 def find_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Have the paper's **A** look for where to finish missed goals."""
+    """Have the paper's **A** find targets that hit missed goals (:func:`_find_by`)."""
     _find_by(count, robot, batch, correct_slots)
 
 
 @shared
 def find_pulled_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Have **A** look with a pull to the preferred posture of each run."""
+    """Have **A** find targets that hit missed goals, pulled to each run's preferred posture
+    (:func:`_find_by`)."""
     _find_by(count, robot, batch, pull_slots)
 
 
@@ -279,7 +282,8 @@ def _are_within(targets: Any) -> bool:
 def _reach_lot(
     first: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
 ) -> None:
-    """Let some of the arms reach for their goals, as many as there is room for."""
+    """Let ``count`` arms from number ``first`` on, as many as a batch has runs, reach for their
+    goals; fill ``goals`` and ``counts`` with their accounts."""
     for i in range(count):
         n, run = first + i, batch.runs[i]
         set_off(run, row_of(arms.starts, n))
@@ -319,7 +323,8 @@ def _reach_lot(
 
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any) -> None:
-    """Let every arm reach for its goals, in lots.
+    """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
+    ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`.
 
     ``others`` are the entries of :class:`Requests` and then those of a batch: a tuple with names
     takes Numba half a microsecond.
@@ -540,7 +545,7 @@ def inside(of_run: bool) -> Iterator[None]:
 
 
 def trials_outside() -> int:
-    """Trials made outside so far, in this process."""
+    """Return the number of trials that this process has made outside the sessions of runs."""
     return _outside
 
 
@@ -550,8 +555,8 @@ def make_trials(
     targets: Configs,
     stops: NDArray[np.bool_] = ALL_STOP,
 ) -> Accounts:
-    """Make N trials of a task: ``hands`` of shape ``(N, G)``; ``targets`` and ``stops`` as in
-    :class:`Requests`."""
+    """Make N trials of a task and return their accounts: ``hands`` has shape ``(N, G)``;
+    ``targets`` and ``stops`` are as in :class:`Requests`."""
     count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
     return reach(compiled.task.robot, arms, compiled.parameters)
@@ -619,9 +624,9 @@ HandSequences = str | Sequence[str]
 
 
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
-    """Return the hand of every trial and goal, shape ``(count, G)``.
+    """Return the hand of every trial and goal, 0 left or 1 right, shape ``(count, G)``.
 
-    Raises ValueError where they do not fit the task.
+    Raises ValueError if the sequences do not fit the task or the number of trials.
     """
     several = isinstance(hands, Iterable) and not isinstance(hands, str)
     each: list[Any] = list(hands) if several else [hands]
@@ -674,7 +679,7 @@ def ranked_sequences(
 
 
 def changes_of_hand(sequence: str) -> int:
-    """Count the successive goals that are hit by different hands."""
+    """Count the pairs of successive goals that are hit by different hands."""
     return sum(a != b for a, b in itertools.pairwise(sequence))
 
 
@@ -690,7 +695,8 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
-    """Say why not all hand sequences can be tried on a task, or None if all can be."""
+    """Return a sentence on why not all hand sequences of a task can be tried; None if all can be.
+    ``hands`` is the number of hands."""
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
@@ -698,8 +704,8 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Return some hands of a task's robot, or all. Raises ValueError for hands that the robot does
-    not have."""
+    """Return ``hands`` as a tuple, for None all hands of the task's robot. Raises ValueError for
+    hands that the robot does not have."""
     if hands is None:
         return task.hands
     chosen = tuple(hands) if isinstance(hands, Iterable) else ()
@@ -732,7 +738,12 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """Search for the initial hands of a task, given as JSON; the same search is made once."""
+    """Return the best hand sequence that the task's ``initial_hands`` allows, each tried by the
+    corrective process alone, and the counts of the search; the last 64 searches are kept.
+
+    ``task_json`` is the task; ``hands`` are the hands that a sequence may have. Raises
+    NotApplicableError if no sequence completes the task, or there are too many.
+    """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)
     if task.initial_hands == "best-single-hand":

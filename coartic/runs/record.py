@@ -194,8 +194,8 @@ class Run:
         return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
 
     def movement_data(self, part: str) -> list[list[Any]]:
-        """Return the movements of a part as plain data (:func:`movement_data`); an empty list if
-        the run lacks the part."""
+        """Return the movements of a part (:data:`PARTS`), each as a list of goal, hand, kind, ticks
+        and path (:func:`movement_data`); an empty list if the run lacks the part."""
         return [movement_data(each) for each in self.scores.get(part, Score()).movements]
 
     def to_row(self) -> dict[str, Any]:
@@ -334,8 +334,8 @@ COLUMNS = tuple(
 
 
 def movement_data(movement: Movement) -> list[Any]:
-    """Return goal, hand, kind, ticks and path of a movement as plain data: the form in which
-    workers send, hashes count and folders store movements.
+    """Return a movement as a list of goal, hand, kind, ticks and path: the form in which workers
+    send, hashes count and folders store movements.
 
     The path is JSON: the target, or the waypoints of a movement of kind ``path``. Adding 0.0 drops
     the sign of -0.0. Raises TypeError, ValueError or AttributeError for a movement that has no such
@@ -352,8 +352,8 @@ def movement_data(movement: Movement) -> list[Any]:
 
 
 def movement_from(data: Sequence[Any]) -> Movement:
-    """Return a movement from its plain data (:func:`movement_data`). Raises TypeError, ValueError
-    or IndexError for other data."""
+    """Return a movement from the list that :func:`movement_data` returns. Raises TypeError,
+    ValueError or IndexError for other data."""
     goal, hand, kind, ticks, text = data
     place = None if text is None else real_array("a path", json.loads(text))
     if kind == "path" and place is not None:

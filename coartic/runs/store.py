@@ -176,7 +176,8 @@ class Store:
             self._db.execute("UPDATE suite SET plan_hash = ?", (self._plan_hash(),))
 
     def plan(self) -> list[Job]:
-        """Return the plan of the folder. Raises CoarticError if no plan is stored yet."""
+        """Return the plan of the folder, the jobs of its last suite. Raises CoarticError if no plan
+        is stored yet."""
         with explain_errors(self.folder):
             suite = self._one("SELECT * FROM suite")
             if suite is None:
@@ -366,7 +367,8 @@ class Store:
         return cell
 
     def _plan_hash(self) -> str:
-        """Return the hash of all that the plan says."""
+        """Return the hash of the folder's last suite: settings, command, date, environment,
+        cells."""
         return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:

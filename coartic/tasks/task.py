@@ -49,7 +49,8 @@ Point = tuple[Finite, Finite]
 
 
 def hands_of(letters: str) -> tuple[Hand, ...]:
-    """``"RL"`` as ``("right", "left")``; ValueError for any other letter."""
+    """Return the names of hands from their letters: ``("right", "left")`` for ``"RL"``. Raises
+    ValueError for any other letter."""
     try:
         return tuple(LETTERS[letter] for letter in letters)
     except (KeyError, TypeError):
@@ -60,7 +61,8 @@ def hands_of(letters: str) -> tuple[Hand, ...]:
 
 
 def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
-    """``("right", "left")`` as ``"RL"``, the paper's way of naming a hand sequence."""
+    """Return the letters of hands, the paper's name of a hand sequence: ``"RL"`` for
+    ``("right", "left")``."""
     return "".join(hand[0].upper() for hand in hands)
 
 
@@ -87,7 +89,8 @@ class Address(NamedTuple):
 
 
 def address_of(name: str) -> Address | None:
-    """The address that a task's name is, ``two-armed/v1/i017`` say; None for other names."""
+    """Parse a task's name, FAMILY/STREAM and NUMBER: ``two-armed/v1/i017`` is family
+    ``two-armed/v1``, stream ``i``, number 17. None for any other spelling."""
     parts = _ADDRESS.fullmatch(name)
     if parts is None:
         return None
@@ -186,7 +189,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """The family that it is an instance of, with its version; None where of none."""
+        """Family that has the task as an instance, with its version; None for other tasks."""
         address = address_of(self.name)
         return address and address.family
 
@@ -327,7 +330,7 @@ class Task(FileData):
 
 
 def check_hands(task: Task, hands: str) -> str:
-    """The hand sequence itself; ValueError where it does not fit the task."""
+    """Return the hand sequence. Raises ValueError if the sequence does not fit the task."""
     allowed = letters_of(sorted(task.hands))
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
     if not fits or not set(hands) <= set(allowed):
@@ -362,8 +365,8 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """How far short of where it would end, ``tolerance`` from the centre of a goal, the
-    corrective process must stay at least, length unit; not positive within reach."""
+    """Return how far the hand must stay at least from where the corrective process ends, at
+    ``tolerance`` from the centre of a goal, length unit; not positive within reach."""
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)
     dx = goal[0] - task.start.base[0] - arm.shoulder_x if "x" in task.locked_base else 0.0
@@ -391,7 +394,7 @@ def read_task(path: Path) -> Task:
 
 @cache
 def shipped_tasks() -> dict[str, Task]:
-    """The tasks that come with the package by name, in the paper's order."""
+    """Return the tasks that come with the package by name, in the paper's order."""
     return {task.name: task for task in map(read_task, sorted(TASK_FOLDER.glob("*.toml")))}
 
 
@@ -425,14 +428,15 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 
 
 def _all_keys() -> list[str]:
-    """All keys of a task file, whatever table they belong to."""
+    """Return all keys of a task file, whatever table they belong to."""
     robot = [field.name for field in fields(Robot)]
     others = (*Start.model_fields, *robot, *Provenance.model_fields)
     return [*Task.model_fields, *others]
 
 
 def task_text(task: Task) -> str:
-    """The task as the text of its file, from which :func:`coartic.load_task` gives it again."""
+    """Return the task as the text of its file, from which :func:`coartic.load_task` reads an equal
+    task."""
     content = task.model_dump(mode="json")
     tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
     if task.robot == Robot():
