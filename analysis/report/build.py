@@ -110,12 +110,13 @@ def _plots_of(study: Study, section: Section) -> list[Plot]:
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: finding, figures and tables.
 
-    Of settings and ablations only the ranking, the table of all methods and CSV files have rows.
+    Settings and ablations have rows in the ranking, in the table of contexts, whose verdicts are
+    counted in a sentence, in the table of all methods, and in CSV files.
     """
     tables = []
     for table in section.tables:
         frame = table(study)
-        if table.id not in ("ranking", "methods"):
+        if table.id not in ("ranking", "contexts", "methods"):
             frame = frame[~is_setting(frame)]
         if len(frame):
             settings = sum("setting" in names for names in classes_of(table, frame))

@@ -164,7 +164,7 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
 
     ``notes`` are below the table, with the meaning of a dagger in it.
     """
-    frame = frame if table.id == "methods" else frame[~is_setting(frame)]
+    frame = frame if table.id in ("contexts", "methods") else frame[~is_setting(frame)]
     columns = columns_of(table, frame)
     chosen = [c for want in IN_LATEX[table.id].split(", ") for c in columns if fnmatch(c, want)]
     cells = [[latex(text) for text in texts_of(table, frame, column)] for column in chosen]
