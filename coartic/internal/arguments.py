@@ -18,6 +18,7 @@ from coartic.internal.text import unknown
 
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
+_ARRAYS = {*get_args(getattr(ArrayLike, "__value__", ArrayLike))}
 _KINDS: dict[Any, Any] = {bool: bool | np.bool_, int: Integral, float: Real, str: str}
 _NEEDED = {"bool": "True or False", "int": "a whole number", "float": "a number", "str": "a text"}
 
@@ -77,9 +78,11 @@ def fits(name: str, value: Any, hint: Any) -> bool:
     Raises ValueError for a value that has a sentence of its own.
     """
     kind, parts = get_origin(hint) or hint, get_args(hint)
+    if hasattr(kind, "__value__"):  # an alias, as NumPy's types are from Python 3.12 on
+        return fits(name, value, kind.__value__)
     if kind in (Union, UnionType) and value is None:
         return type(None) in parts
-    if kind is np.ndarray or {*get_args(ArrayLike)} <= {*parts}:
+    if kind is np.ndarray or _ARRAYS.issubset(parts):
         return bool(real_array(name, value).ndim > 0 or kind is not np.ndarray)
     if kind in (Union, UnionType):
         return any(fits(name, value, each) for each in parts)
