@@ -15,6 +15,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import TypeAliasType
 
 import coartic
 from coartic import (
@@ -78,6 +80,7 @@ from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import SUITE_FOLDER
 from coartic.cli.arguments import value_in
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import RENAMED, did_you_mean
 from coartic.method import Information, Session, outline_of
 from coartic.motion.trial import reach_goals
@@ -604,6 +607,23 @@ def test_all_functions_are_called_wrongly():
 def test_what_was_taken_silently_or_badly_has_a_sentence(call, words):
     with pytest.raises((CoarticError, ValueError, TypeError), match=words):
         call()
+
+
+@pytest.mark.parametrize(
+    ("values", "words"), [("x", "needed are real numbers"), (MASKED, "masked")]
+)
+@pytest.mark.parametrize("hint", [ArrayLike, NDArray[np.float64]])
+def test_a_hint_by_an_alias_is_read(hint, values, words):
+    """From Python 3.12 on NumPy's hints of arrays are aliases; other hints are as before."""
+    namespace = {"alias": TypeAliasType("alias", hint)}
+    exec(
+        "def called(values: 'alias', text: 'alias | None' = None, more: 'dict' = {}): pass",
+        namespace,
+    )
+    call = checked_arguments(namespace["called"])
+    call([1.0], more={"a": 1})
+    with pytest.raises(CoarticError, match=words):
+        call(values)
 
 
 @pytest.mark.parametrize("field", ["goal", "hand", "kind", "target", "waypoints"])
