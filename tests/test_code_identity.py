@@ -137,11 +137,11 @@ for source in json.load(sys.stdin):
 @pytest.mark.parametrize("minor", range(11, 16))
 def test_every_version_of_python_reads_the_same_code(minor):
     sources = json.dumps([*SOURCES.values()])
-    for python in (found := pythons().get(minor, [])):
+    for python in (there := pythons().get(minor, [])):
         command = [python, "-I", "-W", "ignore", "-c", HASH, syntax.__file__]
         done = subprocess.run(command, input=sources, capture_output=True, text=True)
         assert done.stdout.split() == [*SOURCES], done.stderr
-    if not found:
+    if not there:
         pytest.skip(f"Python 3.{minor} is not installed")
 
 

@@ -110,8 +110,8 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     """Return the look of the lines and marks of each method, the same in all figures of a study;
     methods from files are bold."""
     rows = study.methods.loc[[*labels]]
-    own = ~rows.built_in.astype(bool)
-    return {label: style.look_of(rows.look[label], own[label]) for label in rows.index}
+    from_file = ~rows.built_in.astype(bool)
+    return {label: style.look_of(rows.look[label], from_file[label]) for label in rows.index}
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:

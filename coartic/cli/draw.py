@@ -81,9 +81,9 @@ def animate(
         )
     movements = []
     for run_id in (run,) if other is None else (run, other):
-        found = find_run(run_id, folder)
-        movement = trajectory_of(found)
-        title = f"{movement.task.label}\n{title_of(found.cell.method.name)}, run {found.number}"
+        stored = find_run(run_id, folder)
+        movement = trajectory_of(stored)
+        title = f"{movement.task.label}\n{title_of(stored.cell.method.name)}, run {stored.number}"
         movements.append((title, movement))
     if initial:
         on = movements[0][1].task

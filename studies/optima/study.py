@@ -25,20 +25,20 @@ def distances(folder):
     """Return the distance of each bound from the best known reward, per cent of it, by task, with
     the effort that a folder has on it."""
     entries = [entry for key, entry in shipped.read().items() if key[1:] == shipped.FREE]
-    known = pd.DataFrame(entries).set_index("task")[["hands", "reward", "bound"]]
-    known["distance"] = 100 * (known.bound - known.reward) / -known.reward
-    known["family"] = known.index.str.extract("(.*)/", expand=False)
+    bounds = pd.DataFrame(entries).set_index("task")[["hands", "reward", "bound"]]
+    bounds["distance"] = 100 * (bounds.bound - bounds.reward) / -bounds.reward
+    bounds["family"] = bounds.index.str.extract("(.*)/", expand=False)
     log = pd.DataFrame(shipped.read_log(folder), columns=["task", *EFFORT, "base", "other_arm"])
     log = log.query("base == 'task' and other_arm == 'free'")
     effort = log.groupby("task")[EFFORT].sum()
-    return known.assign(goals=known.pop("hands").str.len()).join(effort)
+    return bounds.assign(goals=bounds.pop("hands").str.len()).join(effort)
 
 
-def count(known):
+def count(bounds):
     """Return how many bounds are at each distance, and the effort on them: of the paper's tasks, of
     each family and number of goals, and of all families."""
-    drawn = known[known.family.notna()]
-    groups = {"the paper's tasks": known[known.family.isna()]}
+    drawn = bounds[bounds.family.notna()]
+    groups = {"the paper's tasks": bounds[bounds.family.isna()]}
     for (family, goals), group in drawn.groupby(["family", "goals"]):
         groups[f"{family}, {goals} goals"] = group
     groups["all families"] = drawn
@@ -55,8 +55,8 @@ def count(known):
 
 def tabulate(folder):
     """Return the tables: counts, and the tasks that are open."""
-    known = distances(folder)
-    return {"results": count(known), "open": known[~(known.distance <= 5)].drop(columns=EFFORT)}
+    bounds = distances(folder)
+    return {"results": count(bounds), "open": bounds[~(bounds.distance <= 5)].drop(columns=EFFORT)}
 
 
 @figures.styled

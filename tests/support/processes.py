@@ -73,14 +73,14 @@ def _say(answers, what, arguments):
 def pythons():
     """Pythons of this machine by their minor version: this one, and those on the path and of pyenv,
     but no shims, which need not start."""
-    found = {sys.version_info[1]: [Path(sys.executable)]}
+    by_minor = {sys.version_info[1]: [Path(sys.executable)]}
     places = map(Path, os.environ.get("PATH", "").split(os.pathsep))
     for place in (*places, *Path.home().glob(".pyenv/versions/*/bin")):
         for path in place.glob("python3.[0-9]*"):
             minor = path.name.removeprefix("python3.")
             if minor.isdigit() and "shims" not in path.parts:
-                found.setdefault(int(minor), []).append(path)
-    return found
+                by_minor.setdefault(int(minor), []).append(path)
+    return by_minor
 
 
 def program(path):
