@@ -5,13 +5,16 @@ criteria and the order of operations are those of the package ``cma`` 4.5 with i
 the points are the same to the last bit, which a test checks; but in generations of less than six
 points, as in one dimension, the package mirrors some. It takes four times as long, and most of a
 second to import. Where it begins to rescale the coordinates, at variances 1e8 apart or a condition
-number of 1e12, this strategy ends.
+number of 1e12, this strategy ends. Weights are added from left to right, as the package does up to
+Python 3.11; later versions round ``sum`` otherwise, and the points would depend on them.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from functools import reduce
+from operator import add
 
 import numpy as np
 from numpy import exp
@@ -28,6 +31,11 @@ _NOTED_EACH = 5  # generations: how often best and median are noted
 _MOST_NOTED = 20_000
 
 
+def _added(weights: list[float]) -> float:
+    """Add weights from left to right."""
+    return reduce(add, weights, 0.0)
+
+
 class EvolutionStrategy:
     """Evolution strategy: :meth:`ask` for points, :meth:`tell` their costs, until
     :meth:`has_ended`."""
@@ -38,28 +46,29 @@ class EvolutionStrategy:
         """Points in a generation, λ."""
         raw = [math.log((size + 1) / 2) - math.log(rank) for rank in range(1, size + 1)]
         self._parents = sum(weight > 0 for weight in raw)  # points that are recombined, μ
-        total = sum(raw[: self._parents])
+        total = _added(raw[: self._parents])
         positive = [weight / total for weight in raw[: self._parents]]
-        selected = 1 / sum(weight**2 for weight in positive)
+        selected = 1 / _added([weight**2 for weight in positive])
         c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + selected)
 
         def c_mu(mass: float) -> float:
             return min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))
 
         def scaled(weights: list[float], to: float) -> list[float]:
-            factor = abs(to / (sum(weights) or 1))
+            factor = abs(to / (_added(weights) or 1))
             return [weight * factor for weight in weights]
 
         # Negative weights make up for the positive ones, but cannot make a variance negative. They
         # are scaled twice, with a rate that differs in its last bit, as in the package.
         negative = [weight / total for weight in raw[self._parents :]]
-        negative = [weight / -sum(negative) for weight in negative]
+        negative = [weight / -_added(negative) for weight in negative]
         for mass in (0.25 + selected + 1 / selected - 2, 0.25 + selected - 2 + 1 / selected):
             rate = c_mu(mass)
             negative = scaled(negative, 1 + c_1 / rate)
-            rejected = sum(negative) ** 2 / (sum(weight**2 for weight in negative) or 1)
+            square = _added([weight**2 for weight in negative])
+            rejected = _added(negative) ** 2 / (square or 1)
             for most in ((1 - c_1 - rate) / rate / dim, 1 + 2 * rejected / (selected + 2)):
-                if sum(negative) < -most:
+                if _added(negative) < -most:
                     negative = scaled(negative, most)
         self._recombined = np.array(positive)  # weights of the best points, which sum to 1
         self._selected = selected  # variance effective selection mass, μ_eff

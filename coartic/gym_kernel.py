@@ -110,7 +110,7 @@ class VectorState(NamedTuple):
             at=batch.at,
             corrected=batch.corrected,
             moved=batch.moved,
-            accounts=empty_accounts(robot, SLOTS, 1).goals[:, 0],
+            accounts=empty_accounts(robot, SLOTS, 1).goals[:, 0, 0],
             indices=np.zeros(SLOTS, np.int64),
         )
 
@@ -167,11 +167,11 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
         )
     move(count, robot, batch)
     for i in range(count):
-        state.accounts[i].moved[0] = batch.runs[i].ticks
+        state.accounts[i].moved = batch.runs[i].ticks
     correct(count, robot, batch)
     for i in range(count):
         n, goal = state.indices[i], state.accounts[i]
-        account(batch.runs[i], goal)
+        account(batch.runs[i], goal.moved, goal)
         fill_row(state.q[n], goal.q)
         state.goal[n] += goal.hit
         state.rewards[n] = -goal.ticks if goal.hit else -FAILED

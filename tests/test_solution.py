@@ -17,6 +17,7 @@ from coartic import (
     movements_of,
 )
 from coartic.method import Information, Session
+from coartic.motion.trial import reach_kernel
 from coartic.runs.record import MOST_STEPS, execute_all
 from tests.support.strategies import make_trials, posture, tiny_task
 
@@ -35,6 +36,18 @@ def planned(*targets, hand="right"):
         Movement(number, hand, "planned", np.array(target, dtype=float))
         for number, target in enumerate(targets, 1)
     ]
+
+
+def test_one_kernel_makes_any_number_of_movements_to_a_goal():
+    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
+    plan = planned(posture(0.1), posture(0.2))
+    alone = execute(task, plan)
+    compiled = len(reach_kernel.dispatcher.signatures)
+    short = Movement(1, "right", "planned", posture(0.001))
+    several = execute(task, [short, short, *plan])
+    assert [movement.goal for movement in several.movements[:3]] == [1, 1, 1]
+    assert several.ticks > alone.ticks
+    assert len(reach_kernel.dispatcher.signatures) == compiled
 
 
 WAY = np.zeros((1, 10))

@@ -398,16 +398,16 @@ def make_trial(
                 aim(n, number, before, tables[n], explore, robot, learner, rng, workspace)
         move(runs, robot, batch)
         for n in range(runs):
-            trial[n, number].moved[0] = batch.runs[n].ticks
+            trial[n, number].moved = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
-                fill_row(trial[n, number].target[0], batch.runs[n].target)
+                fill_row(trial[n, number].target, batch.runs[n].target)
         if first or learner.pull == 0.0:
             correct(runs, robot, batch)
         else:
             find_pulled_corrections(runs, robot, batch)
             make_corrections(runs, robot, batch)
         for n in range(runs):
-            account(batch.runs[n], trial[n, number])
+            account(batch.runs[n], trial[n, number].moved, trial[n, number])
             count_goal(trial[n, number], counts[n])
 
 

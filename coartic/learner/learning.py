@@ -239,7 +239,7 @@ def _learn_together(
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
-    empty = np.zeros_like(empty_accounts(task.robot, runs, len(task.goals)).goals)
+    empty = np.zeros_like(empty_accounts(task.robot, runs, len(task.goals)).goals[..., 0])
     results = Results(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
@@ -261,7 +261,7 @@ def _learn_together(
     given = [[[Movement(1, "right", "learned")]] * len(task.goals)] * runs
 
     def movements(accounts: NDArray[np.void]) -> list[tuple[Movement, ...]]:
-        each = movements_in(accounts, dof, given)
+        each = movements_in(accounts[..., None], dof, given)
         completed = accounts["hit"][:, -1]
         return [tuple(some) if whole else () for some, whole in zip(each, completed, strict=True)]
 

@@ -276,20 +276,21 @@ def _make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execut
         np.array([m is None or m.kind != "corrective" for m in rows]).reshape(shape),
     ).goals
     made = movements_in(accounts, compiled.task.robot.dof, given)
-    return [_execution_of(compiled, *each) for each in zip(plans, made, accounts, strict=True)]
+    goals = accounts[..., 0]
+    return [_execution_of(compiled, *each) for each in zip(plans, made, goals, strict=True)]
 
 
 def movements_in(
     accounts: NDArray[np.void], dof: int, given: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
-    """Return the movements of N trials from the accounts of their goals, up to the first goal
-    missed.
+    """Return the movements of N trials from the accounts of their goals, shape ``(N, G, M)``, up to
+    the first goal missed.
 
     ``given`` has the movements to given targets, by trial and goal, as :func:`_with_targets`
     returns them; the movements returned have their kinds.
     """
-    names = ("hand", "hit", "ticks", "corrections", "moved")
-    columns = [accounts[name].tolist() for name in names]
+    names = ("hand", "hit", "ticks", "corrections")
+    columns = [accounts[name][..., 0].tolist() for name in names] + [accounts["moved"].tolist()]
     targets, trials = accounts["target"][..., :dof], []
     for n, of_trial in enumerate(given):
         movements: list[Movement] = []
@@ -302,12 +303,14 @@ def movements_in(
                     movements.append(Movement(goal, hand, movement.kind, target, moved[m]))
             if corrections:
                 ticks = total - sum(moved)
-                corrected = accounts["corrected"][n, g, :dof]
+                corrected = accounts["corrected"][n, g, 0, :dof]
                 movements.append(Movement(goal, hand, "corrective", corrected, ticks))
             if not hit:
                 break
             if len(movements) == before:  # hit on the way: show the hand
-                movements.append(Movement(goal, hand, "corrective", accounts["q"][n, g, :dof], 0))
+                movements.append(
+                    Movement(goal, hand, "corrective", accounts["q"][n, g, 0, :dof], 0)
+                )
         trials.append(movements)
     return trials
 

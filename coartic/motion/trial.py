@@ -74,14 +74,17 @@ TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 
 
 @cache
-def account_type(width: int, moves: int = 1) -> np.dtype[np.void]:
-    """Return the type of the account of a goal, with ``moves`` movements to targets and
-    configurations of ``width`` entries."""
+def account_type(width: int) -> np.dtype[np.void]:
+    """Return the type of the account of a goal, with configurations of ``width`` entries.
+
+    Where several movements to targets are given, each has a record: its ``target`` and ``moved``;
+    the first record has all else.
+    """
     fields = {
         "q": (np.float64, width),  # where the robot is in the end, length unit and rad
-        "target": (np.float64, (moves, width)),  # of each movement; as given where it is not made
+        "target": (np.float64, width),  # of the movement; as given where it is not made
         "corrected": (np.float64, width),  # target of the corrective movement, where one is made
-        "moved": (np.int64, moves),  # ticks of each movement to a target, 0 where it is not made
+        "moved": np.int64,  # ticks of the movement to the target, 0 where it is not made
         "hand": np.int64,
         "hit": np.bool_,
         "ticks": np.int64,  # of all movements
@@ -154,14 +157,12 @@ def make_corrections(count: int, robot: Any, batch: Any) -> None:
 
 
 @inlined
-def account(run: Any, goal: Any) -> None:
-    """Phase 5, *account*: write the result of a run into the account ``goal`` of its goal, which
-    has ``target`` and ``moved`` of the movements to targets already."""
+def account(run: Any, moved: int, goal: Any) -> None:
+    """Phase 5, *account*: write the result of a run, whose movements to targets took ``moved``
+    ticks, into the account ``goal`` of its goal."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
-    goal.ticks = run.ticks
-    for m in range(len(goal.moved)):
-        goal.ticks += goal.moved[m]
+    goal.ticks = moved + run.ticks
     goal.corrections, goal.iterations = run.converged, run.iterations
     goal.evaluations = run.evaluations
     if run.converged:
@@ -253,7 +254,7 @@ class Accounts(NamedTuple):
     """Accounts of N trials with G goals."""
 
     goals: NDArray[np.void]
-    """Accounts of the goals, shape ``(N, G)``: records (:func:`account_type`)."""
+    """Accounts of the goals, shape ``(N, G, M)``: records (:func:`account_type`)."""
     counts: NDArray[np.int64]
     """Counts of the trials, by :data:`COUNTED`, shape ``(N, 5)``."""
     rewards: NDArray[np.int64]
@@ -299,7 +300,7 @@ def _reach_lot(
         for m in range(arms.targets.shape[2]):
             for i in range(count):
                 n, run = first + i, batch.runs[i]
-                target, noted = arms.targets[n, g, m], goals[n, g].target[m]
+                target, noted = arms.targets[n, g, m], goals[n, g, m].target
                 if m > 0:
                     fill_row(run.target, run.q)
                     run.action = IDLE
@@ -313,12 +314,14 @@ def _reach_lot(
                     fill_row(noted, target)
             move(count, robot, batch)
             for i in range(count):
-                goals[first + i, g].moved[m] = batch.runs[i].ticks
+                goals[first + i, g, m].moved = batch.runs[i].ticks
         correct(count, robot, batch)
         for i in range(count):
-            n = first + i
-            account(batch.runs[i], goals[n, g])
-            count_goal(goals[n, g], counts[n])
+            n, moved = first + i, 0
+            for m in range(goals.shape[2]):
+                moved += goals[n, g, m].moved
+            account(batch.runs[i], moved, goals[n, g, 0])
+            count_goal(goals[n, g, 0], counts[n])
 
 
 @entry
@@ -346,7 +349,7 @@ _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
     """Return accounts of ``count`` trials to be filled in, whose counts are 0."""
     return Accounts(
-        np.empty((count, goals), account_type(width_of(robot), moves)),
+        np.empty((count, goals, moves), account_type(width_of(robot))),
         np.zeros((count, len(COUNTED)), dtype=np.int64),
         np.empty(count, dtype=np.int64),
     )
@@ -473,7 +476,7 @@ def reach_goals(
     )
     locked = tuple(locked_base)
     parameters = robot_parameters(robot, radius, locked_base=locked, model=model, checks=checks)
-    ended = reach(robot, arms, parameters).goals[:, 0]
+    ended = reach(robot, arms, parameters).goals[:, 0, 0]
     ended["corrected"][ended["corrections"] == 0] = np.nan
     figures = [ended[name][..., : robot.dof] if name in ("q", "corrected") else ended[name]
                for name in Reached._fields]  # fmt: skip
@@ -604,7 +607,7 @@ class Trials(NamedTuple):
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
     """Return the results of trials from their accounts."""
-    goals, counts, _ = accounts
+    goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
         reached[~goals["hit"]] = np.nan
@@ -614,7 +617,7 @@ def trials_of(accounts: Accounts, dof: int) -> Trials:
         corrections=counts[:, CORRECTIONS],
         iterations=counts[:, ITERATIONS],
         evaluations=counts[:, EVALUATIONS],
-        targets=goals["target"][:, :, 0, :dof],
+        targets=goals["target"][..., :dof],
         reached=reached,
     )
 
@@ -663,7 +666,9 @@ def ranked_sequences(
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets)
     trials = []
-    for hands, goals, counts in zip(sequences, *accounts[:2], strict=True):
+    for hands, goals, counts in zip(
+        sequences, accounts.goals[..., 0], accounts.counts, strict=True
+    ):
         spent = dict(zip(COUNTED, counts.tolist(), strict=True))
         # The place of the hand after each movement is known, as coartic.execute counts it.
         spent["forward_kinematics"] += int(goals["hit"].sum()) + spent["failed_trials"]
