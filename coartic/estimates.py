@@ -179,10 +179,10 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
         yield [rng.integers(size, size=(part.stop - part.start, size)) for size in sizes]
 
 
-@lru_cache(maxsize=8)  # most samples have as many values as another
-def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.int16]]]:
+@lru_cache(maxsize=3)  # most samples have as many values as another
+def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.int64]]]:
     """Return the places of :func:`drawn`, which are kept for further samples of these sizes."""
-    return [[each.astype(np.int16) for each in batch] for batch in drawn(sizes, resamples)]
+    return [*drawn(sizes, resamples)]
 
 
 @checked_arguments

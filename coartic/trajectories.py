@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import check_limits
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel
-from coartic.motion.movement import path_points
+from coartic.motion.movement import line_points, path_points
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.catalogue import TaskLike, as_task
@@ -198,14 +197,8 @@ def trajectory(
         assert ticks is not None
         if movement.waypoints is not None:
             points = path_points(task.robot, q, movement.waypoints, model)[:ticks]
-        else:  # summed and rounded as in the kernel
-            difference, square = target - q, 0.0
-            for value in difference.tolist():
-                square += value * value
-            distance = math.sqrt(square)
-            last, k = math.ceil(distance / model.step), np.arange(ticks)[:, None]
-            between = q + k * model.step / (distance or 1.0) * difference
-            points = np.where(k < last, between, target)
+        else:
+            points = line_points(q, target, model)[:ticks]
         if len(points):
             q = points[-1]
             rows.append(points)

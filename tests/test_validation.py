@@ -466,7 +466,6 @@ CALLS = (
         measures.other_arm, measures.ticks_slower)),
     (measures.isolated_reaches, {"task": TASK, "q": np.tile(TASK.q0, (3, 1)), "goals": [1, 2, 3],
                                  "hands": [1, 1, 1]}),
-    (measures.other, {"hand": "left"}),
     (two_contexts.movable, {"task": TASK, "hand": "right"}),
     (two_contexts.motor_equivalence, {"difference": np.ones(10),
                                       "jacobian": ROBOT.jacobian(TASK.q0, "right")}),

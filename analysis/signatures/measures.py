@@ -25,8 +25,7 @@ from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
 
 
-@checked_arguments
-def other(hand: Hand) -> Hand:
+def _other(hand: Hand) -> Hand:
     """Return the other hand."""
     return "right" if hand == "left" else "left"
 
@@ -87,7 +86,7 @@ def gain_at_next(runs: Solutions) -> Array:
     alone, there = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
     idle = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
     for number, hand in enumerate(HANDS):
-        idle[number, task.robot.joints(other(hand))] = True
+        idle[number, task.robot.joints(_other(hand))] = True
     hit = np.where(idle[hands[now]], there, runs.configurations[now])
     after, nearer = (
         isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
@@ -131,10 +130,10 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     own_last = dict.fromkeys(HANDS, task.q0)
     for row, hand in zip(held, hands, strict=True):
         own_last[hand] = row.copy()
-        joints = task.robot.joints(other(hand))
-        row[joints] = own_last[other(hand)][joints]
+        joints = task.robot.joints(_other(hand))
+        row[joints] = own_last[_other(hand)][joints]
     nearer = np.full(len(task.goals), np.nan)
-    for k, idle in enumerate(map(other, hands)):
+    for k, idle in enumerate(map(_other, hands)):
         if idle in hands[k:]:
             goal = task.goals[hands.index(idle, k)]
             reached, kept, initially = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -70,7 +71,14 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
                 "there. Move it away or choose another folder."
             )
         folder.mkdir(parents=True, exist_ok=True)
+        _check_rights(folder)
     return ours
+
+
+def _check_rights(folder: Path) -> None:
+    """Raises PermissionError where no file may be made in a folder."""
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def check_inside(folder: Path, path: Path) -> None:
@@ -97,11 +105,12 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raises CoarticError where a file may not be written: its name has no folder, is that of
-    a folder or a link, or, without ``replace``, is taken."""
+    """Raises CoarticError where a file may not be written: its name has no folder or one without
+    the right to write, is that of a folder or a link, or, without ``replace``, is taken."""
     with errors_in_words(path):
         if not path.parent.is_dir():
             raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
+        _check_rights(path.parent)
         if path.is_symlink() or (path.exists() and not path.is_file()):
             raise CoarticError(f"cannot write {path}: what is there is a link or no file")
         if path.exists() and not replace:

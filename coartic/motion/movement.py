@@ -603,6 +603,16 @@ def follow(
     return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
 
 
+def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
+    """Return the points of a straight movement, ``(n + 1, dof)``, as the kernels round them."""
+    difference, square = target - q, 0.0
+    for value in difference.tolist():
+        square += value * value
+    distance = math.sqrt(square)
+    k = np.arange(math.ceil(distance / model.step))[:, None]
+    return np.vstack([q + k * model.step / (distance or 1.0) * difference, target])
+
+
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
     """Return the points of a path, ``(n + 1, dof)``: its steps of length m and its end.
 
