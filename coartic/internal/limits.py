@@ -71,7 +71,7 @@ def refuse_entries(name: str, value: Any) -> None:
             if isinstance(each, bool):
                 raise ValueError(f"{name} has {each}; needed are real numbers")
             refuse_entries(name, each)
-    elif np.ma.is_masked(value):
+    elif isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise ValueError(f"{name} has masked entries; needed are numbers without a mask")
 
 

@@ -13,7 +13,6 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
@@ -405,11 +404,11 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
-        for name, kind in (("goal", Integral), ("hand", str), ("kind", str)):
+        for name, kind in (("goal", (int, np.integer)), ("hand", str), ("kind", str)):
             if not isinstance(value := getattr(movement, name), kind):
                 raise SolutionError(
                     f"task {task.name!r}: {name} of a movement is {brief_value(value)}; it must be "
-                    f"{'a whole number' if kind is Integral else 'a text'}"
+                    f"{'a text' if kind is str else 'a whole number'}"
                 )
         if not plan or plan[-1][0].goal != movement.goal:
             plan.append([])
@@ -431,11 +430,11 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
     """Return the movement, a path with its target. Raises SolutionError or ValueError if the
     movement lacks what its kind needs or leads to a configuration that the task does not allow."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
-    if not isinstance(movement.hand, str) or movement.hand not in task.hands:
+    if movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
         hand = brief_value(movement.hand).strip("'")
         raise SolutionError(f"the robot has no {hand} hand; it has {known}")
-    if not isinstance(kind, str) or kind not in KINDS:
+    if kind not in KINDS:
         raise SolutionError(f"unknown kind {brief_value(kind)}; known: {KINDS}")
     if kind == "path":
         if waypoints is None or not isinstance(waypoints, Iterable) or len([*waypoints]) == 0:
