@@ -142,9 +142,10 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> str:
     """Return a suite of random search, the control of signatures, where the study lacks it.
 
-    For each method that may select its solution by rewards (:func:`selects`) it has random search,
-    as many trials as the method's, with each hand sequence in a tenth or more of the method's
-    solved runs that has no control. Run it with the folder of the study included.
+    For each method that may select its solution by rewards (:func:`selects`), the suite has random
+    search with as many trials as the method and with each hand sequence that a tenth or more of the
+    method's solved runs have, unless the study has this random search. Write the suite to a file
+    and run it beside the results of the study: ``coartic run control.toml --include FOLDER``.
 
     Parameters
     ----------
@@ -166,7 +167,11 @@ def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> s
         for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
             if share >= LEAST_SHARE and not _control_of(study, task, label, str(hands)):
                 blocks[task, str(hands), trials] = None
-    lines = ['title = "Random search with the hands of learners"', f"runs = {runs}"]
+    lines = [
+        'title = "Random search with the hands of learners"',
+        'description = "The control of signatures where results lack it."',
+        f"runs = {runs}",
+    ]
     lines += [
         f'\n[[blocks]]\ntasks = ["{task}"]\nmethods = ["random-search"]\n'
         f'parameters = {{ hands = "{hands}", trials = {trials} }}'

@@ -47,10 +47,12 @@ class Finding:
 
     @property
     def opposite_p(self) -> float:
-        """Smallest p-value of the opposites times their number (Bonferroni); NaN without a test.
+        """Smallest p-value of the tests that can refute the claim, times the number of these tests
+        (Bonferroni), 1 at most; NaN without a test.
 
-        The other tail of a test by resampling counts the observed sample, too. Exact tests have
-        their opposites in ``against``.
+        These are the tests in ``against`` or, where that is None, the other tails of ``tests``. In
+        a test by resampling the observed sample counts in both tails. The other tail of an exact
+        test is not computed: exact tests need ``against``.
         """
         if self.against is not None:
             every = [test.p for test in self.against]

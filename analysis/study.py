@@ -53,7 +53,11 @@ UNITS = {
     **dict.fromkeys(["reward", "replay_reward", "initial_reward", "best_known"], "ticks"),
     "movement_ticks": "ticks",
     **dict.fromkeys(["build_s", "solve_s", "wall_s", "cpu_s", "time_limit_s"], "s"),
-    **{"gap": "share of the best known reward", "other_arm_travel": "rad", "process_peak_mb": "MB"},
+    **{
+        "gap": "share of the best known reward",
+        "other_arm_travel": "rad",
+        "process_peak_mb": "MiB",
+    },
 }
 """Units of columns of :attr:`Study.runs`, which its ``attrs`` have."""
 
@@ -429,7 +433,9 @@ class Study:
 
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
-        """Return a signature of the runs of a method on a task that have it, shape ``(n,)``."""
+        """Return a signature of the runs of a method on a task, shape ``(n,)``: of the first 500
+        solved runs, without those that lack the signature. ``name`` and ``replay`` are as in
+        :meth:`signature`."""
         values: Array = self._signature_of_each(name, task, method, replay=replay)
         return values[np.isfinite(values)]
 

@@ -166,8 +166,9 @@ def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Fl
 
 
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
-    """Return where a movement from ``q`` stops, after how many ticks, and whether this is a hit. A
-    movement of more ticks than are stored stops one tick after these."""
+    """Return where a movement from ``q`` stops, after how many ticks, and whether the hand is in
+    its goal there. ``task`` comes from :func:`stored_task`. A movement that would take more ticks
+    than are stored is cut: it takes one more than stored, and where it stops means nothing."""
     _, goal, hand, kind, most, corners = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
     points = path(q, corners, model, most) if on_path else line(q, corners[-1], model, most)

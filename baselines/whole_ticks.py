@@ -133,7 +133,14 @@ class Rounding:
         *,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """The shortest plan near another one, with these lengths and mergers."""
+        """Return the locally shortest plan from the configurations ``start``, shape ``(G, dof)``;
+        it may not have converged.
+
+        ``lengths``, shape ``(G,)``, are the lengths of the movements in joint space; NaN where a
+        length is free. Goals in ``merged`` (from 0) are hit without a movement. With ``deep``
+        (goals, from 0) the hands are as deep inside the discs of these goals as the lengths allow,
+        and the path is not made short. The session counts the solver's effort.
+        """
         instance = self._instance
         if merged:
             lengths, held = lengths.copy(), instance.held.copy()

@@ -128,8 +128,10 @@ _TAKEN_BY = {
 
 @checked_arguments
 def kind_of(name: str) -> str:
-    """Return the kind of a shipped suite or family, a file or a folder (:data:`_TAKEN_BY`); empty
-    for any other name."""
+    """Return the kind of what is named, a key of :data:`_TAKEN_BY`: of a shipped suite or family,
+    of a file ``.py`` (a method file, by its ending alone), of a file ``.toml`` (a suite, family or
+    task, by its keys) or of a results folder; empty for anything else. Raises CoarticError for a
+    ``.toml`` that cannot be read."""
     if name in suites():
         return "suite"
     if {name, f"{name}/v1"} & {*shipped_families()}:

@@ -181,7 +181,8 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
 
 @lru_cache(maxsize=3)  # most samples have as many values as another
 def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.int64]]]:
-    """Return the places of :func:`drawn`, which are kept for further samples of these sizes."""
+    """Return all batches of :func:`drawn`, an array of indices for each sample in each batch. They
+    are kept for further samples of these sizes: do not change them."""
     return [*drawn(sizes, resamples)]
 
 

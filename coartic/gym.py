@@ -271,9 +271,13 @@ class TaskVectorEnv(Recorded, VectorEnv):
     def step(
         self, actions: ArrayLike
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Reach for the next goal of each trial, and start again those that have ended; return
-        observations, rewards, which trials have ended, False for each (none is truncated) and
-        infos."""
+        """Let each robot reach for its next goal by its row of ``actions``, shape ``(N, A)``.
+
+        Returns observations, rewards, which trials have ended, False for each (none is truncated)
+        and infos. A trial that has ended starts again in this step: its observation is the first of
+        the next trial, and ``final_obs`` of the infos has its last. Raises ResetNeeded before the
+        first reset, and ValueError for actions of another shape or that are not finite.
+        """
         state = self.state
         if not state.going.all():
             raise ResetNeeded("no trial goes on: reset first")
@@ -582,8 +586,9 @@ def _options_of(env: Any) -> dict[str, Any]:
 
 
 def _without_wrappers(env: Any, name: str, known: Any = None) -> Any:
-    """The environment in wrappers of Gymnasium and of Stable-Baselines3. Raises TypeError for a
-    wrapper that is neither ``known`` nor added by these libraries themselves."""
+    """Return the environment inside its wrappers: those that Gymnasium and Stable-Baselines3 add by
+    themselves (:data:`ADDED`), and the wrapper ``known``, if given. Raises TypeError for any other
+    wrapper; the message calls the environment ``name``."""
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
         if env is not known and type(env).__name__ not in ADDED:
             raise TypeError(

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import tomllib
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -25,6 +24,7 @@ from coartic.analysis.signatures.two_contexts import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.benchmarks.planning import plan_suite
 from coartic.robot import HANDS
 from tests.support.made_up import runs_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED, changed, posture, tiny_task
@@ -356,7 +356,7 @@ def shifted(task, label, first, *, others=-20, shift=0.0, hands="RRR"):
     return Solutions(task, label, tuple(runs))
 
 
-def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs():
+def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_path):
     """Hands of fewer than a tenth of the runs are not compared."""
     task = load_task("two-armed-2")
     learned = [shifted(task, EC4, 5, hands="RRRR"), shifted(task, EC4, 9, hands="RLRR"),
@@ -384,11 +384,11 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs():
     test = bootstrap_test([5.0] * 18, [2.0, 3.0, 400.0])
     assert (table["first"], table.first_control, table.first_p) == (5, 135, test.p)
     assert (table.runs, table.control_runs) == (18, 3)
-    suite = tomllib.loads(control.control_suite(study))
-    assert suite["blocks"] == [
-        {"tasks": [task.name], "methods": ["random-search"],
-         "parameters": {"hands": "RLRR", "trials": 10}}
-    ]  # fmt: skip
+    (tmp_path / "control.toml").write_text(control.control_suite(study), "utf-8")
+    (job,) = plan_suite(tmp_path / "control.toml")
+    assert (job.cell.task.name, job.cell.method.name) == (task.name, "random-search")
+    assert len(job.numbers) == 20
+    assert (job.cell.parameters["hands"], job.cell.parameters["trials"]) == ("RLRR", 10)
 
 
 def test_p_of_shared_goals_is_corrected_by_method():

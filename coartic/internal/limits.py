@@ -43,8 +43,9 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Numbers as an array of the shape that they have. Raises ValueError for anything else, and
-    for masked entries, under which an array holds numbers that do not count."""
+    """Return real numbers as an array of the shape that they have; NaN and infinity pass. An array
+    of float64 is returned itself, not as a copy. Raises ValueError, which names ``name``, for
+    anything else: text, complex numbers, True and False, rows of unequal length, masked entries."""
     import numpy as np  # which the command line's help does without
 
     refuse_entries(name, value)

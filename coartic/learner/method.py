@@ -79,7 +79,9 @@ class DualProcess(Method):
         return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
-        """Learn; the solution is the best trial's, or the replay's if that is learned."""
+        """Learn; the solution is that of the best trial or, where the condition has
+        ``learned="replay"``, that of the replay, the noiseless trial after learning. Raises
+        MethodError if there is none."""
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
             raise result

@@ -246,10 +246,11 @@ def _has_path(plan: Plan) -> bool:
 
 
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return the movements to a goal before the first without a target, as the kernel takes them.
+    """Return the movements to a goal up to the first one without a target, as the kernel takes
+    them.
 
-    **A** finds the target of that movement. None comes first if no movement is made at once: the
-    hand may be in the goal already.
+    **A** finds the target of that one; movements after it are not made. None comes first where the
+    first movement is corrective: the kernel then checks whether the hand is in the goal already.
     """
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:

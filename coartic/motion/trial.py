@@ -347,7 +347,8 @@ _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 
 
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
-    """Return accounts of ``count`` trials to be filled in, whose counts are 0."""
+    """Return accounts of ``count`` trials with so many goals, and so many movements to targets for
+    each goal. The counts of the trials are 0; all else is to be filled in."""
     return Accounts(
         np.empty((count, goals, moves), account_type(width_of(robot))),
         np.zeros((count, len(COUNTED)), dtype=np.int64),

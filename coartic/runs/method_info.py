@@ -82,8 +82,9 @@ class MethodInfo:
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """Return ``quick``, the parameters for a check, and ``config``, which says if unknown
-        parameters are refused (``extra``) and if parameters cannot be changed (``frozen``)."""
+        """Return ``quick``, parameters with which a check takes seconds, and ``config``, from
+        Pydantic: ``extra`` is ``"forbid"`` if unknown parameters are refused, ``frozen`` is True if
+        parameters cannot be changed."""
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:

@@ -184,9 +184,11 @@ class Family(FileData):
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
-    """The task drawn for an instance at the given attempt, from 0, before any rule has seen it.
+    """Return the task drawn for an instance at the given attempt, from 0, before any rule is
+    checked; equal arguments give equal tasks.
 
-    It may be out of reach. Its initial hands are the family's policy.
+    Its goals may be out of reach. Its ``initial_hands`` is the name of the family's policy, not yet
+    a hand sequence.
     """
     key = hash_key(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)

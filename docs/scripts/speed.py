@@ -25,16 +25,13 @@ import plain_loop
 
 from coartic import CONDITIONS, Objective, Task, execute, learn_many, load_task
 from coartic.baselines.cma_es import CMAES
-from coartic.baselines.hill_climbing import HillClimbing
-from coartic.baselines.random_search import RandomSearch
 from coartic.benchmarks.planning import plan_suite
 from coartic.gym import TaskEnv, TaskVectorEnv
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
-from coartic.method import Method, Session
+from coartic.method import Session
 from coartic.model import PAPER
-from coartic.motion.batch import SLOTS, batch_for, place
-from coartic.motion.compile import entry
+from coartic.motion.batch import SLOTS, batch_for
 from coartic.motion.solution import movements_of
 from coartic.motion.trial import (
     ALL_STOP,
@@ -56,12 +53,11 @@ def main(*, is_long: bool = False) -> None:
         task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, SLOTS))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
-    show_methods()
     show_commands(is_long=is_long)
 
 
 PAGE = Path(__file__).parents[1] / "how-fast.md"
-INTERNAL = ("the empty call", "kernel, one by one", "kernel, 1000 at once", "kinematics alone")
+INTERNAL = ("kernel, one by one", "kernel, 1000 at once")
 """Ways that the page leaves out."""
 HEAD = """\
 # How fast
@@ -79,13 +75,6 @@ the goal, as this package does.
 """
 
 
-@entry
-def kinematics(count: int, repeats: int, batch: Any) -> None:
-    """Compute the forward kinematics of the first slots again and again."""
-    for _ in range(repeats):
-        place(batch.at[0], count, True)
-
-
 def write_page(columns: list[dict[str, float]], tasks: tuple[str, ...]) -> None:
     """Write the page: microseconds by way and task."""
     text = HEAD.format(heads=" | ".join(tasks), rules=" | ".join(["---:"] * len(tasks)))
@@ -96,8 +85,7 @@ def write_page(columns: list[dict[str, float]], tasks: tuple[str, ...]) -> None:
 
 
 def show_ways() -> None:
-    """Print what a trial costs through each public way, and what a call of the kernel costs that
-    makes none; write the page."""
+    """Print what a trial costs through each public way, and write the page."""
     tasks = ("ascending", "two-armed-1")
     medians: list[dict[str, float]] = [{} for _ in tasks]
     columns = [ways(load_task(name)) for name in tasks]
@@ -136,13 +124,12 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
         accounts = empty_accounts(task.robot, len(targets), len(task.goals))
         return compiled.parameters, *accounts, *arms, *batch_for(task.robot)
 
-    none, together, *alone = map(arguments, (targets[:0], targets, *targets[:100, None]))
+    together, *alone = map(arguments, (targets, *targets[:100, None]))
     plain = plain_loop.arguments(task, hands)
     reference = session.trials(hands, targets)
     assert (plain_loop.trials(task.q0, targets, *plain) == reference.ticks).all()
     in_c = plain_loop.trials_in_c(task, hands, targets)
     assert all((make() == reference.ticks).all() for make in in_c.values())
-    evaluations, batch = int(reference.evaluations.sum()), batch_for(task.robot)
     env, many = TaskEnv(task), TaskVectorEnv(1000, task)
     shape = (len(best), *many.action_space.shape)
     actions = np.random.default_rng(0).uniform(-0.1, 0.1, shape)
@@ -156,14 +143,12 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     return {
         "plain loop": (1000, lambda: plain_loop.trials(task.q0, targets, *plain)),
         **{way: (1000, make) for way, make in in_c.items()},
-        "the empty call": (100, lambda: [reach_kernel(*none) for _ in range(100)]),
         "kernel, one by one": (100, lambda: [reach_kernel(*each) for each in alone]),
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
         "Session.trial, one by one": (100, lambda: [session.trial(each) for each in solutions]),
         "execute, one by one": (100, lambda: [execute(task, each) for each in solutions]),
         "environment, one by one": (25, lambda: [episode() for _ in range(25)]),
         "kernel, 1000 at once": (1000, lambda: reach_kernel(*together)),
-        "kinematics alone": (1000, lambda: kinematics(SLOTS, evaluations // SLOTS, batch)),
         "Session.trials, 10,000 at once": (
             10_000,
             lambda: session.trials(hands, np.tile(targets, (10, 1, 1))),
@@ -188,25 +173,6 @@ def _us_a_trial(task: Task, condition: str, runs: int) -> float:
     clock = time.thread_time()
     learn_many(task, CONDITIONS[condition], seeds=range(runs), jobs=1)
     return (time.thread_time() - clock) / runs / TRIALS * 1e6
-
-
-def show_methods() -> None:
-    """Print what a trial of methods that the learner is compared with costs, all but the kernel
-    included."""
-    tasks = ("ascending", "two-armed-1")
-    print(f"{'method':32}{tasks[0]:>12}{tasks[1]:>12}   microseconds of a core a trial")
-    for method in (CMAES, HillClimbing, RandomSearch):
-        costs = [_us_of(method, load_task(name)) for name in tasks]
-        print(f"{method.name:32}" + "".join(f"{us:12.1f}" for us in costs), flush=True)
-
-
-def _us_of(method: type[Method], task: Task) -> float:
-    parameters: Any = method.Parameters
-    for trials in (500, TRIALS):  # the first time libraries are imported
-        session = Session(task, 0, method.information, trusted=True)
-        clock = time.thread_time()
-        method(parameters(trials=trials)).solve(session)
-    return (time.thread_time() - clock) / TRIALS * 1e6
 
 
 TINY = """
