@@ -183,7 +183,7 @@ def _against_gain(study: Study) -> pd.DataFrame:
     "Coarticulation against gain",
     "Signatures of coarticulation of each method against its gain over the corrective process "
     "alone with its best hands: means over tasks (the idle hand: with two arms) of means over "
-    "runs. A line joins numbers of trials of one method.",
+    "runs. Where a method ran with several numbers of trials, a line joins them.",
 )
 def draw_coarticulation(study: Study) -> Parts | None:
     """Draw signatures against gain, a point for each method."""
