@@ -367,9 +367,10 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     The numbers are the best reward, then for each trial by how much it is worse, plus 1; 0 stands
     for None. All lowest bytes of the numbers come first, then all next bytes: so they pack best.
     """
-    best = max((reward for reward in rewards if reward is not None), default=0)
-    numbers = [best, *(0 if reward is None else best - reward + 1 for reward in rewards)]
-    return np.array(numbers).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
+    values = np.array(rewards, np.float64)  # None becomes NaN
+    best = 0.0 if np.isnan(values).all() else np.nanmax(values)
+    numbers = np.append(best, np.where(np.isnan(values), 0.0, best - values + 1.0))
+    return numbers.astype(np.int64).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
 
 
 def rewards_from(content: bytes) -> Array:
