@@ -179,7 +179,7 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
         yield [rng.integers(size, size=(part.stop - part.start, size)) for size in sizes]
 
 
-@lru_cache(maxsize=3)  # most samples have as many values as another
+@lru_cache(maxsize=8)  # most samples have as many values as another
 def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.int64]]]:
     """Return all batches of :func:`drawn`, an array of indices for each sample in each batch. They
     are kept for further samples of these sizes: do not change them."""
