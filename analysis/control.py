@@ -30,7 +30,7 @@ from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
 
 LEAST_SHARE = 0.1
-"""Share of a method's runs that a hand sequence has at least where it is compared."""
+"""Least share of a method's runs on a task that a compared hand sequence has."""
 
 
 @checked_arguments
@@ -81,8 +81,8 @@ def _control_of(study: Study, task: str, label: str, hands: str) -> str:
 
 @cached
 def _controls(study: Study, task: str) -> dict[tuple[str, float], str]:
-    """Return the labels of random search on a task by the hands of its runs, empty for random
-    search with every hand sequence, and the number of its trials."""
+    """Return the labels of random search on a task by the hand sequence of all its runs (empty for
+    random search with every hand sequence) and the number of its trials."""
     labels = dict[tuple[str, float], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
@@ -101,8 +101,9 @@ def _most_trials(study: Study, task: str, label: str) -> float:
 
 @checked_arguments
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
-    """Return the excess of a method's signature over random search on a task: the mean over the
-    runs of the method with whose hands random search has runs; NaN without any."""
+    """Return by how much a method's signature exceeds the mean signature of random search with the
+    same hands (:func:`with_control`), a mean over the method's runs that have this control; NaN
+    without any."""
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
     return float(np.concatenate(excess).mean()) if excess else math.nan
@@ -116,10 +117,11 @@ def selects(study: Study, label: str) -> bool:
 
 @checked_arguments
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """Return all runs of random search, as many trials as the method's, that hit the same goal in
-    the same two contexts; None for a method that selects nothing, and without such runs.
+    """Return all runs of random search that hit the goal of ``contexts`` with the same hand in the
+    same two contexts; None for a method that selects nothing, and without such runs.
 
-    On both tasks the hands are those with which the most runs of the method end.
+    Random search makes as many trials as the method, with the commonest hand sequence of the
+    method's runs on each task.
     """
     if not selects(study, contexts.method):
         return None

@@ -44,11 +44,12 @@ def checked(
     names: Sequence[str] = (),
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Return columns of a user's frame, with ``numbers`` as float64 and NaN for missing numbers.
+    """Return a copy of columns of a user's frame: ``numbers`` as float64 with NaN for missing
+    numbers, ``names`` and ``others`` as they are.
 
-    The index loses its names, which could be those of columns. Raises CoarticError for an object
-    that is no frame, a missing column, a column that is there twice, no rows, a missing name, and
-    for ``numbers`` that are text or infinite.
+    The index loses its names, which could be names of columns. Raises CoarticError for an object
+    that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
+    that is missing or a list, and for ``numbers`` that are text or infinite.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
@@ -84,9 +85,10 @@ def inline(name: object) -> str:
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return the columns that an argument names, also a single one by a text.
+    """Return the names of columns that an argument has; a text is one name.
 
-    Raises CoarticError for an argument that is no list of columns, or names one twice.
+    Raises CoarticError, with ``what`` as the name of the argument, for an argument that is no list
+    of columns, or names a column twice.
     """
     if isinstance(names, str):
         return [names]
@@ -99,7 +101,8 @@ def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
 
 
 def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
-    """Raise CoarticError for the first wrong row, with its value and the value needed."""
+    """Raise CoarticError for the first row that is True in ``wrong``, with its value in ``column``
+    and the words ``needed``."""
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
         raise CoarticError(
@@ -134,9 +137,10 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Return a user's frame of methods on tasks, checked, with the ``gap`` of each row, and its
     ``share`` where the frame has ``corrective_best``.
 
-    ``method`` includes the setting if a method of the frame has several settings; ``task`` is a
-    number. ``more``: other columns of numbers. Raises CoarticError as :func:`checked` and
-    :func:`_with_gaps` do, and for a task with several best known rewards.
+    ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
+    number of the task, from 0, in the order of names. ``more``: names of other columns of numbers
+    to keep. Raises CoarticError as :func:`checked` and :func:`_with_gaps` do, and for a task with
+    several best known rewards.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
@@ -168,8 +172,8 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     Returns
     -------
     Series
-        (best known - reward) / \\|best known\\| of each row: 0.01 is 1 % more ticks than the best
-        known reward; NaN if one of them is NaN.
+        (best known - reward) / \\|best known\\| by the frame's index: 0.01 is 1 % more ticks than
+        the best known reward; NaN if one of the two is NaN.
 
     Raises
     ------
@@ -187,7 +191,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
 
 
 def shares(frame: pd.DataFrame) -> pd.Series:
-    """Share of the possible gain of each run: 0 is the corrective process, 1 the best known.
+    """Return each run's share of the possible gain: 0 is the corrective process, 1 the best known.
 
     Parameters
     ----------

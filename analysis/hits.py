@@ -18,7 +18,7 @@ from coartic.internal.text import counted, foreign_file
 from coartic.motion.movement import LARGEST_ENTRY
 
 LARGEST_ANGLE = 20.0
-"""Angle, rad, beyond which a recorded angle is taken for degrees."""
+"""Largest angle, rad; a larger one is taken for degrees and refused."""
 AMBIGUOUS = 2.5
 """Turn of a joint between hits, rad, from which its direction is in doubt if angles are wrapped."""
 MOST_TRIALS = 100_000
@@ -30,25 +30,27 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     """Read recorded trials: a CSV file with a row for each hit.
 
     Blank lines, lines that begin with ``#``, and commas at the end of a line do not count. Angles
-    that jump by a turn between hits are unwrapped from hit to hit, from the start of the task on,
-    with a warning.
+    that jump by a turn (2π) between hits are unwrapped from hit to hit, from the start of the task
+    on, with a warning. They stay, also with a warning, if most hits are far from their goals.
 
     Parameters
     ----------
     path : str or pathlib.Path
         The file, with columns ``subject``, ``trial`` and ``goal`` (both from 1), ``hand`` (left or
         right), ``ticks`` or ``duration``, and one for each entry of ``task.robot.joint_names``
-        (length unit and rad). Rows of trials and goals may be missing, and so may columns of an arm
-        that is not among ``task.hands`` and of a locked base: they are as at the start.
+        (length unit and rad). ``ticks`` and ``duration`` count from the hit before. Rows of trials
+        and goals may be missing, and so may columns of an arm that is not among ``task.hands`` and
+        of a locked base: their values are then those at the start.
     task : Task
         The task that was practised.
     ticks_per_unit : float
-        Ticks in a unit of ``duration``.
+        Ticks in a unit of ``duration``, such as 100 for seconds.
 
     Returns
     -------
     DataFrame
-        The rows, with ``ticks``, in the order of subjects, trials and goals.
+        The rows by subject (in the order of the file), trial and goal, with ``ticks`` in place of
+        ``duration`` and all joints.
 
     Raises
     ------
@@ -65,8 +67,8 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
 
 
 def _read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]]:
-    """Return headings, rows of as many fields, and their numbers of lines. Raises CoarticError for
-    what is no table of text separated by commas."""
+    """Return headings, rows of as many texts, and the number of the line of each row, from 1.
+    Raises CoarticError for a file that is no table of text separated by commas."""
     try:
         content = Path(path).read_bytes()
         text = content.decode("utf-8-sig")
@@ -108,10 +110,10 @@ def _read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]
 def checked_hits(
     frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]
 ) -> pd.DataFrame:
-    """Return recorded hits, checked and unwrapped, in the order of subjects, trials and goals.
+    """Return a new frame of recorded hits as :func:`read_hits` returns it, checked and unwrapped.
 
-    ``source`` and the ``names`` of its rows are for messages. Raises CoarticError as
-    :func:`read_hits` does.
+    ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
+    Raises CoarticError as :func:`read_hits` does.
     """
     joints = [*task.robot.joint_names]
     free = {f"base_{axis}" for axis in "xy" if axis not in task.locked_base}
@@ -172,7 +174,7 @@ def checked_hits(
 
 
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
-    """Unwrap the angles of sorted hits from hit to hit, each trial from the start of the task on.
+    """Unwrap the angles of sorted hits in place, hit by hit, each trial from the task's start on.
 
     Warns if angles change. Raises CoarticError if the joint of a subject is wrapped and turns by
     more than :data:`AMBIGUOUS` between hits: then its direction is in doubt.
@@ -210,8 +212,8 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
 
 
 def hint(frame: pd.DataFrame, task: Task, source: str) -> bool:
-    """Warn of ticks that rise from goal to goal, and of hits far from their goals, whose angles are
-    not to be believed: then return True."""
+    """Warn if ticks rise from goal to goal in every trial, and if the hand is more than two radii
+    from its goal in the median hit. Return True for the second: such angles are not unwrapped."""
     off = np.zeros(len(frame))
     for hand in task.hands:
         rows = (frame.hand == hand).to_numpy()

@@ -39,20 +39,19 @@ class Finding:
     """True if the runs show the claim; None if the runs are too few."""
     evidence: str
     tests: tuple[Estimate, ...] = ()
-    """Tests of the claim, signed so that a positive estimate is as claimed."""
+    """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
     against: tuple[Estimate, ...] | None = None
-    """Tests of the opposite, any of them enough to refute; None: the other tails of ``tests``."""
+    """Tests of the claim's opposite, one of which refutes it; None: other tails of ``tests``."""
     without: tuple[Estimate, ...] = ()
-    """Tests over tasks, each without the task that favours the claim most."""
+    """Tests of the claim over tasks, each without the task that favours the claim most."""
 
     @property
     def opposite_p(self) -> float:
         """Smallest p-value of the tests that can refute the claim, times the number of these tests
         (Bonferroni), 1 at most; NaN without a test.
 
-        These are the tests in ``against`` or, where that is None, the other tails of ``tests``. In
-        a test by resampling the observed sample counts in both tails. The other tail of an exact
-        test is not computed: exact tests need ``against``.
+        The tests in ``against`` or, if it is None, the other tails of ``tests``, which is right for
+        tests by resampling alone: exact tests need ``against``.
         """
         if self.against is not None:
             every = [test.p for test in self.against]
@@ -62,7 +61,9 @@ class Finding:
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
 
     def verdict(self, p: float, opposite_p: float) -> Verdict:
-        """Return the verdict for p-values of the claim and its opposite, corrected or not."""
+        """Return ``supported``, ``not supported`` or ``undecided`` by p-values of the claim and of
+        its opposite, corrected or not. With NaN for ``p``, as of an exact count, a claim that holds
+        is supported."""
         untested = any(math.isnan(test.p) and min(test.n) < 2 for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -81,7 +82,8 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
 
 
 def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
-    """Test that a mean over tasks exceeds a bound, with all values and without the largest."""
+    """Test that the mean of values, one for each task, exceeds a bound: with all values, and
+    without the largest value."""
     every = np.asarray(values, dtype=np.float64)
     return (
         bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
@@ -147,8 +149,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Holds if all findings hold, with the tests of all, and with their opposites if all findings
-        have opposites. If the runs are too few for one of the findings, this finding.
+        Holds if all findings hold. It has the tests of all, and the tests in ``against`` of all, or
+        None if a finding has None. The first finding whose runs are too few, if there is one.
 
     Raises
     ------
@@ -183,8 +185,8 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     Parameters
     ----------
     claims : mapping of str to (str, str, Finding)
-        Statement, test in words and finding of each claim, by its id. A claim that cannot be
-        tested counts in the correction all the same.
+        Statement, test in words and finding of each claim, by the claim's id. A claim without a
+        p-value counts in the correction all the same.
 
     Returns
     -------

@@ -37,7 +37,8 @@ OWN_COLOR = "brown"
 
 
 def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
-    """Return a row for each method of some runs, in the order of lists and figures.
+    """Return a row for each method with its setting, and for each pair of conditions of the learner
+    on tasks for one arm and for two, in the order of lists and figures.
 
     Parameters
     ----------
@@ -99,10 +100,12 @@ def _group_of(runs: pd.DataFrame) -> str:
 
 
 def _joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the label of the learner over one-armed and two-armed tasks together, with the methods
-    that it joins: EC1, and on tasks for two arms a condition that draws hands at random.
+    """Yield the label of each row of the learner over one-armed and two-armed tasks together, with
+    the ids of the two methods that the row joins: EC1, and on tasks for two arms a condition that
+    draws hands at random; or both informed learners.
 
-    ``tasks`` has the tasks on which each method ran.
+    ``tasks``: names of the tasks on which each method ran, by label. A row needs tasks of its
+    second method, and tasks of its first on which the second did not run.
     """
     drawing = [x for x in LEARNERS if CONDITIONS[CONDITION_OF[x]].hand_exploration == "random"]
     for one, two in (*((EC1, label) for label in drawing), INFORMED_LEARNERS):
@@ -112,13 +115,15 @@ def _joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple
 
 
 def joined_label(one: str, two: str) -> str:
-    """Return the label of the learner with method ``one`` for one arm and ``two`` for two arms."""
+    """Return the label of the learner with method ``one`` (an id) for one arm and ``two`` for two
+    arms, ``dual-process (EC1, EC4)``."""
     return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
 
 
 def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
-    """Return the runs of each method, and of the learner over tasks for one arm and for two
-    (:func:`_joined_learners`)."""
+    """Return the runs of each method by label, and those of the learner over tasks for one arm and
+    for two by :func:`joined_label`: all runs of its second method, and the runs of its first method
+    on tasks on which the second did not run."""
     tasks = {method: {*runs.task} for method, runs in by_method.items()}
     joined = {
         label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
@@ -128,9 +133,8 @@ def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.Dat
 
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield colour and dash of each method: its own, brown for methods from files, else the next
-    that is unused.
-    """
+    """Yield the label of each row with the names of its colour and dash: those in its ``look``; or
+    for the first methods from files brown; or the next pair that no ``look`` has."""
     fixed = {row["look"] for row in rows.values()}
     free = itertools.cycle((c, d) for d in DASHES for c in COLORS if (c, d) not in fixed)
     theirs = itertools.chain(((OWN_COLOR, dash) for dash in DASHES), free)
@@ -140,11 +144,11 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def headline_methods(rows: pd.DataFrame) -> list[str]:
-    """Return the methods that stand for their algorithms, of some rows of
-    :attr:`.Study.methods`; all if none does.
+    """Return the labels of the methods that represent their algorithms, of some rows of
+    :attr:`.Study.methods`; all labels if no method does.
 
-    The learner over all tasks, with the condition that explores most, takes the place of its
-    single conditions.
+    A row that joins conditions of the learner takes the place of the single conditions; of several
+    such rows only the last counts, with the condition that explores most.
     """
     kept = rows[rows.headline]
     joined = kept[kept.parts.map(len) > 1].groupby("algorithm").tail(1)

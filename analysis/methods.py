@@ -17,7 +17,7 @@ from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, ME
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
 """Exploration conditions and ablations of the learner by the id of the method."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
-"""Ids of the learner under the paper's conditions, EC1 for one arm; later ones explore more."""
+"""Ids of the learner under EC1 (for one arm) to EC4, which explore more and more."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two."""
 RANDOM_SEARCH = "random-search"
@@ -25,7 +25,7 @@ RANDOM_SEARCH = "random-search"
 
 
 class _KnownMethod(NamedTuple):
-    """A built-in method's row; ``methods.toml`` explains the fields."""
+    """Facts about a built-in method; ``methods.toml`` explains the fields."""
 
     name: str
     algorithm: str
@@ -60,11 +60,8 @@ def most_exploring(task: Task) -> str:
 
 
 def title_of(method: str, setting: str = "") -> str:
-    """Return the name of a method with its setting, the same wherever it is shown.
-
-    ``learner EC4``, ``hill climbing``, ``CMA-ES (other arm still)``; a method from a file goes by
-    its id.
-    """
+    """Return the name of a method, given by id, with its setting in words: ``learner EC4``, ``hill
+    climbing``, ``CMA-ES (other arm still)``. The name of a method from a file is its id."""
     name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else one_line(method)
     return f"{name} ({_setting_in_words(setting)})" if setting else name
 

@@ -24,9 +24,9 @@ class BestKnown(KnownOptimum):
 
     source: str = "shipped"
     """``shipped`` if no run of the folder exceeds a shipped reward, or else the label of the method
-    with the best run."""
+    with the best run, or ``corrective process alone``."""
     run_id: str = ""
-    """Id of the best run; empty if the reward is shipped."""
+    """Id of the best run; empty if the source is no run."""
     only_here: bool = False
     """True if no reward is shipped and no search for the optimum has a solution."""
 
@@ -77,7 +77,8 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 
 @checked_arguments
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the parameters ``base`` and ``other_arm`` of each run, which restrict movements."""
+    """Return the parameters ``base`` and ``other_arm``, which restrict movements, of each run, as
+    columns; the default for methods without such a parameter."""
     default = {"base": BASE, "other_arm": "free"}
     asked = {text: default | json.loads(text) for text in runs.parameters.unique()}
     return pd.DataFrame(

@@ -28,13 +28,18 @@ def write_study(
     Parameters
     ----------
     folder : str or pathlib.Path
-        The study's folder. Its ``README.md.jinja`` is filled in from all CSV files of the folder,
-        each a table of the file's name, as :func:`fill_page` says.
+        The study's folder, with a template ``README.md.jinja``. :func:`fill_page` makes the page
+        ``README.md`` from it and all CSV files of the folder, each a table named like its file.
     tables : dict
-        Tables by name; ``results.csv`` is made of ``{"results": ...}``. Without any, the tables
-        that are there stay.
+        Tables by name; table ``results`` becomes ``results.csv``. Other CSV files of the folder
+        stay as they are.
     draw : callable
         Draws table ``results``, as it is read from its file, as ``figure.svg``.
+
+    Raises
+    ------
+    CoarticError
+        The folder has no template, or no ``results.csv`` and no table ``results`` for it.
 
     Examples
     --------
@@ -61,7 +66,7 @@ def write_study(
 
 @checked_arguments
 def fill_page(template: str | Path, **values: Any) -> str:
-    """Fill in a page.
+    """Return a page that a Jinja template makes from tables and numbers.
 
     Parameters
     ----------
@@ -79,6 +84,8 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
     Raises
     ------
+    CoarticError
+        There is no such template.
     ValueError
         A sentence that the template expects of the results does not hold.
     jinja2.UndefinedError
@@ -104,7 +111,8 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
 @checked_arguments
 def expect(holds: bool, what: str) -> str:
-    """Return an empty text. Raises ValueError if a sentence of the page no longer holds."""
+    """Return an empty text if a sentence of the page holds. Raises ValueError with the words
+    ``what`` if ``holds`` is False."""
     if not holds:
         raise ValueError(f"this no longer holds: {what}")
     return ""

@@ -23,10 +23,11 @@ class Solutions:
     """Label: the method with its setting."""
     runs: tuple[Execution, ...]
     run_ids: tuple[str, ...] = ()
+    """Ids of the runs, in the order of ``runs``."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
-        """Hands chosen for the goals, as places in HANDS, shape ``(n, G)``."""
+        """Hands chosen for the goals, shape ``(n, G)``: 0 for left, 1 for right, as in HANDS."""
         hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
         return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
 
@@ -46,8 +47,8 @@ class Solutions:
 
     @cached_property
     def against_same_hands(self) -> Array:
-        """Ticks of subtasks less the ticks of the corrective process alone with the hands of the
-        run, shape ``(n, G)``; NaN if the corrective process does not complete the task."""
+        """Ticks of each subtask less its ticks by the corrective process alone with the hands of
+        the run, shape ``(n, G)``; NaN if this process does not complete the task."""
         every = {run.hands for run in self.runs}
         references = {hands: corrective_trial(self.task, hands) for hands in every}
         changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
@@ -60,7 +61,7 @@ class Solutions:
 def initial_solution(task: Task) -> Execution | None:
     """Return the execution of the corrective process alone with the initial hands of a task.
 
-    None if the corrective process completes the task with no hands.
+    None if the corrective process does not complete the task with these hands, or with any hands.
     """
     try:
         execution = corrective_trial(task, initial_hands(task))

@@ -17,9 +17,9 @@ from coartic.internal.text import counted
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return the name of the reward to which gaps on these tasks are taken: ``optimum`` if all are
-    proven, ``best of this folder`` if no other reward is known on any, or else ``best known
-    reward``."""
+    """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
+    best known rewards are proven, ``best of this folder`` if all are known from methods of this
+    folder alone, or else ``best known reward``. All tasks need a best known reward."""
     best = [study.optima[task] for task in tasks]
     if all(each.proven for each in best):
         return "optimum"
@@ -28,8 +28,9 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
-    """Return the runs of every compared method, by the label of its row in :attr:`.Study.methods`,
-    on tasks with a best known reward."""
+    """Return the runs of every method but searches for the optimum, by the label of the method's
+    row in :attr:`.Study.methods`. Runs on tasks without a best known reward, and runs that lock
+    the base, are left out, and so are methods without other runs."""
     runs = study.runs[study.runs.best_known.notna()]
     runs.attrs = {}  # which pandas copies with every selection
     by_row = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
@@ -38,10 +39,10 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a compared method on some tasks.
+    """Return the runs of a method of :func:`compared` on some tasks.
 
-    No runs if the method lacks one of the tasks, or if these tasks have only one of the conditions
-    of a row that joins several.
+    No rows if the method has no run on one of the tasks, or if it is a row of
+    :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.
     """
     runs, tasks = compared(study)[method], {*tasks}
     runs = runs[runs.task.isin(tasks)]
@@ -51,11 +52,10 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 @cached
 def common_tasks(study: Study) -> tuple[str, ...]:
-    """Return the tasks over which algorithms are compared: all tasks, unless too few algorithms ran
-    on all of them.
+    """Return the names of the tasks over which algorithms are compared, in the order of the study.
 
-    Of the sets of tasks on which one method ran, the set with the most pairs of a task and an
-    algorithm that ran on all tasks of the set.
+    The tasks of that method for which the number of its tasks, times the number of algorithms that
+    ran on all of them, is largest. Empty if no method is compared.
     """
     every = compared(study).items()
     sets = [(study.methods.algorithm[method], {*runs.task}) for method, runs in every]
@@ -69,8 +69,8 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 
 
 def common_runs(study: Study) -> pd.DataFrame:
-    """Return the runs of compared methods on :func:`common_tasks`, with the label of the row of
-    :attr:`.Study.methods` in column ``method``."""
+    """Return the runs of the methods that ran on all :func:`common_tasks`, on these tasks, with the
+    label of the row of :attr:`.Study.methods` in column ``method`` and an empty ``setting``."""
     tasks = common_tasks(study)
     parts = [runs_on(study, method, tasks).assign(method=method) for method in compared(study)]
     return pd.concat([*parts, study.runs[:0]], ignore_index=True).assign(setting="")
@@ -78,9 +78,12 @@ def common_runs(study: Study) -> pd.DataFrame:
 
 @cached
 def board(study: Study) -> pd.DataFrame:
-    """Return :func:`.ranking` of the methods that solved every run on :func:`common_tasks`, and of
-    each method from a file on the ``tasks`` on which it solved every run, with the columns of
-    :attr:`.Study.methods`."""
+    """Return a row for each method with a gap, the smallest gap first, with the columns of
+    :func:`.ranking` and of :attr:`.Study.methods`.
+
+    Methods that solved every run on :func:`common_tasks` are ranked over these tasks, other methods
+    from files over the tasks on which they solved every run.
+    """
     runs, methods = common_runs(study), study.methods
     parts = [ranking(runs)] if len(runs) else []
     there = {*parts[0].index[parts[0].gap.notna()]} if parts else set()
@@ -94,14 +97,14 @@ def board(study: Study) -> pd.DataFrame:
 
 @cached
 def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
-    """Return the tasks on which a compared method solved every run."""
+    """Return the names of the tasks on which a method of :func:`compared` solved every run."""
     by_task = compared(study)[method].groupby("task", sort=False)
     return tuple(str(task) for task, runs in by_task if runs.reward.notna().all())
 
 
 def shown_name(study: Study, method: str) -> str:
-    """Return the name of a method, with the number of its tasks for a method from a file that did
-    not solve all of :func:`common_tasks`."""
+    """Return the title of a method, for a method from a file that did not solve every run on
+    :func:`common_tasks` with the number of tasks that it solved: ``mine (3 of 8 tasks)``."""
     row, on = study.methods.loc[method], {*solved_tasks(study, method)}
     if row.built_in or {*common_tasks(study)} <= on:
         return str(row.title)

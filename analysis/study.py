@@ -59,19 +59,20 @@ UNITS = {
         "process_peak_mb": "MiB",
     },
 }
-"""Units of columns of :attr:`Study.runs`, which its ``attrs`` have."""
+"""Units of columns of :attr:`Study.runs`, also in its ``attrs["units"]``."""
 
 
 @checked_arguments
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with a solution."""
+    """Return the runs with a solution, status ``ok``; the frame itself if all runs have one."""
     have_one = runs.status == "ok"
     return runs if have_one.all() else runs[have_one]
 
 
 @checked_arguments
 def typical_run(runs: pd.DataFrame) -> str:
-    """Return the id of the solved run with the reward nearest to the median."""
+    """Return the id of the run with the reward nearest to the median of solved runs, the first of
+    several."""
     rewards = runs.reward.to_numpy(dtype=np.float64)
     return str(runs.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
@@ -79,7 +80,7 @@ def typical_run(runs: pd.DataFrame) -> str:
 Part = Literal["solution", "replay"]
 """Part of a run that can be executed."""
 MOST_EXECUTED = 500
-"""Most runs of a method on a task for which signatures are computed."""
+"""Most runs of a method on a task that are executed again, and so have signatures."""
 
 
 def check_study(study: object) -> None:
@@ -142,7 +143,7 @@ class Study:
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     stored: pd.DataFrame
-    """Runs as stored, a row for each."""
+    """Runs as stored, a row for each; :attr:`runs` has further columns."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -162,7 +163,7 @@ class Study:
     def only(
         self, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
     ) -> Study:
-        """Return the study of some methods on some tasks.
+        """Return a study of some methods on some tasks alone.
 
         Parameters
         ----------
@@ -175,7 +176,7 @@ class Study:
         Returns
         -------
         Study
-            Gaps stay: best known rewards are of all methods.
+            Gaps are as in the whole study: best known rewards are of all methods.
 
         Raises
         ------
@@ -217,14 +218,15 @@ class Study:
 
     @cached_property
     def declared(self) -> dict[str, MethodInfo]:
-        """Declarations of the methods by id."""
+        """Declarations of the methods by id without a setting."""
         return {job.cell.method.name: job.cell.method for job in self.plan}
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """Best known rewards by task, with proven bounds and sources.
+        """Best known rewards by name of the task, with proven bounds and sources; tasks without one
+        are left out (:func:`.best_known`).
 
-        Where the corrective process alone with its best hands exceeds all runs, its reward.
+        The reward of :attr:`corrective_best` where it is higher than all others.
         """
         rewards = best_known(self.stored, self.tasks.values())
         for name, best in rewards.items():
@@ -235,11 +237,11 @@ class Study:
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
-        """Reward of the corrective process alone with its best hands by task, from which gain,
-        share and targets count.
+        """Reward, ticks, of the corrective process alone with its best hands, by name of the task:
+        the zero of gain, share and targets.
 
         With the task's initial hands where there are over 4,096 hand sequences; NaN if the
-        corrective process completes the task with none.
+        corrective process completes the task with none of these hands.
         """
         alone = {}
         for name, task in self.tasks.items():
@@ -254,10 +256,10 @@ class Study:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
         Further columns: ``label``, the method with its setting; ``family``, ``split``, number of
-        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task and
-        :attr:`corrective_best`; ``gap``, a share of the best
-        known reward; and parameters by name, but for names that are taken: ``trials`` is the
-        number of trials made, ``hands`` the hands of the solution.
+        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing for runs with
+        another base) and :attr:`corrective_best`; ``gap``, a share of the best known reward; and a
+        column for each parameter of methods, unless its name is taken: ``trials`` is the number of
+        trials made, ``hands`` the hands of the solution.
         """
         runs, tasks = self.stored, self.tasks
         parameters = {text: json.loads(text) for text in runs.parameters.unique()}
@@ -293,7 +295,7 @@ class Study:
         - ``base``: id of the method without a setting;
         - ``condition``: exploration condition of the learner; empty for other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
-        - ``parts``: labels of the runs; of several, the last label with runs on a task counts;
+        - ``parts``: labels of its runs; where two have runs on a task, those of the last count;
         - ``title``: name on the page, in tables and figures;
         - ``algorithm``: algorithm that the method is a form of;
         - ``is_learner``: True for the paper's learner under the paper's conditions;
@@ -318,8 +320,8 @@ class Study:
     def sequences(self, task: str) -> pd.DataFrame:
         """Return the results of the corrective process alone on a task, by hand sequence.
 
-        A row for each sequence, the best first: ``hands``, ``reward`` (missing for a failure) and
-        ``reason``. No rows if the task has too many sequences.
+        A row for each sequence, the best first: ``hands``, ``reward`` (ticks, missing for a
+        failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
@@ -338,13 +340,14 @@ class Study:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id of each run that made trials, with its rewards, NaN for failed trials."""
+        """Yield the id of each run that made trials, with the rewards of its trials, ticks, shape
+        ``(trials,)``; NaN for failed trials."""
         with open_results(self.folder) as store:
             yield from store.rewards()
 
     @cached
     def executed(self, task: str, method: str, *, replay: bool = False) -> Solutions:
-        """Execute the solutions of the solved runs of a method on a task again.
+        """Return the solved runs of a method on a task, executed again.
 
         Parameters
         ----------
@@ -399,8 +402,8 @@ class Study:
 
         Returns
         -------
-        ndarray, shape (runs, G, dof)
-            Configurations, length unit (base) and rad (joints); at most 500 runs.
+        ndarray, shape (runs, goals, dof)
+            Configurations, length unit (base) and rad (joints); of the first 500 solved runs.
         """
         return self.executed(task, method, replay=replay).configurations
 
@@ -429,13 +432,14 @@ class Study:
 
     @cached
     def _signature_of_each(self, name: str, task: str, method: str, *, replay: bool) -> Array:
+        """Return a signature of each run of :meth:`executed`, ``(n,)``; NaN for runs without it."""
         return signature_named(name).each(self.executed(task, method, replay=replay))
 
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
         """Return a signature of the runs of a method on a task, shape ``(n,)``: of the first 500
-        solved runs, without those that lack the signature. ``name`` and ``replay`` are as in
-        :meth:`signature`."""
+        solved runs, without the runs that lack the signature. ``name`` and ``replay`` are as in
+        :meth:`signature`, ``task`` and ``method`` (a label) as in :attr:`runs`."""
         values: Array = self._signature_of_each(name, task, method, replay=replay)
         return values[np.isfinite(values)]
 
@@ -444,7 +448,8 @@ class Study:
         """Return a signature of the runs of a method on a task by hand sequence.
 
         Arrays have shape ``(n,)``; runs without the signature are left out. Signature ``hand``, the
-        choice of hands itself, is of all hand sequences together, ``""``.
+        choice of hands itself, has one entry ``""`` for all hand sequences together. Parameters are
+        as in :meth:`signature_of`.
         """
         values = self._signature_of_each(name, task, method, replay=False)
         runs = self.executed(task, method).runs
@@ -454,17 +459,17 @@ class Study:
 
     @cached
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of the ``solution`` or ``replay`` of executed runs, by run id."""
+        """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
+        runs of each method on each task; runs without a replay are left out."""
         with open_results(self.folder) as store:
             return store.movements(part, MOST_EXECUTED)
 
 
 @cached
 def one_by_one(study: Study) -> dict[str, Task]:
-    """Return the tasks that a report shows one by one, by name.
-
-    Instances of families are among them only if there are at most eight in all. The name of a
-    changed task begins with the name of its task and a dot.
+    """Return the tasks that a report shows one by one, by name: all tasks, but instances of
+    families, also changed ones such as ``two-armed/v1/i017.radius-0.2``, only if these are at most
+    eight.
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     left_out = drawn if len(drawn) > 8 else ()

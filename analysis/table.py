@@ -19,7 +19,7 @@ from coartic.internal.arguments import checked_arguments
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
-"""Rows of a table with their names."""
+"""Names of the rows of a table, each with its row: values by name of the column."""
 SHORT_ID = 8
 """Characters of a run's id that people see: commands take its beginning."""
 
@@ -64,7 +64,8 @@ class Table:
     rows: Callable[[Study], Rows]
 
     def __call__(self, study: Study) -> pd.DataFrame:
-        """Return the table of a study, with :func:`_shown_names` as its ``attrs``."""
+        """Return the table of a study, with :func:`_shown_names` as its ``attrs``. It is cached: do
+        not change it."""
         return _rows_of(study, self)
 
     def _repr_html_(self) -> str:
@@ -75,7 +76,7 @@ class Table:
         return f"<p>Table {self.id}, a function of a study. {html.escape(words)}</p>{columns}"
 
     def column(self, name: str) -> Column:
-        """Return the column to which a name in the CSV file belongs."""
+        """Return the column to which a name in the CSV file belongs. Raises KeyError for others."""
         for column in self.columns:
             if name == column.name or (column.ending == "*" and name.startswith(column.name)):
                 return column
@@ -148,18 +149,18 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:
-    """Return for each row of a table True if it is of a setting or ablation whose method has a
-    row."""
+    """Return for each row of a :class:`Table`'s frame True if it is of a setting or ablation of a
+    method that has a row, too."""
     label = frame.method if "method" in frame else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
 
 
 @checked_arguments
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
-    """Return what tables with a row for each method on each task say: task, method, numbers of runs
+    """Return the common entries of a row for a cell with these runs: task, method, numbers of runs
     and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.
 
-    A table leaves out what it has no column for.
+    A table leaves out entries for which it has no column.
     """
     rewards = solved(runs).reward.to_numpy(np.float64)
     return {

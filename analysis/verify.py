@@ -100,8 +100,8 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
-    """Return x and y of the hand for configurations in the columns of ``q``; on paths by NumPy's
-    cosine and sine."""
+    """Return x and y of the hand of ``arm`` (in ``arms`` of :func:`stored_task`) for configurations
+    in the columns of ``q``; ``on_path``: by NumPy's cosine and sine."""
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
     angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
@@ -140,8 +140,8 @@ class MoveRow(NamedTuple):
 
 
 def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """Return the points of a straight movement as columns, at most ``most`` and one more. The last
-    is the target, also of a longer movement."""
+    """Return the points of a straight movement as columns, shape ``(dof, points)``, a step apart,
+    at most ``most`` + 1. The last is the target, even if points before it are left out."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
@@ -152,8 +152,8 @@ def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Float
 
 
 def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """Return the points of a path as columns, at most ``most`` and one more. Point k lies k steps
-    along the path, and the last point of a path that is not longer lies at its end."""
+    """Return the points of a path as columns, shape ``(dof, points)``, at most ``most`` + 1. Point
+    k, from 0, lies k steps along the path; the last lies at its end if no point is left out."""
     corners = np.array([q, *waypoints])
     ends = np.append(0.0, np.cumsum(np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))))
     last = math.ceil(ends[-1] / model.step)
@@ -166,8 +166,8 @@ def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Fl
 
 
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
-    """Return where a movement from ``q`` stops, after how many ticks, and whether the hand is in
-    its goal there. ``task`` comes from :func:`stored_task`. A movement that would take more ticks
+    """Return the configuration where a movement from ``q`` stops, its ticks, and whether the hand
+    hits its goal there. ``task`` is from :func:`stored_task`. A movement that would take more ticks
     than are stored is cut: it takes one more than stored, and where it stops means nothing."""
     _, goal, hand, kind, most, corners = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
@@ -237,7 +237,8 @@ class Report(NamedTuple):
 
 
 def check_runs(folder: Path) -> Report:
-    """Recompute all stored runs, check cells and plan; report what differs or is unchecked.
+    """Execute all stored runs of a results folder again, check its cells and plan; report what
+    differs or is unchecked.
 
     Runs that the last plan does not ask for are among them. Raises sqlite3.Error if the folder
     cannot be read.
@@ -355,7 +356,7 @@ def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
 
 
 def hash_of(content: Any) -> str:
-    """Return the SHA-256 of plain data, in hexadecimal digits."""
+    """Return the SHA-256 of plain data as JSON, in 64 hexadecimal digits."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), default=repr)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -401,7 +402,8 @@ def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[Mo
 
 
 def main() -> int:
-    """Check the folder that the command names, this one if it names none; say what was found."""
+    """Check the folder that the command line names, or else the current folder, and print what was
+    found. Returns 0 if nothing differs, 1 if something differs, 2 if it cannot be read."""
     folder = Path(*sys.argv[1:])
     try:
         report = check_runs(folder)

@@ -57,9 +57,9 @@ def id_of(function: Callable[..., Any]) -> str:
 
 @checked_arguments
 def number(value: float, digits: _Digits | None = None) -> str:
-    """Write a number, with a true minus and spaces between thousands; a dash for NaN.
+    """Write a number, with a true minus and spaces between thousands from 10 000 on; – for NaN.
 
-    ``digits``: decimals; by default integers are whole and others have three figures.
+    ``digits``: decimals; by default none for integers, and three significant figures for others.
     """
     if math.isnan(value):
         return NONE
@@ -84,9 +84,9 @@ def p_value(p: float) -> str:
 
 
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
-    """Write an interval, ``[1.3, 2.9]``; empty for NaN.
+    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals as in :func:`number`.
 
-    Also empty for an interval of no length, which would look like certainty.
+    Empty for NaN, and for an interval of no length, which would look like certainty.
     """
     if math.isnan(low) or math.isnan(high) or low == high:
         return ""
@@ -94,7 +94,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 
 def estimate(value: Estimate, digits: int | None = None) -> str:
-    """Write an estimate with its interval, ``2.1 [1.3, 2.9]``."""
+    """Write an estimate with its interval, ``2.1 [1.3, 2.9]``; ``digits`` as in :func:`number`."""
     return f"{number(value.value, digits)} {in_brackets(value.low, value.high, digits)}".strip()
 
 
@@ -134,7 +134,7 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
 
 
 def titled_apart(tasks: Iterable[Task]) -> list[Task]:
-    """Return tasks with titles that differ.
+    """Return tasks in their order, copied with other titles where titles would be the same.
 
     The title of a changed task, ``ascending.radius-0.2``, is the title of its task and the change.
     Other tasks with the same title have their names in the title.
@@ -161,13 +161,13 @@ def marked(task: Task) -> str:
 
 
 def tally(counts: Mapping[Any, int]) -> str:
-    """Write counts, ``LRLR 17, RRLR 3``, the commonest first; a dash without counts."""
+    """Write counts by name, ``LRLR 17, RRLR 3``, the largest first; a dash without counts."""
     ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{name} {count}" for name, count in ordered) or NONE
 
 
 def listed(words: Iterable[str]) -> str:
-    """Write a list: ``a, b and c``."""
+    """Write a list, ``a, b and c``. Raises ValueError without words."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
 
@@ -178,7 +178,7 @@ def capital(text: str) -> str:
 
 
 def slugs(names: Iterable[str]) -> dict[str, str]:
-    """Return a slug for every name (small letters, digits, dashes), no two equal."""
+    """Return slugs (small letters, digits, dashes) by name, no two of them equal."""
     taken: dict[str, str] = {}
     for name in names:
         # Names of files are short.

@@ -51,7 +51,7 @@ class BanditParameters(UninformedParameters):
     """Parameters of the bandit."""
 
     exploration: Annotated[float, Field(ge=0, le=100)] = 0.2
-    """c of UCB1, in spreads of the first rewards."""
+    """c of UCB1, as a multiple of the range of the first rewards."""
 
 
 class Strategy:
@@ -72,7 +72,8 @@ class Strategy:
         self._evolution: EvolutionStrategy
 
     def generation(self) -> None:
-        """Make one generation of trials, or the trials that are left."""
+        """Make the trials of one generation, or those that are left, and learn from their rewards;
+        only for a sequence that **A** completes."""
         if self._restarts < 0 or self._evolution.has_ended():
             self._restarts += 1
             size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
@@ -91,7 +92,8 @@ class Strategy:
 
 
 class CMAES(Method):
-    """CMA-ES for each hand sequence; the upper confidence bound says which goes on."""
+    """CMA-ES for each hand sequence; the sequence of highest upper confidence bound makes the next
+    generation."""
 
     name = "cma-es/bandit"
     title = "CMA-ES, a bandit over hand sequences"
@@ -132,7 +134,8 @@ class GoalByGoalParameters(UninformedParameters):
 
 
 class GoalByGoal(Method):
-    """CMA-ES for each hand sequence; hands are chosen by the best reward that they had."""
+    """CMA-ES for each hand sequence; the hand of each goal is chosen by the best reward of trials
+    with this hand after the hand before."""
 
     name = "cma-es/goal-by-goal"
     title = "CMA-ES, hands chosen goal by goal"

@@ -39,7 +39,7 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """The path to one goal."""
+    """The path from the start, or from one goal, to the next."""
 
     movement: Movement
     ticks: int
@@ -75,21 +75,22 @@ class Controller(ABC):
 
     @abstractmethod
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
-        """Return the memory at the beginning of a leg; ``memory`` is that of the leg before, or
-        None."""
+        """Return the memory, what the controller keeps from step to step, at the beginning of a leg
+        from ``q`` to the goal of the first aim; ``memory`` is the memory at the end of the leg
+        before, or None."""
 
     @abstractmethod
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Any, first: bool
     ) -> tuple[Solution, Array, Any]:
-        """Return the changes of a control step, the changes that the joints prefer, both in control
-        steps, and the memory after the step; ``first``: it is the first step of a leg."""
+        """Return the solution for a control step from ``q``, the changes that the joints prefer,
+        both of the joints that are not locked and in control steps, and the memory after the step;
+        ``first``: it is the first step of a leg."""
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
-        """Return the path to the first aim's goal, from the end of the leg before or the start.
-
-        Raises StuckError if the hand does not get there, MethodError if the solver fails.
-        """
+        """Return the path to the goal of the first aim, from the end of the leg ``before``, or from
+        the start if it is None; further aims are the goals ahead. Raises StuckError if the hand
+        does not get there, MethodError if the solver fails."""
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         _, tolerance = model.tolerances(radius)
@@ -127,24 +128,27 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Solve the cascade; the session counts the iterations."""
+        """Solve the cascade as :func:`solve_cascade` does; the session counts the iterations."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
         return solution
 
     def error(self, q: Array, aim: Aim) -> Array:
-        """Return the vector from a hand to its goal's centre, shape ``(2,)``, length unit."""
+        """Return the vector from the hand of an aim to its goal's centre in configuration ``q``,
+        shape ``(2,)``, length unit."""
         return np.asarray(
             self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
         )
 
     def distance(self, q: Array, aim: Aim) -> float:
-        """Return the distance of a hand from its goal's centre, length unit."""
+        """Return the distance of the hand of an aim from its goal's centre in configuration ``q``,
+        length unit."""
         return float(np.hypot(*self.error(q, aim)))
 
     def add(self, q: Array, change: Array) -> Array:
-        """Return the configuration ``q`` with the joints that are not locked changed."""
+        """Return a copy of ``q`` with ``change``, shape ``(joints,)``, added to the joints that are
+        not locked."""
         result = q.copy()
         result[self.moving] += change
         return result
@@ -176,7 +180,7 @@ class Control(Method):
     """Goals after the current one that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
-        """Return why there are too many sequences to simulate, if there are."""
+        """Return why a task has too many hand sequences to simulate; None if it has not."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
@@ -189,11 +193,10 @@ class Control(Method):
             return self.search(controller, candidates)
 
     def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
-        """Extend the sequence with the fewest ticks so far until one is complete.
-
-        No other can be better then, since ticks only add up. Of equal ones the one with
-        the fewest changes of hand is kept, then the first.
-        """
+        """Return the paths of the candidate with the fewest ticks: the one with the fewest ticks so
+        far is extended until one is complete. Of equal candidates the one with the fewest changes
+        of hand is kept, then the first. Raises MethodError if the hand gets stuck in all of
+        them."""
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)

@@ -26,7 +26,8 @@ class GivenHands(Method):
     stochastic = False
 
     def solve(self, session: Session) -> Result:
-        """Make one trial in which **A** finds the target of each goal as it comes."""
+        """Make one trial in which **A** alone goes to each goal with the task's initial hands.
+        Raises MethodError if the trial misses a goal."""
         hands = session.find_initial_hands()
         with session.solving():
             execution = session.trial(corrective_movements(hands))
@@ -45,12 +46,13 @@ class BestHands(Method):
     stochastic = False
 
     def why_not(self, task: Outline) -> str | None:
-        """The reason why there are too many sequences to try one by one, if there are."""
+        """Return why a task has too many hand sequences to try one by one; None if it has not."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """Make one trial for each hand sequence; of equal rewards keep the one with the fewest
-        changes of hand."""
+        """Make one trial for each hand sequence while trials are left; return the movements of the
+        best trial, of equal rewards the one with the fewest changes of hand. Raises MethodError if
+        every trial misses a goal."""
         completed: list[tuple[int, int, Execution]] = []
         for hands in sequences_with(session.hands, session.goals_count, session.task_name):
             if session.trials_left == 0:

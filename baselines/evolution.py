@@ -38,7 +38,8 @@ def _added(weights: list[float]) -> float:
 
 class EvolutionStrategy:
     """Evolution strategy: :meth:`ask` for points, :meth:`tell` their costs, until
-    :meth:`has_ended`."""
+    :meth:`has_ended`. It begins at ``mean``, shape ``(dim,)``, with SD ``step_size`` in each
+    coordinate."""
 
     def __init__(self, mean: Array, step_size: float, size: int, rng: np.random.Generator) -> None:
         dim = len(mean)
@@ -121,7 +122,8 @@ class EvolutionStrategy:
         return self._mean + self._step_size * drawn
 
     def tell(self, points: Array, costs: Array) -> None:
-        """Learn from the points of a generation and their costs, shape ``(λ,)``, finite."""
+        """Learn from all points of the last :meth:`ask` and their costs, shape ``(λ,)``, finite;
+        the least cost is best."""
         self._generation += 1
         least = int(np.argmin(costs))
         if costs[least] < self._best:

@@ -37,7 +37,7 @@ class HandController(Controller):
     prefer other changes. The memory is a posture, shape ``(dof,)``."""
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return the posture at the beginning of a leg."""
+        """Return ``q``, where the leg begins."""
         return q
 
     def step(
@@ -56,7 +56,8 @@ class HandController(Controller):
         return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the changes that the joints prefer, with so many control steps to come."""
+        """Return the changes that the joints prefer in the next of ``steps`` control steps to the
+        goal, shape ``(joints,)``, in control steps: here none."""
         return np.zeros(len(self.moving))
 
 
@@ -73,7 +74,7 @@ class NextGoalController(HandController):
         return q
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return an even step towards the posture."""
+        """Return an even step towards the posture of the next goal, at most a control step long."""
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))
 

@@ -92,7 +92,8 @@ class OptimumSearch(Method):
 
 @checked_arguments
 def with_locks(task: Task, base: str) -> Task:
-    """The task with further base coordinates locked."""
+    """Return the task with base coordinates locked in addition, ``y`` or ``xy``; the task itself
+    for ``task``. Raises MethodError if the task with these locks is not valid."""
     if base == "task":
         return task
     locked = sorted({*task.locked_base, *base})

@@ -41,7 +41,7 @@ from coartic.robot import BASE_DOF, Array, Hand
 Mask = NDArray[np.bool_]
 
 PER_ROUND = 60
-"""Postures generated in a round."""
+"""Postures generated in a round for each hand sequence."""
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
 _DAMPING = 1e-3  # length unit squared: the Jacobian of a straight arm is singular
 _LONGEST = 0.5  # length unit: most of the error that one step takes on
@@ -71,7 +71,7 @@ class PostureBasedParameters(Parameters):
 
 
 class PostureBased(Method):
-    """Posture-based planning over a horizon of goals."""
+    """Posture-based planning that looks at ``horizon`` goals at a time, one or two."""
 
     horizon: ClassVar[Literal[1, 2]]
     citation = (
@@ -121,7 +121,8 @@ METHODS: tuple[type[Method], ...] = (OneGoal, TwoGoals)
 
 
 class PosturePlanner:
-    """Makes a plan from a store of postures ``(stored, dof)``; ``q`` is where it is so far."""
+    """Makes a plan from ``store``, postures of shape ``(n, dof)``; ``q`` is the configuration in
+    which the movements planned so far end."""
 
     def __init__(
         self, session: Session, parameters: PostureBasedParameters, horizon: Literal[1, 2]
@@ -152,10 +153,9 @@ class PosturePlanner:
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
-        """The movement to each goal, and the ticks that it is expected to take.
-
-        Raises MethodError for a goal that no posture hits.
-        """
+        """Return the movement to each goal, and the ticks that each movement is expected to take.
+        Raises MethodError for a goal that no posture hits. To be called once: ``q`` and the store
+        change."""
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
@@ -191,7 +191,8 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """First aspect: stored postures of the arm with the hand at the goal."""
+        """Return, by goal (from 0) and hand, the stored postures of the arm that correction brings
+        to the goal, shape ``(n, dof)``; the other arm is as in ``q``."""
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))
@@ -203,7 +204,8 @@ class PosturePlanner:
         return retrieved
 
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
-        """Second aspect: the cheapest of the retrieved postures, one for each goal."""
+        """Return the postures of least cost of travel from ``q``, one out of each of ``layers``,
+        the retrieved postures for each goal in turn; shape ``(goals, dof)``."""
         first = layers[0]
         cost = np.linalg.norm(first - self.q, axis=1)
         if len(layers) == 1:
@@ -221,11 +223,9 @@ class PosturePlanner:
     def generate(
         self, promising: dict[HandSequence, Array], noises: Array, goals: range
     ) -> list[tuple[float, HandSequence, Array]]:
-        """Return the cheapest postures ``(goals, dof)`` found around the promising ones by the
-        deadline, after their cost and their hands.
-
-        ``noises`` are standard, shape ``(hand sequences, rounds, PER_ROUND, goals, dof)``.
-        """
+        """Return for each hand sequence its cost of travel, its hands, and the cheapest postures
+        ``(goals, dof)`` found around its promising ones by the deadline. ``noises`` are standard
+        normal, shape ``(hand sequences, rounds, PER_ROUND, goals, dof)``."""
         sequences = [*promising]
         centre = best = np.stack([*promising.values()])
         costs = _path_length(self.q, best)
@@ -257,7 +257,8 @@ class PosturePlanner:
         return list(zip(costs.tolist(), sequences, best, strict=True))
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
-        """Feedforward correction of ``(..., dof)`` in place; True where the hand is there."""
+        """Correct contiguous postures ``(..., dof)`` in place, in at most ``steps`` steps, towards
+        a goal (from 0) for a hand; return True where the hand is at the goal, shape ``(...)``."""
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
         far = np.arange(len(flat))

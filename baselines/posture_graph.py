@@ -90,12 +90,13 @@ class Beginning(NamedTuple):
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
-    """Sample the layers of a graph with at most ``count`` nodes per goal and hand.
+    """Sample the layers of a graph with at most ``count`` nodes per goal and hand; a layer can be
+    empty.
 
     Half of a layer is sampled around the nodes of the goal before, by whichever hand: of 40
     one-armed random tasks the best path known was then found more often on 23, less often on 11.
 
-    Returns the layers, and the evaluations and Jacobians that they took.
+    Returns the layers, and the counts of ``forward_kinematics`` and ``jacobians`` that they took.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}
@@ -112,11 +113,9 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
 
 
 def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain]:
-    """Return the cheapest chain of each hand sequence that has a chain, left before right.
-
-    At most ``most`` beginnings of sequences are kept at each goal, the cheapest; with fewer
-    sequences than that none is lost.
-    """
+    """Return the cheapest chain of each hand sequence that has a chain, left before right. At most
+    ``most`` beginnings of sequences (None: all) are kept at each goal, the cheapest; with fewer
+    sequences than that none is lost."""
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
     kept = [Beginning((), start, np.zeros((1, 1)), ())]
     for _ in range(len(task.goals)):
@@ -176,13 +175,10 @@ def cheapest_chains(
     most: int = BEAM_WIDTH,
     spread: bool = False,
 ) -> Iterator[Chain]:
-    """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
-    graphs until there are as many ``chains``; ``most`` as in :func:`chains_of`. The
-    session counts the effort.
-
-    With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
-    MethodError where a goal has no posture.
-    """
+    """Yield the cheapest chains of ``graphs`` random graphs with ``nodes`` postures per goal and
+    hand, and of more graphs until ``chains`` are yielded; ``most`` as in :func:`chains_of`. The
+    session counts the effort. With ``spread`` and two hands each chain is followed by its
+    :func:`move_other_arm`, which does not count. Raises MethodError where a goal has no posture."""
     yielded = 0
     for number in itertools.count(1):
         layers, spent = sample_layers(task, nodes, rng)
@@ -204,7 +200,8 @@ def cheapest_chains(
 
 
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
-    """A chain's configurations with each arm moving steadily between the goals it hits."""
+    """Return a copy of a chain's configurations, shape ``(G, dof)``, with each arm moving steadily
+    between the goals that it hits."""
     configurations = chain.copy()
     for hand in task.hands:
         joints = task.robot.joints(hand)

@@ -75,21 +75,21 @@ _SHORTEST = 0.02  # path whose share still counts, length unit and rad
 
 
 class PostureController(Controller):
-    """Go straight in joint space to the posture of the current goal.
-
-    The memory is the posture of each aim, by aim.
-    """
+    """Go straight in joint space to the posture of the current goal. The memory has a posture,
+    shape ``(dof,)``, for each aim: the current goal and the goals ahead."""
 
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return the postures at the beginning of a leg."""
+        """Return the postures by aim at the beginning of a leg; postures in ``memory``, that of the
+        leg before, are kept."""
         return dict(zip(aims, self.find_postures(q, aims, memory or {}), strict=True))
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array], first: bool
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
-        """Keep the postures up and step towards the posture of the current goal."""
+        """Update the postures, unless the step is the ``first`` of a leg, and step towards the
+        posture of the current goal; returns as :meth:`Controller.step` does."""
         postures = [memory[aim] for aim in aims]
         if not first:
             self.sweep(q, aims, postures)
@@ -104,10 +104,10 @@ class PostureController(Controller):
     def find_postures(
         self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]
     ) -> list[Array]:
-        """The posture of each aim, in the order of the goals.
-
-        A posture that is not known ``earlier`` is searched from the one before it, as the nearest.
-        """
+        """Return a posture ``(dof,)`` that hits its goal for each aim, in the order of the goals.
+        Postures in ``earlier`` are taken over; each other one is sought by descent from the posture
+        of the aim before, the first from ``q``. With several aims all are then moved to shorten the
+        path."""
         postures: list[Array] = []
         for aim in aims:
             before = postures[-1] if postures else q
@@ -123,11 +123,10 @@ class PostureController(Controller):
         return postures
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Move each posture, in place, towards where the paths to and from it are shortest.
-
-        The sum of two distances is least where their ends, each weighted by the inverse of its
-        distance, have their mean (Weiszfeld 1937). Returns the largest change's norm.
-        """
+        """Move each entry of ``postures``, in place, towards where the path from ``q`` through them
+        is shortest. The sum of two distances is least where their ends, each weighted by the
+        inverse of its distance, have their mean (Weiszfeld 1937). Returns the largest length that
+        :meth:`step_nearer` returns."""
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]
@@ -142,10 +141,9 @@ class PostureController(Controller):
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """Make a Gauss-Newton step to the posture that hits a goal nearest to a preferred posture.
-
-        Returns the posture and the norm of the change.
-        """
+        """Make a Gauss-Newton step from a posture towards the posture that hits the goal of an aim
+        nearest to a preferred posture. Returns the posture after the step, and the length that the
+        step had before it was limited, length unit and rad mixed."""
         rows, outside = self.faces(posture, aim)
         wanted = _POSTURE_GAIN * (preferred - posture)[self.moving]
         change = self.solve(rows, outside, wanted).changes
@@ -160,7 +158,9 @@ class PostureController(Controller):
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """A, ``(FACES, joints)``, and b, ``(FACES,)``, of the module's docstring, length unit."""
+        """Return A, ``(FACES, joints)`` over the joints that are not locked, and b, ``(FACES,)``,
+        of the module's docstring for the disc of an aim's goal and a robot in ``q``, length
+        unit."""
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET
         return _FACE_NORMALS @ jacobian, _FACE_NORMALS @ self.error(q, aim) - radius
@@ -180,7 +180,7 @@ class CurrentGoal(Control):
 
 
 class GoalsAhead(CurrentGoal):
-    """Level 2 approaches a posture chosen with a view to the two goals that follow."""
+    """Posture QP whose posture for the current goal is chosen with a view to the next two goals."""
 
     name = "posture-qp/goals-ahead"
     title = "Posture QP, goals ahead"

@@ -23,12 +23,14 @@ REWARD_INFORMATION = MODEL_BASED | {Information.REWARD_FORMULA}
 
 
 class ShortestPlans(NamedTuple):
-    """The plans that many starts led to."""
+    """The plans found from many starts."""
 
     by_hands: dict[HandSequence, PathPlan]
     """The shortest plan of each hand sequence that has one."""
     solves: int
+    """Number of solves, one for each start."""
     failed: int
+    """Number of solves that did not converge."""
 
     @property
     def ranked(self) -> list[PathPlan]:
@@ -53,10 +55,9 @@ def shortest_plans(
     *,
     still: bool,
 ) -> ShortestPlans:
-    """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
-
-    Raises MethodError where no solve finds a path.
-    """
+    """Solve from each start, and return the shortest plan of each hand sequence; ``still`` holds
+    the arm that is not chosen. The session counts the effort. Raises MethodError where no solve
+    finds a path."""
     best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
     for hands, start in starts:
@@ -77,11 +78,10 @@ def shortest_plans(
 def fewest_ticks(
     session: Session, task: Task, problem: TrajectoryProblem, plans: ShortestPlans
 ) -> PlanInTicks:
-    """The fewest ticks over all plans, roundings and mergers, as executed.
-
-    Of equal ones the one with the fewest corrections, then the one of the shortest plan. Raises
-    MethodError where no rounding can be solved.
-    """
+    """Round all plans to whole ticks in every way, with and without goals that are hit without a
+    movement; return the result with the fewest ticks when executed. Plans are tried by length; of
+    equal results the first is kept, unless another that is executed has fewer corrections. Raises
+    MethodError where no rounding can be solved. The session counts the effort."""
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 

@@ -80,10 +80,9 @@ def cheapest_plan(
     *,
     stops: bool = False,
 ) -> PathPlan:
-    """The cheapest plan that starts lead to; where none converges the last one.
-
-    ``stops`` as in :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
-    """
+    """Return the cheapest plan that converges from one of ``starts``, each ``(G, dof)``; the last
+    plan, which has not converged, if none does. ``stops`` as in
+    :meth:`~.trajectory_problem.TrajectoryProblem.solve`."""
     plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
@@ -100,7 +99,8 @@ class TrajectoryOptimisation(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
-        """Plan every sequence, keep the cheapest, return its movements."""
+        """Plan for each hand sequence, and return the movements of the plan of least cost. Raises
+        MethodError if no plan converges."""
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
@@ -156,11 +156,9 @@ class TrajectoryOptimisation(Method):
         return Result(solution, details)
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
-        """Starts for every hand sequence.
-
-        The cheapest chain of each graph, and that with the other arm in steady motion; noise on
-        the first. Raises MethodError if a goal has no posture.
-        """
+        """Return starts, each ``(G, dof)``, for every hand sequence: the cheapest chain of each
+        graph, the same chain with the other arm in steady motion, and the first start with noise.
+        Raises MethodError if a goal has no posture."""
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(
@@ -256,11 +254,12 @@ METHODS: tuple[type[Method], ...] = (PathLength, SquaredDisplacement, Accelerati
 def path_movements(
     session: Session, task: Task, instance: Instance, path: list[Array]
 ) -> tuple[Movement, ...]:
-    """A path of one piece ``(k, dof)`` per goal, which ends where the scorer sees the hit.
+    """Return the movements along a path of one piece ``(k, dof)`` per goal, each with all of its
+    piece.
 
-    A smooth path goes on towards a goal's inside after its rim is hit; the rest of the
-    piece then begins the next movement, so that the whole path is followed: but for joints
-    held on the way to the next goal, which stay where they are.
+    A smooth path goes on towards a goal's inside after its rim is hit; the rest of the piece then
+    begins the next movement, so that the whole path is followed: but for joints held on the way to
+    the next goal, which stay where they are.
     """
     paths: list[Movement] = []
     here, rest = np.array(task.q0), np.empty((0, task.robot.dof))

@@ -89,7 +89,7 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Instance:
-    """The parameters and bounds of one solve: a task, a hand per goal, a restriction."""
+    """Start, goals, hand of each goal and joints that cannot move: the parameters of one solve."""
 
     q0: Array
     goals: Array
@@ -102,16 +102,16 @@ class Instance:
 
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
-        """The instance of a task; ``still`` holds the arm that is not chosen."""
+        """Return the instance of a task with a hand for each goal, radius in length units;
+        ``still`` as in :func:`held_joints`."""
         held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
 
 
 def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np.bool_]:
-    """Joints that cannot move on the way to each goal, bool, shape ``(G, dof)``.
-
-    ``still`` holds the arm that is not chosen.
-    """
+    """Return True for the joints that cannot move on the way to each goal, shape ``(G, dof)``:
+    locked base coordinates and arms that the task does not use. With ``still`` the arm whose hand
+    is not chosen for the goal cannot move either."""
     held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
     held[:, ["xy".index(axis) for axis in task.locked_base]] = True
     for goal, hand in enumerate(hands):
@@ -123,7 +123,7 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
 
 @dataclass(frozen=True)
 class PathPlan:
-    """The outcome of a solve."""
+    """The outcome of a solve, also of one that did not converge."""
 
     instance: Instance
     """The instance that was solved."""
@@ -133,20 +133,24 @@ class PathPlan:
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
     cost: float
+    """Value of the problem's cost; minus the depth in the discs if the solve asked for depth."""
     durations: Array
-    """Durations of the segments, shape ``(G,)``, with mean 1; for smoothness costs only."""
+    """Durations of the segments, shape ``(G,)``, with mean 1; all 1 for costs without rates."""
     rates: Array
-    """Time derivatives at start and goals, shape ``(derivatives, G + 1, dof)``."""
+    """Velocities, for jerk also accelerations, at start and goals, shape
+    ``(derivatives, G + 1, dof)``; ``derivatives`` is 0 for path length and squared displacement."""
     spent: dict[str, int] = field(default_factory=dict)
     """Counters of the solver, ready for ``Session.spend``."""
 
     def lengths(self) -> Array:
-        """Joint-space distances from the start to the goals in turn, shape ``(G,)``."""
+        """Return the joint-space lengths of the segments, from the start to goal 1 and from goal to
+        goal, shape ``(G,)``."""
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
 
 class TrajectoryProblem:
-    """The compiled programme of one cost, for every task of a robot with so many goals."""
+    """The compiled programme of one cost, for every task of a robot with these hands and this
+    number of ``goals``."""
 
     def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
         self.robot, self.goals, self.cost = robot, goals, cost
@@ -223,13 +227,14 @@ class TrajectoryProblem:
         stops: bool = False,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
+        """Return a locally cheapest plan, sought from one configuration per goal, ``start``
+        ``(G, dof)``.
 
-        ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
-        cost only); ``deep`` then asks for hands as deep inside the discs of these goals
-        (0-based) as those lengths allow, instead of short paths. ``stops`` holds all rates at the
-        goals at 0 (smoothness costs only). A plan has converged if IPOPT says so and every
-        constraint holds.
+        ``lengths`` ``(G,)`` fixes the joint-space lengths of segments where it is not NaN
+        (path-length cost only); with ``deep`` (goals, from 0) the hands are then as deep inside the
+        discs of these goals as those lengths allow, and the path is not made short. ``stops`` holds
+        all rates at the goals at 0 (smoothness costs only). A plan has converged if IPOPT says so
+        and every constraint holds; one that has not is returned as well.
         """
         goals, at = self.goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -361,7 +366,8 @@ def _hand_jerks(
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
-    """The compiled problem, built once per process."""
+    """Return the compiled problem of these arguments; the last 32 problems are kept in this
+    process."""
     with _ONE_AT_A_TIME:
         return _built(robot, hands, goals, cost)
 
@@ -376,10 +382,9 @@ def segment_lengths(configurations: Array) -> Array:
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:
-    """Configurations along a smooth plan, one piece ``(samples, dof)`` per goal.
-
-    Hermite cubics (one rate) or quintics (two) between start and goals.
-    """
+    """Return configurations along a plan with rates, one piece ``(samples, dof)`` per goal, at
+    equal steps in time; the last of a piece is the configuration at the goal. Hermite cubics (one
+    rate) or quintics (two) between start and goals."""
     from scipy.interpolate import BPoly  # slow, and a command that names methods needs none
 
     corners = np.vstack([plan.instance.q0, plan.configurations])

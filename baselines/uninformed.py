@@ -81,7 +81,7 @@ class Attempts:
         return trials
 
     def result(self, **details: Any) -> Result:
-        """Return the movements of the best trial, with its number and ``details``. Raises
+        """Return the movements of the best trial, with its number (from 0) and ``details``. Raises
         MethodError if no trial hit every goal."""
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)

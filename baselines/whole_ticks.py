@@ -55,19 +55,16 @@ class Rounding:
         self._step = session.model.step
 
     def nearest(self, plan: PathPlan) -> TickPlan | None:
-        """Every segment but the last rounded to the nearest step, the last one up.
-
-        At a shortest path the total does not change with the division to first order, so
-        this is nearly always the least number of ticks. None where a solve fails.
-        """
+        """Return the plan with every segment but the last rounded to the nearest step, and the last
+        one up. At a shortest path the total does not change with the division to first order, so
+        this is nearly always the least number of ticks. None where a solve fails."""
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
     def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Roundings up and down of all but the last segment, the nearest first.
-
-        All of them with up to seven goals, else the nearest ``MOST_ROUNDINGS``.
-        """
+        """Yield the plan with all but the last segment rounded up or down, and the last one up, the
+        nearest roundings first. All roundings with up to seven goals, else the nearest
+        ``MOST_ROUNDINGS``; those whose solve fails are left out."""
         exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
         ranked = sorted(
@@ -88,10 +85,10 @@ class Rounding:
     def plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """Yield the plan itself, and shortest plans in which some goals are hit without a movement.
-        Such a plan pays if its path grows by less than the ticks that it saves. The path only grows
-        with further such goals, so sets are left out that cannot save what is ``worth`` it.
-        """
+        """Yield pairs of goals (from 0) that are hit without a movement and the shortest plan in
+        which they are, first no goals with the plan itself. Such a plan pays if its path grows by
+        less than the ticks that it saves. ``worth`` says whether a number of ticks is of interest;
+        sets of goals that cannot come to such a number are left out."""
         goals = len(self._instance.hands)
         able = _mergeable(task, self._instance.hands)
         waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
@@ -108,7 +105,8 @@ class Rounding:
                     waiting.append((more, merger))
 
     def divide(self, plan: PathPlan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
-        """The plan with these steps to all goals but the last, and as few as can be to that."""
+        """Return the plan with these numbers of steps to all goals but the last, and the fewest to
+        the last goal; None if a solve fails."""
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)
         if not shortest.converged:
@@ -176,12 +174,12 @@ def movements(
     configurations: Array,
     steps: tuple[int, ...] | None = None,
 ) -> tuple[Movement, ...]:
-    """Movements of an instance to one configuration per goal, ``(G, dof)``.
+    """Return the movements of an instance to one configuration per goal, ``(G, dof)``.
 
-    Joints that are held on the way to a goal stay where they are, also where an earlier
-    movement hit before it was where the plan has it. With ``steps``, each movement aims
-    through the rim to hit after so many; where no target beyond does, it aims at the plan's
-    own configuration. The session counts the effort.
+    Joints that are held on the way to a goal stay where they are, also where an earlier movement
+    hit before it was where the plan has it. With ``steps`` (a number per goal, 0 for no movement)
+    each movement aims through the rim to hit after so many; where no target beyond does, it aims at
+    the plan's own configuration. The session counts the effort.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model

@@ -29,11 +29,9 @@ _AROUND = tuple(Path(__file__).with_name(name) for name in ("worker.py", "scorin
 
 
 def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
-    """Return the hash of the code of a method in a file, and of the data files that the method
-    reads.
-
-    Raises OSError or SyntaxError.
-    """
+    """Return the hash, 12 hexadecimal digits, of the code of a method in a file, and of the data
+    files that the method reads. Raises OSError for a file that cannot be read, SyntaxError or
+    ValueError for one that is no Python."""
     modules = [path.read_bytes() for path in [*files_of(method), *_AROUND]]
     content = sorted(syntax(text)[0].encode() for text in modules)
     content += [path.read_bytes() for path in data]

@@ -43,7 +43,7 @@ _UNDECLARED = ("does not declare", "own compiled", "outside its session")  # wor
 
 
 class Law(NamedTuple):
-    """A law, True if it holds, and the finding in words."""
+    """A law by name, whether it holds, and the finding in words."""
 
     name: str
     passed: bool
@@ -60,11 +60,9 @@ def _law(name: str, problems: Iterable[str], finding: str) -> Law:
 def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
-    """Check every law of a method, in order.
-
-    ``tasks`` are the shipped tasks by default. ``verbose`` shows what the method prints and logs,
-    and the tracebacks of its crashes.
-    """
+    """Check every law of a method by runs on tasks, and return the laws in order. ``tasks`` are the
+    shipped tasks by default; those to which the method does not apply are left out. ``verbose``
+    shows what the method prints and logs, and the tracebacks of its crashes."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
@@ -97,7 +95,7 @@ def _laws_of_runs(
     info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
 ) -> Iterator[Law]:
     """Yield the laws that the runs of a method keep or break; ``runs`` holds the runs by kind and
-    task."""
+    task, ``checked_with`` names the parameters in words."""
 
     def of_kind(kind: str) -> Iterator[tuple[str, Outcome]]:
         return ((task, run.outcome) for (each, task), run in runs.items() if each == kind)
@@ -224,7 +222,8 @@ def _hopeless_task(like: Task) -> Task:
 
 
 def check_task_file(path: Path, registered: Registry) -> list[Law]:
-    """Check every law of a task file, in order; for an invalid file the first law alone."""
+    """Check every law of a task file, and return the laws in order; for an invalid file the first
+    law alone. ``registered``: the methods of which some have to apply."""
     try:
         task = load_task(path)
     except TaskError as error:

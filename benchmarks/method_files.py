@@ -33,11 +33,10 @@ _LONGEST_ANSWER = 2**24  # bytes of an answer
 
 def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """Start a process that imports a method file, and return a function that asks the process about
-    a method by its id.
-
-    The function raises CoarticError if the process gives no answer. The process, with all processes
-    that it starts, ends with this process.
-    """
+    a method. ``shown`` is the name of the file in messages. The function takes the id of a method,
+    a question of :class:`MethodInfo` and its arguments; the question ``methods``, with an empty id,
+    gives the infos of all methods as dictionaries. It raises CoarticError if the process gives no
+    answer or an error. The process, with all processes that it starts, ends with this process."""
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, path, shown
@@ -139,8 +138,8 @@ def _methods_of_module(
 
 
 def check_declaration(method: type[Method], origin: str) -> None:
-    """Check the declaration of a method. Raises CoarticError if a required attribute is missing or
-    wrong."""
+    """Check the declaration of a method; ``origin`` is the name of its file in messages. Raises
+    CoarticError if a required attribute is missing or wrong."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)

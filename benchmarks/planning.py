@@ -128,7 +128,8 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
 
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
-    """Return the jobs that a request asks for.
+    """Return the jobs that a request asks for, one for each cell; ``registered`` has all known
+    methods.
 
     Raises CoarticError for unknown names, for a task whose name is taken, for parameters that a
     method does not take, for more than :data:`MOST_CELLS` cells, and for a name or an option

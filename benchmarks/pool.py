@@ -90,8 +90,8 @@ class Local:
 
 
 class Workers:
-    """Worker processes and the folder of their answers. If the worker ``stays``, it waits for
-    further jobs of its method."""
+    """Worker processes with the options of ``local``, and the folder of their answers. With
+    ``stays`` a worker without jobs waits for further jobs of its method."""
 
     def __init__(self, local: Local, *, stays: bool = False) -> None:
         self.local, self.stays = local, stays
@@ -259,7 +259,8 @@ class Worker:
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None) -> list[Outcome]:
-        """Return the outcomes of the current job of a process that has ended or is late."""
+        """Return the outcomes of the current job of a process that has ended, or that is late
+        (``exit_code`` None)."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"

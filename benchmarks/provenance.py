@@ -37,7 +37,8 @@ _LIBRARIES = (
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Return versions, platform and commit of this process."""
+    """Return versions, platform and commit of this process: always the same dictionary, not to be
+    changed."""
     processor = platform.processor()
     with contextlib.suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")

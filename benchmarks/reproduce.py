@@ -78,10 +78,9 @@ def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[
 
 
 def perform_again(run: Run, registered: Registry) -> Run:
-    """Perform a stored run again with the present code of its method.
-
-    Raises CoarticError if the method no longer takes the parameters of the run.
-    """
+    """Perform a stored run again with the present code of its method, and return the new run, which
+    is not stored. ``registered`` must have the method. Raises CoarticError if the method no longer
+    takes the parameters of the run."""
     method = registered[run.cell.method.name]
     try:
         method.complete(run.cell.parameters)
@@ -97,12 +96,9 @@ def perform_again(run: Run, registered: Registry) -> Run:
 def perform_some_again(
     folder: Path, count: int, registered: Registry
 ) -> Iterator[tuple[str, list[str]]]:
-    """Perform ``count`` runs of a folder again, spread over its cells, and yield the id of each run
-    with its differences to the stored run.
-
-    Runs count whose methods still have the code of the run. Raises CoarticError if there is no such
-    run.
-    """
+    """Perform at most ``count`` runs of a folder again, spread over its cells, and yield the id of
+    each run with its differences to the stored run (:func:`compare_runs`). Runs count whose methods
+    still have the code of the run. Raises CoarticError if there is no such run."""
     with open_store(folder) as store:
         ids = [
             job.run_id(number)
@@ -149,8 +145,8 @@ def doubts_of(run: Run) -> Iterator[str]:
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:
-    """Return the differences between the results of two runs, in words; times and environments do
-    not count."""
+    """Return the differences between the results of two runs, in words, none for equal results;
+    times and environments do not count."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     first, second = a.to_row(), b.to_row()

@@ -72,7 +72,7 @@ class _Block(FileData):
     free_base: Annotated[bool, Field(strict=True)] = False
     """True to free the base in x and y on every task."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
-    """Numbers of goals: the block has only tasks with so many; by default all."""
+    """Numbers of goals that tasks of the block may have; by default any."""
     runs: RunCount | None = None
     """Runs of each method on each task; by default the number of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
@@ -147,8 +147,8 @@ def kind_of(name: str) -> str:
 
 @checked_arguments
 def check_kind(name: str, *kinds: str) -> None:
-    """Check that a name, if it is a thing at all, is of one of these kinds. Raises CoarticError,
-    which names the command for its kind."""
+    """Check that what is named, if it has a kind (:func:`kind_of`), is of one of these kinds.
+    Raises CoarticError, which names the command for its kind."""
     kind = kind_of(name)
     if kind and kind not in kinds:
         raise CoarticError(f"{name} is a {kind}: {_TAKEN_BY[kind].format(quote(name))}")
@@ -190,11 +190,9 @@ def _read_suite(path: Path) -> Suite:
 def tasks_of(
     suite: Suite, block: _Block, own: Collection[str], task_named: TaskNamed
 ) -> Iterator[Task]:
-    """Yield the tasks of a block, as the block changes them.
-
-    ``own`` names the tasks of the user. A block for all tasks is for these tasks as well, and moves
-    none of their goals.
-    """
+    """Yield the tasks of a block, with a freed base or a moved goal where the block asks for it.
+    ``own`` has the names of the user's tasks, ``task_named`` returns a task by name. A block for
+    all tasks (``*``) is for the user's tasks as well, and moves none of their goals."""
     every = [*builtin_tasks(), *own]
     names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):

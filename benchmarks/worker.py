@@ -49,7 +49,8 @@ def fail(
     wall_s: float | None = None,
     cpu_s: float | None = None,
 ) -> list[Outcome]:
-    """Return the outcomes of a job whose worker gave no answer."""
+    """Return an outcome for each run of a job whose worker gave no answer. ``wall_s`` and ``cpu_s``
+    are times of the whole job, which its runs share."""
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.numbers]
@@ -128,7 +129,8 @@ def _noting(maker: Any) -> Any:
 
 
 def perform_job(job: Job) -> list[Outcome]:
-    """Perform a job. An error of the method is an outcome."""
+    """Perform the runs of a job in this process, and return an outcome for each in their order. An
+    error of the method is an outcome, and not raised."""
     cell, name = job.cell, job.cell.method.name
     sessions = [
         Session(
@@ -233,6 +235,7 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
 
 
 def _plain_details(details: Any) -> dict[str, Any]:
-    """Return the details of a result as plain data."""
+    """Return a copy of the details of a result as plain data. Raises TypeError or ValueError for
+    details that JSON cannot hold."""
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
     return dict(json.loads(text.encode()))

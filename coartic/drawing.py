@@ -36,11 +36,11 @@ def draw_robot(
     alpha: float = 1.0,
     colour: str = BLACK,
 ) -> Callable[[Array], None]:
-    """Draw base and arms in configuration ``q`` (dof,), their joints marked.
+    """Draw the base and the arms of the task's hands in configuration ``q``, shape ``(dof,)``.
 
-    Returns a function that moves what is drawn to another configuration. ``weight`` is the width
-    of lines, ``alpha`` makes all paler. Set the limits of ``axes``: patches do not widen them,
-    which takes long.
+    Returns a function that moves the drawing to another configuration. ``weight`` scales the width
+    of lines; ``alpha`` is the opacity, from 0 to 1. Set the limits of ``axes`` yourself: the base
+    does not widen them.
     """
     base = Polygon(
         task.robot.base_outline(q),
@@ -70,7 +70,7 @@ def draw_robot(
 
 
 def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
-    """Draw every goal as an open circle of its radius; returns the circles."""
+    """Draw every goal as an open circle of its radius; return the circles, in goal order."""
     options: Any = {"fill": False, "edgecolor": BLACK, "linewidth": 0.7 * weight, "zorder": 3}
     circles = [Circle(goal, task.radius, **options) for goal in task.goals]
     for circle in circles:
@@ -79,13 +79,14 @@ def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]
 
 
 def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
-    """Fill the goals that are hit."""
+    """Fill the circles of goals that are hit and empty the others; ``hit`` has a bool for each."""
     for circle, is_hit in zip(circles, np.asarray(hit), strict=True):
         circle.set(fill=bool(is_hit), facecolor=HIT)
 
 
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
-    """Write the number of every goal above it, or below where another goal is close above."""
+    """Write the number of every goal, from 1, above it, or below where another goal is close above.
+    ``weight`` scales the distance; ``text`` goes to ``Axes.annotate``."""
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
     crowded = _CROWDED * task.robot.scale
@@ -102,9 +103,10 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
 
 
 def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
-    """Lower left and upper right corner of a box with the goals and the robot, length unit.
+    """Return the lower left and the upper right corner, shape ``(2,)``, length unit, of a box
+    around the goals and the robot in ``configurations``, shape ``(..., dof)``.
 
-    ``configurations`` are the robot's, shape ``(n, dof)``; ``margin`` is for arms of length 4.
+    ``margin`` is the free border, length unit, for arms of length 4; it scales with the arms.
     """
     margin *= task.robot.scale
     points = [

@@ -61,20 +61,21 @@ class Estimate:
     high: float = math.nan
     p: float = math.nan
     n: tuple[int, ...] = ()
-    """Values in each sample; a number taken as known is no sample."""
+    """Number of values in each sample; a number taken as known is no sample."""
     resamples: int = 0
-    """Resamples that p was counted in; 0 for an exact test."""
+    """Number of resamples in which p was counted; 0 for an exact test."""
     least_p: float = math.nan
     """Smallest p that the test can give for so many values: above 5 % it cannot reject."""
 
     def columns(self, name: str) -> dict[str, float]:
-        """Three columns of a table: the number and both ends of its interval."""
+        """Return three entries of a table: ``name``, the value, and ``name_low`` and ``name_high``,
+        the ends of its interval."""
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
 
 def vector(values: ArrayLike) -> Array:
-    """A sample as a vector (n,). Raises ValueError where it is empty or holds NaN, infinity or
-    masked values.
+    """Return a sample as a float vector ``(n,)``. Raises ValueError where it is empty or holds NaN,
+    infinity or masked values.
 
     Runs without a solution have no reward: the caller decides what becomes of them.
     """
@@ -85,7 +86,7 @@ def vector(values: ArrayLike) -> Array:
 
 
 def slices(count: int, most: int) -> Iterator[slice]:
-    """Slices of at most ``most`` places that cover ``count`` places, in their order."""
+    """Yield slices of at most ``most`` indices, which in their order cover 0 to ``count`` - 1."""
     for start in range(0, count, most):
         yield slice(start, min(start + most, count))
 
@@ -99,13 +100,14 @@ def varies(values: Array) -> Array:
 
 @checked_arguments
 def centred(values: Array) -> Array:
-    """Values less their mean over the first axis; 0 where they do not differ."""
+    """Return values less their mean over the first axis; 0 where they do not differ."""
     return np.where(varies(values), values - values.mean(axis=0), 0.0)
 
 
 @checked_arguments
 def mean(values: ArrayLike, *, resamples: Resamples = RESAMPLES) -> Estimate:
-    """Mean with its interval, as :func:`mean_of_means` makes it."""
+    """Return the mean of a sample ``(n,)`` with its interval, as :func:`mean_of_means` makes it.
+    Raises ValueError for a sample that is empty or not finite."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
 
@@ -126,9 +128,10 @@ def difference_of_means(
 def mean_of_means(
     samples: Sequence[Array], weights: Sequence[float], resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """A weighted sum of the means of independent samples, with its BCa interval.
+    """Return the weighted sum of the means of independent samples, with its BCa interval.
 
-    Each sample is resampled within itself, so samples that are strata stay so. The edge cases:
+    Samples have shapes ``(n,)``, each with a weight. Each is resampled within itself. Raises
+    ValueError without a sample. The edge cases:
 
     - a sample of fewer than :data:`FEWEST` values: no interval;
     - no spread in any sample: the interval is that point, which says that the samples have no
@@ -170,8 +173,8 @@ def mean_of_means(
 
 
 def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
-    """Yield the places of values that resamples of samples draw, shape ``(batch, size)`` for each
-    sample, a thousand resamples at a time or as many as fit."""
+    """Yield batches of at most 1,000 resamples: for each sample the indices of the values drawn,
+    shape ``(batch, size)``. Equal arguments give equal indices."""
     rng, batch = np.random.default_rng(SEED), 1_000
     if max(sizes) > LARGE:
         batch = max(1, min(100, 1_000_000 // max(sizes)))
@@ -188,5 +191,6 @@ def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.
 
 @checked_arguments
 def standard_deviation(values: Array) -> float:
-    """SD of values (n,), n - 1 degrees of freedom; 0 without spread, NaN of fewer than two."""
+    """Return the SD of values ``(n,)``, with n - 1 degrees of freedom; 0 without spread, NaN for
+    fewer than two values."""
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

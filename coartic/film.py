@@ -50,13 +50,14 @@ def write_film(
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Draw movements with their titles side by side, all from their first tick, into ``path``.
+    """Write a film of movements side by side, all from their first tick.
 
-    Returns the number of frames that differ, and the ticks that are shown in a second.
+    ``movements`` are pairs of a title and a trajectory. Returns the number of frames that differ,
+    and the ticks that are shown in a second.
 
     ``width`` of the picture is in pixels. A movement that ends before the others stands still.
-    Without ``replace`` no file is written over. Raises CoarticError for an ending that is not in
-    :data:`FILMS`, for MP4 without ffmpeg, and where the file cannot be written.
+    Without ``replace`` no file is written over. Raises CoarticError for movements without a tick,
+    and as :func:`check_film` does.
     """
     check_film(path, replace=replace)
     ticks = max(len(movement.configurations) for _, movement in movements)
@@ -92,8 +93,8 @@ def write_film(
 
 @checked_arguments
 def check_film(path: Path, *, replace: bool = False) -> None:
-    """Raises CoarticError, before anything is drawn, for an ending that is not supported, for MP4
-    without ffmpeg, and as :func:`check_output` does."""
+    """Raise CoarticError for a film whose ending is not in :data:`FILMS`, for MP4 without ffmpeg,
+    and as :func:`check_output` does. Nothing is written."""
     check_ending(path, FILMS)
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
@@ -101,8 +102,8 @@ def check_film(path: Path, *, replace: bool = False) -> None:
 
 
 def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
-    """Draw goals, robot, traces and the counter of ticks, and return a function that shows them at
-    a row of the movement, past its end at the last: artists are updated, never drawn again."""
+    """Draw goals, robot, traces and the counter of ticks, and return a function that updates them
+    to a row of the movement's configurations, from 0; to the last one past the end."""
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
     traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}
@@ -124,8 +125,8 @@ def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int],
 def set_stage(
     movements: Sequence[tuple[str, Trajectory]], width: int
 ) -> tuple[Figure, list[Callable[[int], None]]]:
-    """A figure ``width`` pixels wide with a scene per movement, all showing the same place, and
-    the functions that show their rows."""
+    """Return a figure ``width`` pixels wide with axes for each movement, all over the same region,
+    and for each movement a function that shows a row of its configurations, from 0."""
     corners = np.array([box(movement.task, movement.configurations) for _, movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low

@@ -53,7 +53,7 @@ RowIndex = NDArray[np.int64] | slice
 
 
 class Recorded:
-    """An environment whose specification JSON can hold, as recorders of episodes do."""
+    """An environment whose specification is plain data for JSON, as recorders of episodes need."""
 
     _spec: EnvSpec | None = None
 
@@ -180,7 +180,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self._rngs: list[Any] = [None] * num_envs
 
     def task_at(self, number: int) -> Task:
-        """A task by its number, from 0; it is loaded when it is first asked for."""
+        """Return a task by its number in ``tasks``, from 0; it is loaded on the first call. Raises
+        ValueError for another number."""
         check_limits("number", number, 0, len(self.tasks) - 1)
         task, state = as_task(self.tasks[number]), self.state
         if state.kinds[number] < 0:
@@ -212,7 +213,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self._widest.most_links + right])
 
     def _begin(self, rows: RowIndex, numbers: ArrayLike) -> None:
-        """Put robots at the start of the tasks of these numbers."""
+        """Put the robots ``rows`` at the start of the tasks of these numbers, and observe."""
         state = self.state
         state.task[rows], state.goal[rows], state.going[rows] = numbers, 0, True
         for number in {*state.task[rows].tolist()}:
@@ -238,7 +239,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         step_robots(*self.state)
 
     def infos(self) -> dict[str, Any]:
-        """Names of tasks, and whether all goals are hit."""
+        """Return ``task``, the name of each robot's task, and ``is_success``, whether it has hit
+        all goals: arrays of shape ``(N,)``."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
@@ -250,8 +252,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin all trials, and return observations and infos.
 
-        ``seed``: a seed for each robot, or one, from which robot i has ``seed + i``; None keeps the
-        generators. There are no options.
+        ``seed``: a seed for each robot, or one, from which robot i (from 0) has ``seed + i``; None
+        keeps the generators. Raises ValueError for any option, and for other seeds.
         """
         _check_no_options(options)
         if isinstance(seed, Iterable):
@@ -345,7 +347,8 @@ class TaskEnv(Recorded, gymnasium.Env):
         return state.seen[0].copy(), state.rewards.item(), not state.going[0], False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The robot and its goals as a picture ``(400, 600, 3)``; goals that are hit are filled."""
+        """Return the robot and its goals as a picture ``(400, 600, 3)``, in which goals that are
+        hit are filled; None without ``render_mode``."""
         if self.render_mode is None:
             return None
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -375,7 +378,7 @@ def _check_no_options(options: Mapping[str, Any] | None) -> None:
 
 
 def _whole_seed(seed: Any) -> int | None:
-    """A seed as Gymnasium takes it. Raises ValueError for anything else."""
+    """Return a seed: a whole number from 0, or None. Raises ValueError for anything else."""
     if seed is None:
         return None
     check_limits("seed", seed, 0, MOST_RUN_SEED)
@@ -432,8 +435,7 @@ def score(
     ----------
     env : str, Env or VectorEnv
         An environment of this package without wrappers, or its id. Of a family the instances of
-        the test split
-        are scored, or those of the ``split`` that is given here.
+        the test split are scored, or of the ``split`` that is given here.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
@@ -490,7 +492,7 @@ def score(
 
 @checked_arguments
 def column(rewards: Iterable[float | None]) -> Array:
-    """Rewards as a column, shape ``(K, 1)``; NaN for None."""
+    """Return rewards as a column, shape ``(K, 1)``; NaN for None."""
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
 
 
@@ -545,8 +547,9 @@ def _rollout(
 
 @checked_arguments
 def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
-    """Compare rewards of policies, shapes ``(K, trials)``, with the best known rewards, shape
-    ``(K, 1)``, as :func:`score` returns them."""
+    """Return the table of :func:`score` from the rewards of policies on K tasks, shapes
+    ``(K, trials)``, NaN where a trial failed, and the best known rewards, shape ``(K, 1)``, NaN
+    where none is known. Raises ValueError for other shapes."""
     shapes = [np.shape(earned) for earned in (best, *rewards.values())]
     if any(len(shape) != 2 or shape[0] != len(best) for shape in shapes):
         raise ValueError(f"rewards have shapes {shapes}; needed is a row for each task")
@@ -601,7 +604,7 @@ def _without_wrappers(env: Any, name: str, known: Any = None) -> Any:
 
 
 def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Reward of a method's solution of a task; None where it has none."""
+    """Return the reward of a method's solution of a task; None without one, or if it fails."""
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
         return execute(task, result.solution, model=model).reward

@@ -31,9 +31,9 @@ class VectorState(NamedTuple):
     """State of N environments, each on one of T tasks with G goals at most, and work space."""
 
     task: Numbers
-    """Number of the task, shape ``(N,)``."""
+    """Number of the task, from 0, shape ``(N,)``."""
     goal: Numbers
-    """Index of the next goal, shape ``(N,)``."""
+    """Index of the next goal, from 0, shape ``(N,)``."""
     q: Configs
     """Configurations, shape ``(N, dof)``."""
     going: NDArray[np.bool_]
@@ -52,17 +52,17 @@ class VectorState(NamedTuple):
     goals: Points
     """Centres of goals, shape ``(T, G, 2)``; a task has the first ``counts``."""
     counts: Numbers
-    """Goals of each task, shape ``(T,)``."""
+    """Number of goals of each task, shape ``(T,)``."""
     movable: NDArray[np.bool_]
     """True where the robot of a task can move a joint, shape ``(T, E)``."""
     joints: Numbers
     """Indices in a configuration of the joints that are seen and moved, shape ``(E,)``."""
     sides: Hands
-    """The hands of all robots, shape ``(H,)``."""
+    """The hands that all robots have, shape ``(H,)``."""
     ahead: int
-    """Goals that are seen beyond the next one."""
+    """Number of goals that are seen beyond the next one."""
     reach: float
-    """How far from the middle a target can be, length unit or rad."""
+    """Half the width of the box of targets, length unit (base) and rad (joints)."""
     runs: NDArray[np.void]
     """Runs of a lot of robots with each hand, shape ``(H, SLOTS)``."""
     at: NDArray[np.void]
@@ -70,9 +70,9 @@ class VectorState(NamedTuple):
     corrected: Array
     moved: Array
     accounts: NDArray[np.void]
-    """Accounts of these robots' goals, shape ``(SLOTS,)``."""
+    """Accounts of the goals of the robots of a lot, shape ``(SLOTS,)``."""
     indices: Numbers
-    """Numbers of these robots, shape ``(SLOTS,)``."""
+    """Numbers, from 0, of the robots of a lot, shape ``(SLOTS,)``."""
 
     @classmethod
     def empty(
@@ -85,8 +85,8 @@ class VectorState(NamedTuple):
         ahead: int,
         reach: float,
     ) -> VectorState:
-        """State in which no task is loaded: of N environments on T tasks with G goals at most, the
-        ``shape``, whose observations have so many entries."""
+        """Return a state in which no task is loaded. ``shape`` is ``(N, T, G)``, numbers of
+        environments, tasks and, at most, goals; ``entries`` is the length of an observation."""
         count, tasks, goals = shape
         batch = batch_for(robot)
         return cls(
@@ -117,7 +117,8 @@ class VectorState(NamedTuple):
 
 @inner
 def _squared_distance(run: Any) -> float:
-    """Squared joint distance to the solution of the corrective process; infinite without one."""
+    """Return the squared joint distance of a run from its target, the solution of the corrective
+    process; infinite without a solution."""
     square = 0.0 if run.converged else math.inf
     for j in range(len(run.q)):
         square += (run.target[j] - run.q[j]) ** 2
@@ -132,7 +133,8 @@ def aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -
 
     ``run`` is changed in place; ``other`` is the run of the other hand, with two hands.
     ``action[0] > 0.5`` takes the other hand; the rest, clipped to ±1, is scaled by
-    ``state.reach``."""
+    ``state.reach``.
+    """
     if len(state.sides) > 1:
         is_nearer = _squared_distance(other) < _squared_distance(run)
         if is_nearer != (action[0] > 0.5):
@@ -149,7 +151,7 @@ def aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -
 
 @inlined
 def _step_lot(count: int, robot: Any, state: Any) -> None:
-    """A step of as many robots as there is room for."""
+    """Make a step of the first ``count`` robots in ``state.indices``, at most :data:`SLOTS`."""
     for h in range(len(state.sides)):
         for i in range(count):
             n, run = state.indices[i], state.runs[h, i]
@@ -180,8 +182,8 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
 
 @entry
 def observe(*fields: Any) -> None:
-    """Fill in what each robot sees: whether there is a goal, places of goals from the base, joints,
-    and, where there is room for it, whether the robot can move them."""
+    """Fill in ``seen`` of a :class:`VectorState`, whose entries are ``fields``: whether there is a
+    goal, places of goals from the base, joints, and, where there is room, which joints can move."""
     state = VectorState(*fields)
     goals, joints = state.ahead + 1, len(state.joints)
     for n in range(len(state.task)):
@@ -201,7 +203,8 @@ def observe(*fields: Any) -> None:
 
 @entry
 def step_robots(*fields: Any) -> None:
-    """Let all robots whose trial goes on reach for their next goal."""
+    """Let all robots whose trial goes on reach for their next goal; change the arrays ``fields``,
+    the entries of a :class:`VectorState`, in place."""
     state = VectorState(*fields)
     last = len(state.task) - 1
     for kind in range(len(state.parameters)):  # robots of a kind are moved together

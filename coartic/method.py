@@ -151,7 +151,7 @@ class Meter:
     """Wall time of solving them."""
 
     COUNTS: ClassVar[tuple[str, ...]]
-    """All of these but the times."""
+    """Names of all counters but the times."""
     SOLVER: ClassVar[tuple[str, ...]] = (
         "forward_kinematics",
         "jacobians",
@@ -164,7 +164,7 @@ class Meter:
     that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add to counters."""
+        """Add counts to the counters of these names, unchecked."""
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 
@@ -187,9 +187,9 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     """Plain data to be stored with the solution. Never its score."""
     initial: tuple[Movement, ...] = ()
-    """Movements of a learner's first trial, if it hit every goal."""
+    """Movements of a learner's first trial; empty if it failed, and for other methods."""
     replay: tuple[Movement, ...] = ()
-    """Movements of a learner's noiseless greedy trial after learning."""
+    """Movements of a learner's noiseless greedy trial after learning; empty likewise."""
 
 
 class Outline(NamedTuple):
@@ -217,18 +217,20 @@ class Outline(NamedTuple):
 
 @checked_arguments
 def outline_of(task: Task) -> Outline:
-    """The outline of a task."""
+    """Return the outline of a task."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
 class Session:
     """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced, and calls are counted. This is no sandbox.
-    ``trusted`` methods, this project's own, may also take the task to their compiled
-    kernels and state the counts themselves. Trials that a process makes outside the
-    sessions ``of_run`` are counted as well (:mod:`coartic.motion.trial`). Threads can share
-    a session: they make trials one after the other, of one budget.
+    The declaration is enforced, and calls are counted: a call that *needs* information raises
+    UndeclaredError if ``information`` lacks it. This is no sandbox. ``trusted`` methods, this
+    project's own, may also take the task to their compiled kernels and state the counts
+    themselves. ``of_run`` marks the session of a run: trials that a process makes outside such
+    sessions are counted apart (:func:`coartic.motion.trial.trials_outside`). ``trial_budget`` is
+    the most trials, None for any number. Threads can share a session: they make trials one after
+    the other, of one budget.
     """
 
     def __init__(
@@ -247,6 +249,7 @@ class Session:
         self._used: set[Information] = set()
         self.seed = seed
         self.rng = np.random.default_rng(seed)
+        """Generator of the run's random numbers."""
         self.model = model
         self._trusted = trusted
         self._of_run = of_run
@@ -285,7 +288,7 @@ class Session:
 
     @property
     def q0(self) -> Array:
-        """Starting configuration, shape ``(dof,)``."""
+        """Starting configuration, shape ``(dof,)``, length unit and rad, a copy."""
         return np.array(self._task.q0)
 
     @property
@@ -294,20 +297,20 @@ class Session:
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
-        """The part of ``q`` that holds one arm's joints."""
+        """Return the slice of a configuration that holds the joint angles of a hand's arm."""
         return self._task.robot.joints(hand)
 
     # These need a declaration.
 
     @property
     def goals(self) -> Array:
-        """Goal centres, shape ``(G, 2)``. Needs ``goals``."""
+        """Goal centres, shape ``(G, 2)``, length unit, a copy. Needs ``goals``."""
         self._use(Information.GOALS)
         return np.array(self._task.goal_array)
 
     @property
     def radius(self) -> float:
-        """θ^g. Needs ``goals``."""
+        """θ^g: radius of every goal, length unit. Needs ``goals``."""
         self._use(Information.GOALS)
         return self._task.radius
 
@@ -321,7 +324,7 @@ class Session:
         return self._task.robot
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Hand position as a CasADi expression. Needs ``kinematic model``.
+        """Return :meth:`Robot.symbolic_hand`, a CasADi expression. Needs ``kinematic model``.
 
         What a solver evaluates of it is counted with :meth:`spend`.
         """
@@ -334,9 +337,10 @@ class Session:
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Count corrective movements without a target as a use of the corrective process.
+        """Note a use of the corrective process if a corrective movement has no target.
 
-        Raises SolutionError for what is no list of movements.
+        Raises UndeclaredError if the method does not declare the corrective process, and
+        SolutionError for what is no sequence.
         """
         if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
@@ -359,14 +363,16 @@ class Session:
     # Calls that are counted.
 
     def forward_kinematics(self, q: Any, hand: Hand) -> Array:
-        """Hand positions, ``(..., 2)``; counts one evaluation per configuration."""
+        """Return hand positions, ``(..., 2)``, length unit, for configurations ``(..., dof)``;
+        count an evaluation for each. Needs ``forward kinematics``."""
         self._use(Information.FORWARD_KINEMATICS)
         positions = self._task.robot.forward_kinematics(q, hand)
         self._meter.add(forward_kinematics=positions[..., 0].size)
         return positions
 
     def jacobian(self, q: Any, hand: Hand) -> Array:
-        """Jacobians, ``(..., 2, dof)``; counts one per configuration."""
+        """Return Jacobians, ``(..., 2, dof)``, for configurations ``(..., dof)``; count one for
+        each. Needs ``Jacobian``."""
         self._use(Information.JACOBIAN)
         jacobians = self._task.robot.jacobian(q, hand)
         self._meter.add(jacobians=jacobians[..., 0, 0].size)
@@ -374,7 +380,7 @@ class Session:
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
         """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1); count its
-        iterations, Jacobians and forward-kinematics evaluations."""
+        iterations, Jacobians and evaluations. Needs ``corrective process``."""
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
         correction = correct(
@@ -393,12 +399,12 @@ class Session:
         return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
-        """Make one physical trial; counts it, its ticks and its corrections.
+        """Make one physical trial; count it, its ticks and its corrections. Needs ``reward by
+        trial``.
 
-        Goals that are missed are corrected, and paid for. Where the corrective process
-        is not declared, the execution that comes back does not show what it found.
-        Raises BudgetError where no trial is left, SolutionError for a solution that
-        breaks the rules.
+        Goals that are missed are corrected, and the ticks count. Where the corrective process is
+        not declared, the execution has the movements as given and no configurations. Raises
+        BudgetError if no trial is left, SolutionError for a solution that breaks the rules.
         """
         self._use(Information.REWARD_BY_TRIAL)
         self.check_solution(solution)
@@ -428,8 +434,8 @@ class Session:
         ``hands`` is one hand sequence for all (``"RRLR"``), or one each. ``targets`` has shape
         ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
         keeps its value, and for a goal without any target the corrective process acts alone, which
-        has to be declared. Goals that are missed are corrected, and paid for. A trial with a target
-        beyond 100,000 fails without a movement.
+        has to be declared. Goals that are missed are corrected, and the ticks count. A trial with a
+        target beyond 100,000 fails without a movement. Needs ``reward by trial``.
 
         Where the budget has fewer trials left, only the first are made: what comes back is as
         long as trials were made. With ``until``, shape ``(N,)``, the last trial is the first
@@ -478,8 +484,8 @@ class Session:
         return compiled_task(self._task, self.model)
 
     def hand_codes(self, hands: HandSequences, count: int) -> Hands:
-        """Hands of trials as indices into HANDS, shape ``(count, G)``; ValueError where they do
-        not fit."""
+        """Return the hands of trials, 0 left or 1 right, shape ``(count, G)``. Raises ValueError
+        for hand sequences that do not fit the task or ``count``."""
         return hand_codes(self._task, hands, count)
 
     def _make_trials(
@@ -498,7 +504,8 @@ class Session:
         return accounts
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
-        """The hand sequence of a first trial, for a robot with these hands (all by default).
+        """Return the hand sequence of a first trial with these hands (by default all of the robot).
+        Needs ``corrective process`` and ``reward by trial``.
 
         Where the task names a policy in place of a sequence, the trials of the search are counted
         as ``initial_trials``: neither the trials of the method nor the budget include them.
@@ -555,8 +562,8 @@ class Session:
     # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
-        """Add to counters that the session cannot see: evaluations of a solver, and iterations of a
-        corrective process that the method runs itself, which are Jacobians, too.
+        """Add to counters of :attr:`Meter.SOLVER`, by name: evaluations of a solver, and iterations
+        of a corrective process that the method runs itself, which are Jacobians, too.
 
         Raises ValueError for a negative count, for one beyond :data:`MOST_COUNT` in all, and for
         one that the session keeps itself.
@@ -570,11 +577,11 @@ class Session:
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:
-        """Count the wall time of the block as set-up."""
+        """Return a context that adds the wall time of its block to ``build_s``, the set-up."""
         return self._timing("build_s")
 
     def solving(self) -> AbstractContextManager[None]:
-        """Count the wall time of the block as solving."""
+        """Return a context that adds the wall time of its block to ``solve_s``."""
         return self._timing("solve_s")
 
     @contextmanager
@@ -589,7 +596,7 @@ class Session:
     # The back door of this project's compiled methods.
 
     def reveal(self, *information: Information) -> Task:
-        """The task itself, for compiled methods of this project that count by themselves.
+        """Return the task itself, for compiled methods of this project that count by themselves.
 
         Marks ``information`` as used. The method adds its counts with :meth:`spend`.
         Raises UndeclaredError for any other method.
@@ -601,8 +608,9 @@ class Session:
         return self._task
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
-        """Keep the rewards of the trials of a compiled method of this project, and its time for
-        them; in a batch, an equal share of the batch's time."""
+        """Keep the rewards of the trials of a compiled method of this project (None for a failed
+        trial), and its time for them, s; in a batch, an equal share of the batch's time. Raises
+        UndeclaredError for any other method."""
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))
         self._meter.solve_s += solve_s
@@ -634,7 +642,7 @@ class Method(ABC):
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def why_not(self, task: Outline) -> str | None:
-        """Why the method does not apply to a task, or None where it does."""
+        """Return a sentence on why the method does not apply to a task; None if it applies."""
         return None
 
     @abstractmethod
@@ -642,9 +650,9 @@ class Method(ABC):
         """Find a solution. Raises MethodError if no solution is found."""
 
     def most_together(self) -> int:
-        """Number of runs in a batch, at most, for :meth:`solve_together`.
+        """Return the largest number of sessions for a call of :meth:`solve_together`.
 
-        The methods of others are given one.
+        Methods that are not this project's own are given one.
         """
         return 1
 

@@ -66,11 +66,11 @@ _BOUNDS = {
 
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """The model itself; ValueError for constants no movement can be made with,
-    TypeError for what is no model.
+    """Return the model itself. Raises TypeError for what is no MotionModel, and ValueError for
+    constants with which no movement can be made.
 
-    ``radius`` of the goals, where known: a corrective process that ends farther from a
-    goal's centre than that never hits it.
+    ``radius`` is that of the goals, length unit; if it is given, ``correction_tolerance`` must be
+    below it.
     """
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")

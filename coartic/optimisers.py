@@ -70,7 +70,7 @@ NO_COPIES = (
 
 
 def explored_joints(session: Session) -> NDArray[np.bool_]:
-    """Find the joints that methods explore at every goal, shape ``(dof,)``.
+    """Return which entries of a configuration methods explore at every goal, shape ``(dof,)``.
 
     The joints are those that the learner explores under EC1 with one arm and under EC4 with two:
     the coordinates of the base that are not locked, and both arms, whichever hand hits the goal.
@@ -83,9 +83,9 @@ def explored_joints(session: Session) -> NDArray[np.bool_]:
 
 
 def sequences_of(session: Session) -> list[str]:
-    """All hand sequences, the task's own first: a small budget may not reach the others.
+    """List all hand sequences in alphabetical order, but first the one that the task names, if any.
 
-    The task's own alone, where there are too many to try one by one.
+    If there are more than 4096, the task's initial hand sequence alone.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -160,9 +160,9 @@ class Objective:
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
         self.evaluations = 0
-        """Points evaluated; the first trials are not among them."""
+        """Number of points evaluated; the first trials are not among them."""
         self.best_cost = float(-alone.rewards[best])
-        """Cost of the best trial so far; at the start that of the corrective process alone."""
+        """Cost of the best trial so far, ticks; at first that of the corrective process alone."""
         self.best_hands = self.hands
         """Hand sequence of the best trial so far."""
         self._best_x: Array = np.full(self.dim, np.nan)
@@ -184,7 +184,7 @@ class Objective:
 
     @property
     def hands(self) -> str:
-        """The hand sequence."""
+        """Hand sequence of a point for which none is given, such as ``"RRLR"``."""
         return self._hands
 
     # What is known of the task; nothing of this is for a method.
@@ -237,8 +237,8 @@ class Objective:
         return pd.DataFrame(self._better, columns=["evaluations", "cost"])
 
     def evaluations_to(self, targets: ArrayLike) -> Any:
-        """Evaluations after which the cost was at or below targets: a float, or an array of the
-        shape of ``targets``, ticks; infinite for targets that are not reached so far.
+        """Return the number of evaluations after which the best cost was at or below targets,
+        ticks: a float, or an array of their shape; infinite for targets not reached so far.
 
         Raises ValueError for a target that is no cost, from 0 to ``FAILED``.
         """
@@ -307,7 +307,7 @@ class Objective:
         return movements_of(chosen, np.where(after, task.q0, targets))
 
     def fresh(self) -> Objective:
-        """The same problem with nothing evaluated and its whole budget: for another run.
+        """Return the same problem with nothing evaluated and its whole budget, for another run.
 
         Raises UndeclaredError in a method.
         """
@@ -325,9 +325,9 @@ class Objective:
     ) -> Array: ...
 
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
-        """The cost of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)`` as scipy has
-        them. Of as many points as they have entries rows could be meant: :meth:`many` takes
-        rows."""
+        """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
+        columns as scipy has them. Raises ValueError for shape ``(dim, dim)``, in which points may
+        be rows: :meth:`many` takes rows. Other errors are those of :meth:`many`."""
         point = real_array("x", x)
         if point.ndim == 2 and len(point) == self.dim:
             if point.shape[1] == self.dim:
@@ -354,7 +354,7 @@ class Objective:
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
-        """Costs ``(N,)`` of points, which are evaluated side by side.
+        """Return the costs of points, which are evaluated side by side.
 
         Parameters
         ----------
@@ -441,11 +441,12 @@ class Objective:
 
     @property
     def trials_left(self) -> int:
-        """Number of trials left."""
+        """Number of trials left in the budget; above 10^18 without a budget."""
         return self._end - self._session.trials_made
 
     def _trials_left(self, wanted: int) -> int:
-        """Return how many of the trials wanted are left. Raises BudgetError if none is."""
+        """Return how many of the trials wanted are left. Raises BudgetError if none is, and
+        CoarticError in another process."""
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
         left = self.trials_left
@@ -519,7 +520,7 @@ def problems(
     model: MotionModel = PAPER,
     budget: int | None = None,
 ) -> list[Objective]:
-    """The first instances of a family of random tasks as problems.
+    """Return the first instances of a family of random tasks as objectives.
 
     Parameters
     ----------
@@ -574,7 +575,8 @@ class Optimiser(Method):
     Parameters = OptimiserParameters
 
     def solve(self, session: Session) -> Result:
-        """Optimise until the trials are used up; the solution is the best trial's."""
+        """Optimise until the trials are used up; the solution is the best trial's. Raises
+        MethodError if there is no trial to make, none succeeds, or no point is evaluated."""
         parameters: OptimiserParameters = self.parameters
         try:
             cost = Objective(
@@ -593,4 +595,5 @@ class Optimiser(Method):
 
     @abstractmethod
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise; the objective keeps the best point, and ends this when no trial is left."""
+        """Minimise ``objective``, which keeps the best point; let its BudgetError pass, which ends
+        the run when no trial is left. ``rng`` is the generator of the session."""

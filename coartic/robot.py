@@ -127,8 +127,8 @@ class Robot:
 
     @cached_property
     def scale(self) -> float:
-        """Length of the shorter arm compared with the paper's, 4 length units: what is drawn in
-        length units is so much larger."""
+        """Length of the shorter arm divided by the paper's, 4 length units: the factor for sizes in
+        drawings."""
         return min(math.fsum(self.left_links), math.fsum(self.right_links)) / 4.0
 
     @property
@@ -169,7 +169,7 @@ class Robot:
         }
 
     def arm(self, hand: Hand) -> Arm:
-        """Return the arm that carries a hand."""
+        """Return the arm that carries a hand. Raises ValueError for an unknown hand."""
         try:
             return self._arms[hand]
         except (KeyError, TypeError):
@@ -251,7 +251,8 @@ class Robot:
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """Compute :meth:`forward_kinematics` and :meth:`jacobian` of the same ``q`` together."""
+        """Return :meth:`forward_kinematics` and :meth:`jacobian` of the same ``q``, in this order,
+        for less than both cost."""
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1
@@ -331,6 +332,6 @@ def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[An
 
 
 def directions(angles: ArrayLike) -> Array:
-    """Unit vectors of links at absolute angles (rad), shape ``(..., 2)``."""
+    """Return unit vectors, shape ``(..., 2)``, at angles from +x, rad, shape ``(...)``."""
     absolute = np.asarray(angles, dtype=np.float64)
     return np.stack([np.cos(absolute), np.sin(absolute)], axis=-1)

@@ -37,7 +37,7 @@ class RobotEnvs(VecEnv):
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin all trials."""
+        """Begin all trials; return the first observations, shape ``(N, O)``."""
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
         self._reset_seeds()
         self._lost[:], self._steps[:] = 0, 0
@@ -45,11 +45,12 @@ class RobotEnvs(VecEnv):
         return observations
 
     def step_async(self, actions: Array) -> None:
-        """Take the actions of the next subtask."""
+        """Take the actions of the next subtask, shape ``(N, A)``, for :meth:`step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
-        """Make the next subtask of all trials."""
+        """Make the next subtask of all trials; return observations, rewards (:class:`RobotEnvs`),
+        which trials have ended, and a dictionary of infos for each trial."""
         costs = np.array([self._cost(task) for task in self._envs.state.task.tolist()])
         observations, rewards, ended, _, seen = self._envs.step(self._actions)
         self._lost += rewards
@@ -65,15 +66,15 @@ class RobotEnvs(VecEnv):
         """Nothing is open."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute, once for each environment."""
+        """Return an attribute of this vector environment, once for each of ``indices``."""
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused: all environments are one object, so that none can have its own value."""
+        """Raise NotImplementedError: the environments are one object, and none has own values."""
         raise NotImplementedError("the environments have no attributes of their own")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """Refused: all environments are one object, so that none can be asked alone."""
+        """Raise NotImplementedError: the environments are one object, and none has own methods."""
         raise NotImplementedError("the environments have no methods of their own")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
@@ -81,7 +82,8 @@ class RobotEnvs(VecEnv):
         return [False] * self.num_envs
 
     def _cost(self, number: int) -> float:
-        """Ticks of the corrective process alone on a task, one at least, or of a failure."""
+        """Return the ticks of the corrective process alone on the task of this number, at least 1;
+        ``FAILED`` if the process fails."""
         if number not in self._costs:
             reward = initial_reward(self._envs.task_at(number), self._envs.model)
             self._costs[number] = float(FAILED if reward is None else max(-reward, 1))

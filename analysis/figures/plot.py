@@ -73,9 +73,9 @@ project's, as ``matplotlib.style.use`` takes them.
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that turns a drawing function of a study into a figure of the report.
 
-    The figure is in the style of all figures; its id is the name of the function. The caption
-    explains the dagger if a task is reconstructed; ``{n}`` in it is the range of the column
-    ``runs`` of the drawn numbers.
+    The figure is in the style of all figures; its id is the function's name without ``draw_``. The
+    caption gets an explanation of the dagger if a task is reconstructed; ``{n}`` in it is the range
+    of the column ``runs`` of the drawn numbers.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
@@ -107,16 +107,16 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
 
 def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
-    """Return the look of the lines and marks of each method, the same in all figures of a study;
-    methods from files are bold."""
+    """Return the look of the lines and marks of methods by label, the same in all figures of a
+    study; methods from files are bold."""
     rows = study.methods.loc[[*labels]]
     from_file = ~rows.built_in.astype(bool)
     return {label: style.look_of(rows.look[label], from_file[label]) for label in rows.index}
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
-    """Return each row in words, for an alternative text: names in ``{}`` are columns, ``{title}``
-    is the name of the method."""
+    """Return the rows in words, for an alternative text. Names in ``{}`` of the template are
+    columns, ``{title}`` is the title of the method whose label is in column ``method``."""
     rows = rows.assign(title=rows.method.map(study.methods.title))
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 

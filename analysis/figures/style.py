@@ -66,7 +66,7 @@ _DASHES: dict[str, Any] = {
 }
 OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": _DASHES["dotted"]}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": _DASHES["dash-dotted"]}
-"""Lines at the rewards of the optimum and of the initial solution."""
+"""Looks of the lines at the optimum, and at the reward of the corrective process alone."""
 styled = style.context(["default", RC])
 """Decorator that draws in this style on Matplotlib's defaults, without the user's settings."""
 
@@ -76,7 +76,7 @@ Look = dict[str, Any]
 
 
 def look_of(names: tuple[str, str], bold: bool) -> Look:
-    """Return the look of lines and marks by the names of a colour and a dash; ``bold``: with a
+    """Return the look of lines and marks by ``names``, of a colour and of a dash; ``bold``: with a
     wider line and larger marks."""
     color, dash = names
     sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
@@ -91,7 +91,7 @@ def grid(panels: int) -> tuple[int, int]:
 
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
-    """Make :func:`panels` of this block make figures of a width, inches; None: of their own."""
+    """Within this block, let :func:`panels` make figures of a width, inches; None: as they ask."""
     before = _width.set(width)
     try:
         yield
@@ -100,7 +100,7 @@ def drawn_at(width: float | None) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Return whether figures are drawn at less than five inches."""
+    """Return whether figures are now drawn at less than five inches (:func:`drawn_at`)."""
     return (_width.get() or TWO) < 5
 
 
@@ -140,14 +140,15 @@ def panels(
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
-    """Write names to the left of rows that stand at 0, -1, -2 and so on."""
+    """Write names to the left of rows, which stand at y = 0, -1, -2 and so on, first name first."""
     axes.set_yticks([-place for place in range(len(names))], names)
     axes.set_ylim(-len(names) + 0.4, 0.6)
     axes.tick_params(axis="y", length=0)
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """Draw a legend below all panels; for more than two lines the figure becomes taller."""
+    """Draw a legend of so many columns, or fewer if the figure is narrow, below all panels; for
+    more than two lines of entries the figure becomes taller."""
     widest = 0.45 + 0.06 * max(len(str(handle.get_label())) for handle in handles)  # inches
     columns = min(columns, max(1, int(figure.get_figwidth() // widest)))
     lines = -(-len(handles) // columns)

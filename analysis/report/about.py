@@ -29,22 +29,22 @@ RUNS = 20
 
 
 def shown(text: str) -> str:
-    """Return text as a printable line without breaks before per cent signs and daggers."""
+    """Return text as one printable line with no-break spaces before per cent signs and daggers."""
     return one_line(text).replace(" %", f"{NO_BREAK}%").replace(" †", f"{NO_BREAK}†")
 
 
 def visible_sections(study: Study) -> list[Section]:
-    """Return the sections, without sections about single tasks if a folder has many tasks."""
+    """Return the sections, without sections about single tasks if :func:`.one_by_one` is empty."""
     return [section for section in SECTIONS if one_by_one(study) or not section.single]
 
 
 def attempt(
     failures: dict[str, str], name: str, make: Callable[..., Made], *args: Any
 ) -> Made | None:
-    """Make a part of a report, and return None if this raises an exception.
+    """Return ``make(*args)``, a part of a report, or None if it raises an exception.
 
-    ``failures`` then has the error, with file and line, by the ``name`` of the part. Raises a
-    CoarticError, which is an error of the folder.
+    The error, with file and line, is then added to ``failures`` by the ``name`` of the part. A
+    CoarticError, which is an error of the folder, is raised.
     """
     try:
         return make(*args)
@@ -58,7 +58,7 @@ def attempt(
 
 
 def finding(study: Study, section: Section) -> list[str]:
-    """Return the lines of a section's sentence; none without rows in its first table."""
+    """Return the lines of a section's sentence, filled in; none without sentence or rows for it."""
     frame = section.tables[0](study)
     label = frame.method if "method" in frame else frame.index.to_series()
     rows = frame.assign(title=label.map(study.methods.title))[~is_setting(frame)]
@@ -75,7 +75,8 @@ def finding(study: Study, section: Section) -> list[str]:
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the first two rows, and the rows of the paper's learner and of random search."""
+    """Return the first two rows of a table, and the rows of the paper's learner (EC1, EC4) and of
+    random search, each row a dict."""
     label = rows.method if "method" in rows else rows.index.to_series()
     kept = label.isin([*label[:2], joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH])
     return rows[kept].to_dict("records")
@@ -83,7 +84,7 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 
 @cached
 def limits(study: Study) -> dict[str, Any]:
-    """Return facts that limit the conclusions from these runs, for the page."""
+    """Return facts that limit conclusions from a study's runs, by name, for the page's template."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
@@ -115,7 +116,7 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """Return the notes on a table with these columns."""
+    """Return notes, a sentence each, on the gaps and optima in a table with these columns."""
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []
     if unproven and columns & {"gap", "optimum"}:

@@ -65,8 +65,9 @@ def player(study: Study) -> str:
 
 
 def _first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> dict[str, Any]:
-    """Return the preset and the method shown first: the method from a file with the smallest gap,
-    or else the preferred method if the first preset has it."""
+    """Return the label of the method shown first (``who``): the method from a file with the
+    smallest gap, with the number of its ``preset``, from 0; or else the ``preferred`` method if the
+    first preset has it, or else the first method there."""
     ids = [[run["id"] for run in preset["runs"]] for preset in presets]
     for method in own_methods(study):
         for number, played in enumerate(ids):

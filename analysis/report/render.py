@@ -54,7 +54,7 @@ def _guarded(value: Any) -> Any:
 
 
 def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
-    """Return the columns of a table that the page and LaTeX show, with their headings.
+    """Return the headings of the columns that the page and LaTeX show, by name of the column.
 
     A task goes by its title, with † where it is reconstructed.
     """
@@ -82,7 +82,7 @@ def _is_number(values: pd.Series) -> bool:
 
 
 def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
-    """Return the values of a column as text, with their SDs and intervals."""
+    """Return the values of column ``name`` as text, with their SDs and intervals, row by row."""
     if not _is_number(frame[name]):
         titles = frame.attrs.get("titles", {})
         shown = {each: titles.get(each) or one_line(str(each)) for each in frame[name].unique()}
@@ -149,8 +149,8 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
 
 
 def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
-    """Return the classes of each row: ``own`` for methods from files in a table with other methods,
-    ``setting`` for settings and ablations of a method of the same ranking."""
+    """Return the HTML classes of each row, separated by a space: ``own`` for methods from files in
+    a table with other methods, ``setting`` for settings and ablations in the ranking."""
     is_own = [label in frame.attrs.get("own", ()) for label in frame.get("method", frame.index)]
     is_folded = is_setting(frame) & (table.id == "ranking")
     return [

@@ -30,8 +30,9 @@ class Section:
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
     folds all figures but the first."""
     sentence: str = ""
-    """Jinja template of the finding in words, from ``rows``: the first table, without settings and
-    ablations, and with the ``title`` of each method. Every number is a cell of the table."""
+    """Jinja template of the finding in words. It has ``every``, the first table, and ``rows``, this
+    table without settings and ablations, and with the ``title`` of each method (further names:
+    :func:`.finding`). Every number is a cell of the table. Empty: no finding."""
     note: str = ""
     """Explanation of figures and tables."""
     single: bool = True
@@ -176,6 +177,6 @@ ascending=False)) %}
 )
 TABLES = {table.id: table for section in SECTIONS for table in section.tables}
 TABLES["against-learner"] = ranking.list_against_learner
-"""Tables by id; the last is a CSV file without a section."""
+"""Tables by id; ``against-learner`` is a CSV file without a section."""
 FIGURES = {id_of(draw): draw for section in SECTIONS for draw in section.figures}
 """Figures by id."""

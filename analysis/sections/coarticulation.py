@@ -33,11 +33,12 @@ from coartic.estimates import LEVEL, difference_of_means, mean
 from coartic.robot import HANDS
 
 SAME = 1e-9
-"""Largest posture difference that is rounding, length unit and rad mixed."""
+"""Largest posture difference that counts as rounding, length unit and rad mixed."""
 
 
 def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Yield each first goal that two tasks share, for each hand that hit this goal in both."""
+    """Yield the runs of a method at each of the first goals that two tasks share, once for each
+    hand that hit this goal on both tasks."""
     for first, second, shared in context_pairs(one_by_one(study)):
         keys = (first, label), (second, label)
         if study.cells.keys() >= {*keys}:
@@ -159,7 +160,7 @@ AGAINST_GAIN = {
 
 def _against_gain(study: Study) -> pd.DataFrame:
     """Return gains and signatures, means over tasks of means over runs, a row for each method that
-    ran on all tasks that the most methods share.
+    has a solution on each of :func:`.common_tasks`.
 
     Columns ``method``, ``base`` (the method with its setting, but for its number of trials),
     ``trials``, ``tasks``, ``gain`` (ticks) and a column for each signature of
@@ -215,8 +216,9 @@ def draw_coarticulation(study: Study) -> Parts | None:
 def verdict_of(study: Study, shared: TwoContexts, control: Row | None = None) -> str:
     """Return in words whether the posture at a shared goal depends on the next goal.
 
-    Stochastic methods need a test; methods that select from trials need random search, too.
-    ``control``: :func:`beside_control` if it is there already.
+    For stochastic methods by the permutation test, p uncorrected; methods that select their
+    solution from trials are compared with random search, too. ``control`` is the result of
+    :func:`beside_control` for ``shared``; None: computed here.
     """
     method: Any = study.methods.loc[shared.method]
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
@@ -236,8 +238,9 @@ def verdict_of(study: Study, shared: TwoContexts, control: Row | None = None) ->
 
 
 def beside_control(study: Study, shared: TwoContexts) -> Row:
-    """Return the posture difference of random search in the same two contexts, the number of its
-    runs, and the p-value of the test that the method's difference exceeds it."""
+    """Return the posture difference of random search in the same two contexts (``control``), the
+    number of its runs (``control_runs``), and the p-value of the test that the method's difference
+    exceeds it (``p_random_search``); empty without such a control."""
     control = contexts_of_control(study, shared)
     if control is None:
         return {}
@@ -282,8 +285,8 @@ def draw_postures(study: Study) -> Parts | None:
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
-    """Draw the postures of runs at a shared goal, runs thin and their means thick; return their
-    numbers for each task."""
+    """Draw the postures of runs at a shared goal, runs thin and their means thick; return a frame
+    of the postures, a row for each run, for each of the two tasks."""
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius

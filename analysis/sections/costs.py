@@ -23,7 +23,7 @@ from coartic.internal.limits import brief_value, real_array
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
-"""Costs, as columns of ``runs``; ``solve_s`` is wall time, s."""
+"""Costs, as columns of :attr:`.Study.runs`; ``solve_s`` is wall time, s."""
 TARGETS = tuple(n / 20 for n in range(1, 21))
 """Targets, as shares of the distance from the corrective process alone, with its best hands, to the
 optimum."""
@@ -33,15 +33,15 @@ COSTS = (
     ("forward_kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
-"""Columns of :func:`list_runtimes`, with the cost and the share of targets of each."""
+"""Columns of :func:`list_runtimes`, each with its cost and the share of the targets to reach."""
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
 """Costs with a panel in the figure, and the labels of their axes."""
 
 
 @cached
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return, by run id, the numbers of the trials that were better than all before, from 1, and
-    their rewards, for runs that made trials."""
+    """Return for each run that made trials, by run id, the numbers, from 1, of the trials with a
+    higher reward than all trials before, and these rewards, ticks; shape ``(n,)`` each."""
     by_run = {}
     for run_id, rewards in study.rewards():
         best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards))
@@ -52,11 +52,11 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 @cached
 def spans(study: Study) -> dict[str, tuple[float, int]]:
-    """Return the reward of the corrective process alone with its best hands and the best known
-    reward of each task.
+    """Return the two rewards between which targets lie, ticks, by name of the task: the reward of
+    the corrective process alone with its best hands, and the best known reward.
 
-    Targets lie between the two. Tasks that the corrective process does not complete, or on which it
-    is the best known, are left out.
+    Tasks that the corrective process does not complete, or on which its reward is the best known,
+    are left out.
     """
     zero = study.corrective_best
     rewards = {name: (zero[name], best.reward) for name, best in study.optima.items()}
@@ -67,14 +67,14 @@ def spans(study: Study) -> dict[str, tuple[float, int]]:
 def times_of(
     study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
-    """Return the cost at which each run of a method on a task reached each target, shape ``(runs,
-    targets)``.
+    """Return the cost ``spend``, one of :data:`SPENDS`, at which each run of a method on a task of
+    :func:`spans` reached each target, shape ``(runs, targets)``.
 
-    Infinite for a target that the run did not reach. A planner reaches its targets at its end.
-    Forward-kinematics evaluations and time are totals of a run, spread evenly over its trials, an
-    approximation: over the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times
-    their even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. Times are of
-    :func:`solve_times`; a run without a known cost has no row.
+    ``shares`` are the targets, as in :data:`TARGETS`. Infinite for a target that the run did not
+    reach; a solved run without a known cost has no row. A planner reaches its targets at its end.
+    Forward-kinematics evaluations and time (:func:`solve_times`) are totals of a run, spread evenly
+    over its trials, an approximation: over the first 10 to 1000 of 10 000 trials, evaluations were
+    0.6 to 1.5 times their even share, 3.4 times for the first 10 of CMA-ES on two-armed 1.
     """
     initial, optimum = spans(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
@@ -97,10 +97,10 @@ def times_of(
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
-    """Return the wall time of solving, s, of solved runs in warm processes, or of all solved runs
-    if no process was warm.
+    """Return the wall time of solving, s, of the runs that were made in warm processes, or of all
+    runs if no process was warm, by the index of ``runs``.
 
-    The time of the run stands in for methods that do not report the time of solving.
+    For methods that do not report the time of solving, the wall time of the run.
     """
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     warm = runs.warm.to_numpy(bool, na_value=False)
@@ -109,10 +109,11 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 @cached
 def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return the runs of each method on the tasks of :func:`.common_tasks` that have targets.
+    """Return the runs of each compared method on the tasks of :func:`.common_tasks` that have
+    targets, by label.
 
-    Methods that did not run on all these tasks are left out, or, if they are from files, have their
-    runs on all tasks with targets.
+    A method that did not run on all these tasks is left out; a method from a file then has its runs
+    on all its tasks with targets.
     """
     common = [task for task in standings.common_tasks(study) if task in spans(study)]
     of_methods = {}
@@ -128,14 +129,14 @@ def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
 def _times_on_tasks(
     study: Study, runs: pd.DataFrame, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> list[Array]:
-    """Return :func:`times_of` of some runs of a method, for each of their tasks."""
+    """Return :func:`times_of` for each task on which some runs of a method were made."""
     pairs = runs[["task", "label"]].drop_duplicates().to_numpy()
     return [times_of(study, task, label, spend, shares) for task, label in pairs]
 
 
 def half_of_targets(study: Study, runs: pd.DataFrame) -> Estimate:
-    """Return the trials within which some runs of a method reach half of the targets of their
-    tasks; NaN without targets."""
+    """Return the number of trials, with its interval, within which some runs of a method reach half
+    of the targets of their tasks; infinite if they do not, NaN without targets."""
     times = _times_on_tasks(study, runs[runs.task.isin(spans(study).keys())], "trials")
     return running_times.budget_for(times, 0.5) if times else Estimate(math.nan)
 
@@ -146,8 +147,8 @@ def runtimes(
     """Return the share of reward targets that methods reach within a budget: the ECDF of running
     times.
 
-    For the methods that the report compares and that ran on all tasks; tasks have the same weight.
-    Methods from files count on the tasks on which they ran.
+    For the methods that the report compares and that ran on all tasks; methods from files that did
+    not are taken on the tasks on which they ran. Tasks have the same weight.
 
     Parameters
     ----------
@@ -204,8 +205,8 @@ def runtimes(
 def list_runtimes(study: Study) -> Rows:
     """List the costs of reaching a quarter and half of the targets.
 
-    ``half on``: median trials to the target halfway, by task, infinite if most runs do not reach
-    this target.
+    ``half on *``: median number of trials to the target halfway to the optimum on a task, infinite
+    if most runs do not reach this target.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: _times_on_tasks(study, runs, spend) for spend in SPENDS}

@@ -30,7 +30,8 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1",
 )
 def list_learning(study: Study) -> Rows:
-    """List the best reward after some numbers of trials (mean over runs)."""
+    """List the best reward after each number of trials in :data:`BUDGETS` (mean over runs), for
+    methods whose runs on a task all made trials, 100 at least, and have a solution."""
     for (task, label), every in study.cells.items():
         runs = [improvements(study)[run] for run in every.run_id if run in improvements(study)]
         if task not in one_by_one(study) or study.methods.is_search[label]:
@@ -101,11 +102,11 @@ def draw_learning_curves(study: Study) -> Parts | None:
 
 
 def learning_curves(study: Study) -> pd.DataFrame:
-    """Return the best reward so far by task, method and trial.
+    """Return the best reward so far, ticks, by task, method and number of trials.
 
-    For runs with a solution; EC1 only on tasks without two-armed conditions. Columns ``task``,
-    ``method``, ``runs``, ``trial``, ``best`` (mean over runs), and quartiles ``best_low``
-    and ``best_high`` of the runs.
+    For runs with a solution; EC1 only on tasks without runs of EC2 to EC4. Columns ``task``,
+    ``method`` (label), ``runs`` (number of runs), ``trial`` (from 1), ``best`` (mean over runs, NaN
+    until all have a solution), and quartiles of the runs, ``best_low`` and ``best_high``.
     """
     shown, methods = list[tuple[str, str]](), study.methods
     drawn = methods.index[methods.headline & (methods.base.isin(CURVES) | ~methods.built_in)]

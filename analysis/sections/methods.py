@@ -45,7 +45,7 @@ def list_methods(study: Study) -> Rows:
     "task; method; failed: failed runs; runs; reasons",
 )
 def list_failed(study: Study) -> Rows:
-    """List the numbers of failed runs of each method on each task, with their reasons."""
+    """List the number of failed runs of each method on each task with their commonest reasons."""
     failures = study.runs[study.runs.status != "ok"]
     by_cell = dict([*failures.groupby(["task", "label"], sort=False)])
     for (task, label), runs in study.cells.items():

@@ -18,7 +18,8 @@ from coartic.robot import Array
 
 
 def own_methods(study: Study) -> list[str]:
-    """Return the methods from files that solved every run on a task, the smallest gap first."""
+    """Return the labels of the methods from files that solved every run on a task or more, the
+    smallest gap first."""
     rows = board(study)
     return [*rows.index[~rows.built_in.astype(bool)]]
 
@@ -68,11 +69,12 @@ def list_own(study: Study) -> Rows:
 def difference_of_gaps(
     first: pd.DataFrame, first_is_exact: bool, second: pd.DataFrame, second_is_exact: bool
 ) -> Estimate:
-    """Return the mean gap of the first runs less that of the second, each a mean over its own
-    tasks.
+    """Return the mean gap of the first runs less the mean gap of the second runs, each a mean over
+    the tasks of these runs.
 
-    Tasks are not matched: give both the same tasks. The interval is for other runs of both methods
-    on these tasks; gaps of deterministic methods are exact, and two exact gaps have no interval.
+    Tasks are not matched: give both the same tasks. ``first_is_exact`` and ``second_is_exact`` are
+    True for deterministic methods, whose gaps are taken as exact. The interval is for other runs on
+    these tasks; two exact gaps have no interval.
     """
     exact, weights, drawn = 0.0, list[float](), list[Array]()
     for sign, runs, is_exact in ((1, first, first_is_exact), (-1, second, second_is_exact)):

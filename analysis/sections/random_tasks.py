@@ -19,7 +19,7 @@ from coartic.analysis.table import Row, Rows, run_ids, table
 @cached
 def on_instances(study: Study) -> pd.DataFrame:
     """Return the solved runs of compared methods on instances of families, with the label of the
-    row of the method in column ``method``."""
+    row of the method in column ``method``, by ``place``, the number of the instance from 0."""
     parts = [solved(runs).assign(method=method) for method, runs in compared(study).items()]
     every = pd.concat([*parts, study.runs[:0]], ignore_index=True)
     instances = [name for name in study.optima if study.tasks[name].family is not None]
@@ -28,7 +28,7 @@ def on_instances(study: Study) -> pd.DataFrame:
 
 
 def _by_family(runs: pd.DataFrame) -> Scores:
-    """Return the gaps of the runs on each instance, by family."""
+    """Return the gaps of the runs on each instance, by family; runs as of :func:`on_instances`."""
     return {
         str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
         for family, of_family in runs.groupby("family", sort=False)

@@ -32,9 +32,9 @@ from coartic.internal.text import counted
 SCORE_COLUMNS = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
 """Columns of :func:`.ranking` that are in the table for all tasks and for parts of them."""
 LONGEST = 44
-"""Letters of a name in the figure."""
+"""Most letters of a name in the figure."""
 EARLY = 1_000
-"""Trials after which methods are scored as well."""
+"""Number of trials after which the ranking has a further gap, ``gap_early``."""
 
 
 @table(
@@ -72,8 +72,8 @@ def list_against_learner(study: Study) -> Rows:
 
 
 def after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
-    """Return runs with the best reward of their first trials; runs of methods that make no trials
-    keep theirs."""
+    """Return a copy of runs with the best ``reward`` of the first ``trials`` trials of each, NaN if
+    none succeeded; runs without trials keep their reward. Column ``gap`` stays as it is."""
 
     def best(run_id: str, reward: float) -> float:
         numbers, rewards = improvements(study).get(run_id, ([], []))
@@ -125,7 +125,8 @@ def list_ranking(study: Study) -> Rows:
 
 
 def ranked(study: Study) -> list[str]:
-    """Return the methods of the ranking by mean gap, then those without one as in lists.
+    """Return the labels of the methods of the ranking by mean gap, then of the methods without a
+    gap in the order of :attr:`.Study.methods`.
 
     Methods from files come first, and settings after their method.
     """
@@ -205,7 +206,8 @@ def draw_ranking(study: Study) -> Parts | None:
 
 
 def name_in_figure(study: Study, line: Any) -> str:
-    """Return the name left of a line of the figure: a heading, or a row with a method."""
+    """Return the name left of a line of the figure, shortened if it is long. ``line`` is a heading,
+    or a row of a table with the label ``method``."""
     name = line if isinstance(line, str) else shown_name(study, line["method"])
     longest = LONGEST // 2 if style.is_narrow() else LONGEST
     if len(name) > longest:  # its end may say on how many tasks

@@ -69,9 +69,10 @@ def posture_difference_below(
 ) -> float:
     """Test that the standardised posture difference is below a bound, by the bootstrap.
 
-    p is the share of bootstrap samples, with runs drawn within each context, whose
-    :func:`standardised_posture_difference` is at least ``bound``; the observed sample counts, too.
-    Noise adds to distances, so that p is rather too large. NaN if a context has a single run.
+    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, the share of bootstrap samples,
+    with runs drawn within each context, whose :func:`standardised_posture_difference` is at least
+    ``bound`` (in SDs); the observed sample counts, too. Noise adds to distances, so that p is
+    rather too large. NaN if a context has a single run.
     """
     first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:

@@ -147,10 +147,10 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
 @dataclass(frozen=True)
 class Signature:
-    """A signature of coarticulation, with its words."""
+    """A signature of coarticulation, and what it measures, in ``words``."""
 
     each: Callable[[Solutions], Array]
-    """Function of solutions that returns the signature of each run, shape ``(n,)``, or NaN."""
+    """Function that returns the signature of each run, shape ``(n,)``, NaN for runs without it."""
     words: str
 
 
@@ -176,7 +176,8 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 @checked_arguments
 def other_arm(runs: Solutions) -> Array:
-    """Return the mean of :func:`preshaping` over the goals after which the idle hand hits another.
+    """Return for each run the mean of :func:`preshaping` over the goals after which the idle hand
+    hits a later goal.
 
     Negative where the idle hand moves away. NaN on a task for one hand, without an initial
     solution, and for a run whose idle hand never hits a later goal.
@@ -192,7 +193,7 @@ def other_arm(runs: Solutions) -> Array:
 
 @checked_arguments
 def arm(runs: Solutions) -> Array:
-    """Return the mean of :func:`gain_at_next` over goals g < G."""
+    """Return for each run the mean of :func:`gain_at_next` over goals g < G, ticks."""
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
     return np.asarray(gain_at_next(runs).mean(axis=1))

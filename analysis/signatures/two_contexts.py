@@ -32,11 +32,8 @@ from coartic.tasks.optima import KEPT
 
 @checked_arguments
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Return pairs of tasks that differ only after their first goals, with the number of shared
-    goals.
-
-    Shared goals count if another goal follows in both tasks.
-    """
+    """Return the names of each pair of tasks that differ only after their first goals, with the
+    number of first goals that they share and that another goal follows in both tasks."""
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
         others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
@@ -49,7 +46,7 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
 
 @checked_arguments
 def movable(task: Task, hand: Hand) -> Array:
-    """Return the indices of the joints that can move a hand: free base coordinates and its arm."""
+    """Return the indices in a configuration that move a hand: free base coordinates and its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
@@ -141,7 +138,7 @@ class TwoContexts:
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Parts of the posture difference by :func:`motor_equivalence`."""
+        """Motor-equivalent and other part of the posture difference (:func:`motor_equivalence`)."""
         task, joints = self.first.task, movable(self.first.task, self.hand)
         posture = np.concatenate(self.configurations).mean(axis=0)
         first, second = (configurations.mean(axis=0) for configurations in self.configurations)
@@ -155,8 +152,8 @@ class TwoContexts:
 
     @checked_arguments
     def p_beyond(self, other: TwoContexts) -> float:
-        """Return the p-value of the test that the posture difference exceeds the posture difference
-        of another method; NaN if a context has a single run."""
+        """Return the p-value of the test that the posture difference exceeds that of ``other``,
+        another method at the same goal (:func:`.beyond_p`); NaN if a context has a single run."""
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:

@@ -46,7 +46,8 @@ def bootstrap_test(
     *,
     resamples: Resamples = RESAMPLES,
 ) -> Estimate:
-    """Test the difference of two means, or of a mean and a number, by the bootstrap.
+    """Test the difference of two means, or of a mean and a number, by the bootstrap. The value of
+    the estimate is the mean of ``first`` less the mean of ``second`` (or less the number).
 
     Algorithm 16.2 of Efron & Tibshirani (1993), the book that the paper cites: every sample is
     shifted to the mean 0 and resampled, and the statistic is the difference of means over its
@@ -100,10 +101,11 @@ def bootstrap_test(
 
 @checked_arguments
 def sign_flip_test(differences: ArrayLike) -> Estimate:
-    """Test paired differences, shape ``(n,)``, by permutations of their signs, two-tailed.
+    """Test paired differences, shape ``(n,)``, by permutations of their signs, two-tailed. The
+    value of the estimate is their mean.
 
     The level is exact if the two members of a pair are exchangeable. All 2^n signs are enumerated
-    up to :data:`RESAMPLES` (13 pairs), and as many are drawn beyond. NaN with fewer than two pairs.
+    up to 13 pairs; beyond, :data:`RESAMPLES` are drawn. p is NaN with fewer than two pairs.
     """
     values = vector(differences)
     mean, n = float(values.mean()), (len(values),)

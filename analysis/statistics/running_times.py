@@ -23,9 +23,11 @@ RunningTimes = Sequence[Array]
 
 
 def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the finite running times in ascending order, with their weights and numbers of runs.
+    """Return the finite running times in ascending order, the weight of each, and the number of its
+    run, from 0 through all tasks.
 
-    The weights of all pairs of run and target, also of pairs that are not reached, sum to 1.
+    The weights of all pairs of run and target, also of pairs that are not reached, sum to 1; each
+    task has the same weight and needs a run.
     """
     values = np.concatenate([of_task.ravel() for of_task in times])
     order = np.argsort(values, kind="stable")
@@ -36,7 +38,7 @@ def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Return the budgets at which the share of reached targets rises, and the shares.
+    """Return the budgets at which the share of reached targets rises, and the shares from there on.
 
     An infinite budget and a share of 0 if no target is reached.
     """
@@ -48,12 +50,13 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 
 def share_reached(times: RunningTimes) -> float:
-    """Return the share of targets that runs reach in the end."""
+    """Return the share of pairs of run and target that are reached at all; tasks weigh the same."""
     return float(pairs(times)[1].sum())
 
 
 def budget_for(times: RunningTimes, share: float) -> Estimate:
-    """Return the least budget that reaches a share of the targets, infinite if no budget does.
+    """Return the least budget within which a share (0 to 1) of all pairs of run and target is
+    reached, infinite if no budget is enough.
 
     The percentile interval is of the bootstrap over runs within tasks, without widening, as budgets
     can be infinite. No interval if a task has too few runs.
@@ -92,10 +95,8 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
 
 @lru_cache(maxsize=4)  # methods mostly have as many runs as another
 def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
-    """Return the number of times that each resample draws each run, shape ``(resamples, runs)``.
-
-    A byte is enough: no run is drawn 256 times.
-    """
+    """Return the number of times that each resample draws each run, shape ``(resamples, runs)``,
+    for tasks with ``sizes`` runs. The array is cached: do not change it."""
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MOST_RUNS_DRAWN // sum(sizes), 200))
     drawn = [np.empty((resamples, size), dtype=np.uint8) for size in sizes]

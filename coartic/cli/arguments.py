@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for a file or a folder."""
+    """Return an option for a file or a folder, by its flags ``names``; ``what`` is its help."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
 def option(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for text, or for files that are read later."""
+    """Return an option for text, or for files that are read later, as :func:`file_or_folder`."""
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
@@ -59,8 +59,8 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
 
 
 def value_in(text: str) -> Any:
-    """Return the number that an option names, or the range, such as ``50..99``; any other text is
-    returned unchanged."""
+    """Return the number that an option names, an int if it is one, or the range ``50..99``, both
+    ends included; any other text is returned unchanged."""
     ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", str(text))  # a default is no text
     value: Any = range(int(ends[1]), int(ends[2]) + 1) if ends else text
     for kind in (float, int):
@@ -70,7 +70,8 @@ def value_in(text: str) -> Any:
 
 
 def asked(name: str, what: str, unit: str = "N") -> Any:
-    """Return an option for a field of a request that holds a number, and is checked by it."""
+    """Return an option for the field ``name`` of a request, a number that the request checks. Its
+    flag is the name without ``_s``, such as ``--time-limit``."""
     option = f"--{name.removesuffix('_s').replace('_', '-')}"
 
     def read(text: str) -> Any:
@@ -85,7 +86,7 @@ def asked(name: str, what: str, unit: str = "N") -> Any:
 
 
 def names_in(text: str | None) -> list[str]:
-    """Return the names in an option that are separated by commas."""
+    """Return the names in an option, separated by commas; an empty list for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
@@ -100,7 +101,8 @@ def _id_named(name: str, names: Mapping[str, str]) -> str:
 
 
 def tasks_meant(names: Sequence[str]) -> list[str]:
-    """Return the ids of tasks from names that users write; other names are returned unchanged."""
+    """Return the ids of tasks from their ids or titles, in small or capital letters; other names
+    are returned unchanged."""
     from coartic import builtin_tasks, load_task
 
     known = {name: load_task(name).label for name in builtin_tasks()}
@@ -144,7 +146,7 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
 def check_used(
     method_files: Sequence[Path] | None, registered: Registry, methods: Iterable[str]
 ) -> None:
-    """Raise CoarticError for a method file that has none of some methods."""
+    """Raise CoarticError for a method file that defines none of ``methods``, ids of methods."""
     used = {registered[name].where for name in methods if name in registered}
     for path in method_files or ():
         if str(path.resolve()) not in used:

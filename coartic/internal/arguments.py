@@ -75,7 +75,8 @@ def checker_of(function: Callable[..., Any]) -> Callable[..., None]:
 def fits(name: str, value: Any, hint: Any) -> bool:
     """Return whether a value is of the kind that a hint says; True for hints of other forms.
 
-    Raises ValueError for a value that has a sentence of its own.
+    Raises ValueError, which calls the value ``name``, for a number out of the limits of
+    ``Annotated``, an unknown text of a ``Literal``, and an array that is not of real numbers.
     """
     kind, parts = get_origin(hint) or hint, get_args(hint)
     if hasattr(kind, "__value__"):  # an alias, as NumPy's types are from Python 3.12 on

@@ -16,7 +16,7 @@ LISTING = ".coartic-files"
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all. Raises OSError."""
+    """Write a file, also over another, so that it is there whole or not at all. Raises OSError."""
     part = path.with_name(f".coartic-{os.getpid()}-{path.name}")
     try:
         part.unlink(missing_ok=True)
@@ -28,10 +28,10 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, by their paths below it; replace those that were written so
-    before, and remove those of them that are written no more.
+    """Write files, by their paths below the folder. Files that an earlier call wrote there are
+    replaced, or removed if they are not among ``files``.
 
-    Raises CoarticError, before anything is written, where another file is in the way.
+    Raises CoarticError, before anything is written, if a file of another origin is in the way.
     """
     before = make_folder(folder, files)
 
@@ -51,8 +51,8 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
-    """Make a folder for :func:`publish`, for those who work long before. Returns the files that an
-    earlier call wrote there. Raises CoarticError where :func:`publish` would."""
+    """Make a folder, and raise CoarticError now if :func:`publish` could not write files ``names``
+    there later. Returns the paths, below the folder, of files that earlier calls wrote there."""
     ours, listing = set[str](), folder / LISTING
     with errors_in_words(folder):
         if os.path.lexists(folder) and not folder.is_dir():
@@ -76,13 +76,13 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
 
 
 def _check_rights(folder: Path) -> None:
-    """Raises PermissionError where no file may be made in a folder."""
+    """Raise PermissionError if no file may be made in a folder."""
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def check_inside(folder: Path, path: Path) -> None:
-    """Raises CoarticError for a path of a folder that is a link or leads out of it by one."""
+    """Raise CoarticError for a path of a folder that is a link or leads out of it by one."""
     inside = Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
     if path.is_symlink() or not inside:
         raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
@@ -99,14 +99,15 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
 
 
 def check_ending(path: Path, endings: Collection[str]) -> None:
-    """Raise CoarticError for a file whose name has none of some endings."""
+    """Raise CoarticError unless a file's name has one of ``endings``, such as ``.svg`` (or its
+    capital letters)."""
     if path.suffix.lower() not in endings:
         raise CoarticError(f"{path}: the name must end in {' or '.join(endings)}")
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raises CoarticError where a file may not be written: its name has no folder or one without
-    the right to write, is that of a folder or a link, or, without ``replace``, is taken."""
+    """Raise CoarticError if a file may not be written: its folder is missing or may not be written,
+    its name is that of a folder or a link, or, without ``replace``, the file is there."""
     with errors_in_words(path):
         if not path.parent.is_dir():
             raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
@@ -121,8 +122,8 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """A file or folder by its name. Raises CoarticError for what is no name, for an empty name,
-    which is not the current folder, and for one that nothing can have."""
+    """Return the path of a file or folder, which need not exist. Raises CoarticError, which calls
+    it ``what``, for what is no text or path, for an empty name and for an impossible one."""
     if not isinstance(name, str | os.PathLike):
         raise CoarticError(f"{what} is {plain(repr(name), 80)}: needed is a text or a path")
     if isinstance(name, str) and not name.strip():
@@ -138,7 +139,7 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 @contextlib.contextmanager
 def errors_in_words(path: Path) -> Iterator[None]:
-    """Raise CoarticError for what the system refuses to write, or to read in order to write."""
+    """Turn an OSError of this block into a CoarticError: ``path`` cannot be written."""
     try:
         yield
     except OSError as error:

@@ -95,7 +95,8 @@ def end_if_interrupted() -> None:
 
 @contextmanager
 def blocked_signals() -> Iterator[None]:
-    """A process that begins meanwhile is not asked to end: Ctrl-C asks all that a terminal has."""
+    """Block the signals :data:`ENDING` in this block, also for processes that begin in it: Ctrl-C
+    reaches all processes of a terminal."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

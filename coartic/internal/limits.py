@@ -30,8 +30,8 @@ WIDTHS = (1e-9, 100.0)
 
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
-    """Raises ValueError for what is no number from ``least`` to ``most``, or, where ``least`` is
-    an ``int``, no whole one."""
+    """Raise ValueError, which calls the value ``name``, for what is no number from ``least`` to
+    ``most``, both included, or, where ``least`` is an ``int``, no whole one."""
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
@@ -77,5 +77,5 @@ def refuse_entries(name: str, value: Any) -> None:
 
 
 def brief_value(value: object) -> str:
-    """A value as it would be written in Python, as one short printable line."""
+    """Return a value as Python writes it, in one printable line of at most 80 characters."""
     return plain(repr(value), 80)

@@ -26,13 +26,13 @@ _MOST_FIGURES = 12  # of an array in a repr
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
-    """Text as one printable line (:func:`one_line`) of at most ``most`` characters."""
+    """Return text as one printable line (:func:`one_line`), cut to ``most`` characters."""
     line = one_line(text[: 4 * most].strip())  # an escape takes longer than what it shows
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def error_line(error: BaseException) -> str:
-    """An exception in one line."""
+    """Return an exception as one printable line, ``ValueError: message``."""
     return plain(f"{type(error).__name__}: {error}".removesuffix(": "))
 
 
@@ -54,17 +54,17 @@ def prints(c: str) -> bool:
 
 
 def escape(c: str) -> str:
-    """A character, or its escape where it does not print."""
+    """Return a character, or its escape if it does not print."""
     return c if prints(c) else c.encode("unicode_escape").decode()
 
 
 def counted(count: int, thing: str) -> str:
-    """``1 run``, ``2 runs``."""
+    """Return a count with its noun, such as ``1 run`` or ``2 runs``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
-    """The ``repr`` of an object: ``Name(text, fact=value)``, of at most :data:`LONGEST_LINE`
+    """Return the ``repr`` of an object, ``Name(text, fact=value)``, cut to :data:`LONGEST_LINE`
     characters.
 
     ``texts`` stand as they are. Of arrays with more than a few figures the shape is shown.
@@ -92,11 +92,11 @@ RENAMED = {
     "trajectory-optimisation/squared-changes": "trajectory-optimisation/squared-displacement",
     "optimum/branch-and-bound": "optimum/search",
 }
-"""Present ids of methods that were renamed."""
+"""Present ids of methods that were renamed, by their earlier ids."""
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """``; did you mean 'a'?`` with the name that is nearest; empty where none is near.
+    """Return ``; did you mean 'a'?`` with the nearest of ``names``; empty if none is near.
 
     Near are names that differ in small letters and punctuation, begin so, are spelt alike or end in
     the same word, in this order. A method that was renamed has its present id instead.
@@ -141,8 +141,8 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
-    """A sentence on a name that is not among some names: the nearest of them, or all; or on the
-    file of another program."""
+    """Return a sentence on a name of a ``kind`` that is not among ``names``, with the nearest of
+    them, or some or all; or on the file of another program."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)
@@ -154,7 +154,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
 
 
 def _refuse_unprintable(text: str) -> str:
-    """The text itself; a validation error where it is not one printable line."""
+    """Return the text itself. Raises a validation error if it is not one printable line."""
     if wrong := next((c for c in text if not prints(c)), ""):
         words = f"should be one line of printable text, without {escape(wrong)}"
         raise PydanticCustomError("not_plain", "{words}", {"words": words})

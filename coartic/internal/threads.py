@@ -28,11 +28,11 @@ ONE_THREAD = dict.fromkeys(
     ),
     "1",
 )
-"""Environment of a worker. One run, one core: BLAS threads would get in each other's way."""
+"""Environment variables of a worker, which has one thread, as BLAS threads of workers compete."""
 
 
 def threads_for(jobs: int) -> int:
-    """Return the number of threads or processes; ``jobs`` is -1 for one a core.
+    """Return ``jobs``, the number of threads or processes; for -1 the number of cores.
 
     Raises ValueError for any other number below 1.
     """
@@ -45,9 +45,10 @@ def threads_for(jobs: int) -> int:
 
 
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
-    """Do work on the rows of a call: in threads where each has so many rows at least.
+    """Call ``work`` with slices that together cover ``count`` rows, in threads with at least
+    ``least`` rows each; in this thread alone if there are fewer. Raises what ``work`` raises.
 
-    There are as many threads as cores, or as ``OMP_NUM_THREADS`` allows: one in worker processes.
+    There are at most as many threads as cores, or as ``OMP_NUM_THREADS`` says, one in workers.
     """
     allowed = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
     threads = min(count // least, int(allowed) if allowed.isdigit() else threads_for(-1))
@@ -62,7 +63,7 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Processes that begin meanwhile have these variables."""
+    """Set environment variables in this block, for processes that begin in it; then reset them."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -76,9 +77,9 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
-    """Leave the terminal with its first ``streams`` (input, output, errors), and lead a group of
-    processes. It ends with this one or when the parent has ended, and then ``folder`` with it; the
-    server of both lives as long as any worker."""
+    """Make this process a worker: lead a group of processes, and connect the first ``streams`` of
+    input, output and errors to the null device. When the parent process has ended, ``folder`` is
+    removed and the group is ended."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:
@@ -97,7 +98,7 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
 
 
 def end_group(pid: int) -> None:
-    """End a worker, and all processes in its group, unless it does not lead one yet."""
+    """Kill the group of processes that worker ``pid`` leads, if it leads one, and the worker."""
     for end in (getattr(os, "killpg", None), os.kill):
         if end is not None:
             with contextlib.suppress(OSError):

@@ -15,7 +15,8 @@ from coartic.internal.text import LONGEST_LINE, plain
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
-    """The content of a TOML file. Raises ``error`` for one that cannot be used."""
+    """Return the content of a TOML file. Raises ``error``, which names the file, if it cannot be
+    read, is too large (:func:`check_file`), or is not TOML in UTF-8."""
     check_file(path, error=error)
     shown = plain(str(path), LONGEST_LINE)
     try:
@@ -29,7 +30,7 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
 
 
 def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) -> None:
-    """Raises ``error`` for what cannot be read or is no file, such as a pipe or a device, and for
+    """Raise ``error`` for what cannot be read or is no file, such as a pipe or a device, and for
     a file of more than :data:`MOST_BYTES`."""
     shown = plain(str(path), LONGEST_LINE)
     try:

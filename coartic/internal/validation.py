@@ -49,7 +49,8 @@ _LISTS = {
 
 
 def in_sentences(kind: type[T]) -> type[T]:
-    """Decorate a pydantic class: wrong arguments raise ValueError with a sentence."""
+    """Decorate a pydantic class, in place: wrong arguments raise ValueError with a sentence, and a
+    model's arguments without names TypeError."""
     init: Any = kind.__init__
 
     @wraps(init)
@@ -104,12 +105,13 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
-    """The problems of a file, the first :data:`_SHOWN` of them, as part of a sentence."""
+    """Return the first :data:`_SHOWN` problems, joined by semicolons; ``keys`` as in
+    :func:`explain_file`, in the order of arguments."""
     return "; ".join(_explain_first(error, keys)[0])
 
 
 def _explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[str], int]:
-    """A sentence for each of the first :data:`_SHOWN` problems, and how many more there are."""
+    """Return a sentence for each of the first :data:`_SHOWN` problems, and how many are left."""
     details = error.errors(include_url=False)
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
@@ -118,7 +120,7 @@ def _explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[st
 
 
 def sentence_error(text: str) -> PydanticCustomError:
-    """A validation error whose message needs no prefix."""
+    """Return a validation error whose message is ``text`` alone, without the key."""
     return PydanticCustomError("sentence", "{text}", {"text": text})
 
 

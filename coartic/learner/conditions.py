@@ -41,10 +41,10 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
 METHOD_PREFIX = "dual-process/"
-"""A condition or ablation as a method has this before its id."""
+"""Beginning of the name of a method that is the learner under a condition; its id follows."""
 MOST_NOISE = 100.0
-"""Largest noise, length unit and rad: far beyond what any arm can use. Targets that
-lose themselves in the far would be approached step by step without an end."""
+"""Largest noise, length unit and rad, beyond what any arm can use: movements to targets still
+farther away would take too many steps."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
@@ -72,9 +72,9 @@ Drifts = Annotated[
 class ExplorationCondition:
     """Exploration of the learner. Source: paper, section *Experiments*.
 
-    ``CONDITIONS`` has the paper's four, ``ABLATIONS`` what takes something away, ``INFORMED`` what
-    adds information; ``dataclasses.replace`` makes others of them. Raises ValueError for what
-    cannot be.
+    ``CONDITIONS`` has the paper's four, ``ABLATIONS`` those without a part of the learner,
+    ``INFORMED`` those with more information; ``dataclasses.replace`` makes others of them. Raises
+    ValueError for fields that are out of range or contradict each other.
     """
 
     id: str
@@ -94,23 +94,26 @@ class ExplorationCondition:
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """Standard deviation of the noise η, length unit (base) and rad (joints) (published)."""
     corrects: bool = True
-    """True if **A** finishes what a stored target misses. If not, such a trial fails;
-    **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
+    """True if **A** corrects a goal that a movement to a stored target misses. If False, such a
+    trial fails, and **A** acts only for pairs (s, a) without a stored target, as in trial 0."""
     learned: Literal["best", "replay"] = "best"
-    """Result of learning: the best trial, or the noiseless replay after the last trial."""
+    """Solution of a run: the best trial (``"best"``), or the noiseless trial after the last one
+    (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
-    """Meaning of Q(s, a) of a goal: the reward R of the whole trial, or the return of that
-    goal, the reward of its own subtask first."""
+    """Meaning of Q(s, a) of a goal: the reward R of the whole trial (``"overall"``), or the return
+    of that goal (``"subtask"``, see ``discount``)."""
     discount: Share = 0.0
     """γ: the return of goal g is Σ γ^|h − g| r_h, with r_h the reward of the movements to goal h. 0
     is the reward of the subtask alone. With credit "subtask" only."""
     counted: Literal["later", "all"] = "later"
-    """Goals h of this sum: g and later ones, or all. Of all, γ = 1 is R, for every goal."""
+    """Goals h in the sum of the return of goal g: g and later goals (``"later"``), or all goals
+    (``"all"``), with which γ = 1 makes every return R."""
     drift: Drifts = 0.0
     """κ of informed exploration: the share of the way to the preferred posture, in the null space
-    of the hand, by which the mean of exploration moves. Of several each trial draws one."""
+    of the hand, by which the mean of exploration moves. Of several numbers each trial draws one."""
     pull: Share = 0.0
-    """β of informed correction: the same share in each iteration of the corrective process."""
+    """β of informed correction: the share of the way to the preferred posture, in the null space of
+    the hand, that each iteration of the corrective process adds."""
     direction: Literal["next-goal", "stay", "start"] = "next-goal"
     """The preferred posture: halfway to the stored target of the next goal (``"next-goal"``), where
     the robot is when the goal becomes current (``"stay"``), or where the trial began (``"start"``,
@@ -149,7 +152,7 @@ class ExplorationCondition:
         return short_repr(self, brief_value(facts.pop("id")), *positional, **facts)
 
     def why_not(self, task: Task | Outline) -> str | None:
-        """Why the condition does not apply to a task, or None where it does."""
+        """Return a sentence on why the condition does not apply to a task; None if it applies."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
             return (
@@ -200,9 +203,10 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """A condition or ablation by its id.
+    """Return a condition of :data:`EVERY_CONDITION` by its id, with or without
+    :data:`METHOD_PREFIX`; a condition is returned itself.
 
-    Raises CoarticError for an unknown one, and TypeError for what is neither id nor condition.
+    Raises CoarticError for an unknown id, and TypeError for what is neither id nor condition.
     """
     if isinstance(condition, ExplorationCondition):
         return condition

@@ -108,7 +108,7 @@ class Results(NamedTuple):
     completed: Flags
     """True where a trial hit every goal, shape ``(N, T)``."""
     best_trial: NDArray[np.int64]
-    """First trial with the highest reward, -1 for none, shape ``(N,)``."""
+    """First trial, from 0, with the highest reward, shape ``(N,)``; -1 if none was completed."""
     counts: NDArray[np.int64]
     """Counts of all trials but the replay, by :data:`coartic.motion.trial.COUNTED`, shape
     ``(N, 5)``."""
@@ -117,9 +117,9 @@ class Results(NamedTuple):
     first: NDArray[np.void]
     """Accounts of the goals in trial 0, where it was completed, shape ``(N, G)``."""
     best: NDArray[np.void]
-    """In the best trial, likewise."""
+    """Accounts of the goals in the best trial, if there is one, shape ``(N, G)``."""
     last: NDArray[np.void]
-    """In the last trial made, likewise: in the end the replay of what was learned."""
+    """Accounts of the goals in the last trial made, shape ``(N, G)``: in the end the replay."""
 
 
 class _Workspace(NamedTuple):
@@ -140,8 +140,8 @@ class _Workspace(NamedTuple):
 def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
 ) -> LearnerParameters:
-    """The learner parameters of a task and a condition, with a movement to each goal for trial
-    0."""
+    """Return the learner parameters of a task and a condition; ``first`` has a movement for each
+    goal of trial 0."""
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(first), width), np.nan)
     for target, movement in zip(first_targets, first, strict=True):
@@ -177,10 +177,10 @@ def learner_parameters(
 
 
 def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
-    """Tables in which nothing is learned, ``(N, G, 3, 2)``.
+    """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``.
 
-    By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q, and
-    ``target``, q*.
+    By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q (-inf), and
+    ``target``, q* (NaN).
     """
     learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), learned)
@@ -189,7 +189,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
 
 
 def workspace_for(runs: int, task: Task) -> _Workspace:
-    """Work space of runs, as many as there are slots at most."""
+    """Return work space for ``runs`` runs, at most :data:`coartic.motion.batch.SLOTS`."""
     return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
@@ -202,7 +202,8 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
 
 @inlined
 def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
-    """How far a hand of a run is from the centre of its goal, length unit."""
+    """Return the distance of a hand (0 left, 1 right) from the centre of the run's goal, length
+    unit; it counts as an evaluation."""
     arm = arm_of(robot, hand)
     joint_chain(run.q, arm, workspace.xs, workspace.ys)
     run.evaluations += 1
@@ -249,9 +250,10 @@ def _best_hand(entries: Any, hands: Any) -> int:
 def choose_hand(
     n: int, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
 ) -> int:
-    """Choose the hand of highest value; with probability ε another, as the condition explores.
+    """Return the hand (0 left, 1 right) of highest value in ``entries``, the records of the state
+    by hand; with ``explore``, with probability ε, the hand that the condition explores.
 
-    Of hands that are equally close to the goal a random one.
+    Of hands that are equally close to the goal a random one is explored.
     """
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
@@ -287,7 +289,7 @@ def _draw_drift(run: Any, learner: Any, rng: Any) -> None:
 
 @inner
 def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
-    """Set the preferred posture p of a run, which has chosen its hand for a goal.
+    """Set the preferred posture p of a run that has chosen its hand for goal ``number``, from 0.
 
     *next goal*: (q + t') / 2 with the stored target t' of the next goal for the hand that is best
     there, given this one; q for joints that the movement to it would not explore, and where nothing
@@ -348,8 +350,9 @@ def aim(
     rng: Any,
     workspace: Any,
 ) -> None:
-    """Phase 2, *aim*: choose the hand of run ``n`` for a goal and, where there is a target
-    q*(s, a), set q^t = mean + η."""
+    """Phase 2, *aim*: choose the hand of run ``n`` for goal ``number`` (from 0) after hand
+    ``before`` and, where there is a target q*(s, a), set q^t = mean + η; q^t = q* without
+    ``explore``."""
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
@@ -375,8 +378,9 @@ def make_trial(
     rngs: Any,
     workspace: Any,
 ) -> None:
-    """Make a trial of every run, with the accounts ``trial`` of its goals; ``first``: trial 0. A
-    trial fails at a goal missed."""
+    """Make a trial of every run, up to the first goal missed, and fill in ``trial``, the accounts
+    of its goals, shape ``(N, G)``. ``first`` makes trial 0, with given hands and targets; without
+    ``explore`` a trial is greedy and has no noise."""
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
@@ -472,10 +476,8 @@ def _learn_from(number: int, learner: Any, tables: Any, results: Any, workspace:
 def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
-    """All trials of N runs, each with its own generator, and the replay of what they learned.
-
-    ``tables`` and ``results`` are filled.
-    """
+    """Make all trials of N runs, each with its own generator, and then a greedy trial without noise
+    of each, the replay. ``tables`` and ``results`` are filled in."""
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         first, explore, made = number == 0, number < trials, results.last

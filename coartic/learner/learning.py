@@ -84,7 +84,7 @@ def learn(
     ----------
     task : Task, str or pathlib.Path
     condition : str or ExplorationCondition
-        The condition, or the name of one in ``CONDITIONS`` or ``ABLATIONS``, such as ``"EC4"``.
+        The condition, or the id of one in ``CONDITIONS``, ``ABLATIONS`` or ``INFORMED``: ``"EC4"``.
     seed : int
         Seed of the random numbers.
     trials : int
@@ -232,10 +232,10 @@ def _learn_together(
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
-    """All trials of runs side by side, one a seed, which differ in nothing else.
+    """Make all trials of runs side by side, a run for each seed; return the runs in this order.
 
-    Nothing is checked. ``first`` has a movement to each goal for trial 0; there are no more seeds
-    than slots.
+    Nothing is checked. ``first`` has a movement for each goal of trial 0; there are at most
+    :data:`SLOTS` seeds.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
@@ -294,10 +294,11 @@ Kernels = Literal["learner", "motion", "trials"]
 
 
 def warm_up(task: Task, *parts: Kernels) -> None:
-    """Compile the kernels, or load them, so that no run's time contains it.
+    """Compile or load the kernels for the number of links of the task's robot, so that no run's
+    time contains it.
 
-    They are those of the number of links that the task's robot has: the learner's, those of single
-    movements and corrections, and that of trials and executions; all, or the ``parts`` named.
+    ``parts`` names the kernels, by default all: ``"learner"``, ``"motion"`` (single movements and
+    corrections), ``"trials"`` (trials and executions).
     """
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))

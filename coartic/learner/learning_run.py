@@ -39,15 +39,15 @@ class LearningRun:
     """Total reward of each trial, shape ``(trials,)``: minus its control ticks; masked where the
     trial failed."""
     best_trial: int | None
-    """First trial with the highest total reward; None where none was completed."""
+    """First trial, from 0, with the highest total reward; None if none was completed."""
     initial: tuple[Movement, ...]
-    """Movements of trial 0; none where it failed."""
+    """Movements of trial 0; empty if it failed."""
     solution: tuple[Movement, ...]
-    """Movements of the best trial."""
+    """Movements of the best trial; empty if no trial was completed."""
     replay: tuple[Movement, ...]
-    """Movements of one noiseless greedy trial with the final tables; none where it failed."""
+    """Movements of one noiseless greedy trial with the final tables; empty if it failed."""
     replay_reward: int | None
-    """Its reward; None where it did not hit every goal."""
+    """Total reward of the replay; None if it failed."""
     values: Array
     """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. In ticks, below
     0: total rewards, or returns of the goal where the condition credits subtasks; -inf
@@ -85,8 +85,8 @@ class LearningRun:
 
     @property
     def learned(self) -> tuple[Movement, ...]:
-        """Movements of the learned solution: those of the best trial, or of the replay where the
-        condition says so; none where there is no such trial."""
+        """Movements of the learned solution: of the best trial, or of the replay where the
+        condition has ``learned="replay"``; empty if there is no such trial."""
         if self.condition.learned == "best":
             return self.solution
         return self.replay
@@ -105,22 +105,20 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Learned reward: the highest total reward of any trial, which is max Q of state 1 if
-        the overall reward is credited; that of the replay where the condition says so. Where
-        subtasks are credited, what the tables lead to is the replay (:attr:`replay_reward`): the
-        best trial is one that noise made good."""
+        """Total reward of the learned solution; None without one. It is the highest reward of any
+        trial, or, where the condition has ``learned="replay"``, that of the replay."""
         if self.condition.learned == "replay":
             return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])
 
     @property
     def hands(self) -> str | None:
-        """Hand sequence of the learned solution."""
+        """Hand sequence of the learned solution, such as ``"LRLR"``; None without a solution."""
         return hands_in(self.learned) if self.learned else None
 
     @property
     def initial_reward(self) -> int | None:
-        """Reward of trial 0."""
+        """Total reward of trial 0; None if it failed."""
         return int(self.rewards[0]) if self.completed[0] else None
 
     def execute(self) -> Execution:

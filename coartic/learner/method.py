@@ -57,7 +57,7 @@ class CustomParameters(DualProcessParameters):
 
 
 def _condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
-    """Return a condition with the fields that parameters set."""
+    """Return condition ``base`` with the fields that parameters set, where they are not None."""
     return replace(base, **parameters.model_dump(include={*_FIELDS}, exclude_none=True))
 
 
@@ -88,11 +88,12 @@ class DualProcess(Method):
         return result
 
     def most_together(self) -> int:
-        """As many as fit into one job."""
+        """Return the number of runs that fit into one job (:func:`runs_at_once`)."""
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
-        """Learn in each session; a solution is the best trial's, or the replay's."""
+        """Learn in sessions that differ in their seeds alone; return for each the result of
+        :meth:`solve`, or the MethodError that it would raise."""
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
         task, model = tasks[0], sessions[0].model

@@ -74,9 +74,11 @@ def robot_parameters(
     model: MotionModel = PAPER,
     checks: bool = True,
 ) -> NDArray[np.void]:
-    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``.
+    """Return robot, constants and options for kernels: a record in an array of shape ``(1,)``,
+    which is cached: copy it before you change it.
 
-    Raises ValueError for locks of what is no coordinate of the base.
+    ``checks`` says whether an arm without a target may be in its goal already. Raises ValueError
+    for a lock other than ``"x"`` and ``"y"``.
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
@@ -94,7 +96,7 @@ def robot_parameters(
 
 @inlined
 def arm_of(robot: Any, hand: int) -> Any:
-    """The arm of a hand: 0 left, 1 right."""
+    """Return the arm of a hand (0 left, 1 right) of a record of :func:`robot_parameters`."""
     arm = robot.arms[hand]
     return Arm(arm.first, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
 
@@ -182,7 +184,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
 
 
 def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
-    """Number of rows of quantities of these shapes."""
+    """Return the number of rows of quantities with these shapes, by name, without slots."""
     return sum(math.prod(shape) for shape in shapes.values())
 
 

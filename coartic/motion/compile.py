@@ -97,14 +97,13 @@ intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
-    """Type of a record for kernels, with these fields; they lie together in memory."""
+    """Return the NumPy type of a record for kernels, with these types by name, aligned."""
     return np.dtype(list(fields.items()), align=True)
 
 
 @inlined
 def fill_row(row: Any, values: Any) -> None:
-    """row[:] = values, or as many of them as both have, without the slices' checks, which cost
-    seconds to compile."""
+    """Copy ``values`` into ``row``, in place, as many as both have."""
     for j in range(min(len(row), len(values))):
         row[j] = values[j]
 
@@ -115,7 +114,8 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 
 
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
-    """NumPy generators as kernels take them, a row each; they must outlive the call."""
+    """Return the addresses by which kernels draw from NumPy generators, shape ``(N, 3)``
+    (:func:`generator_at`). The generators must outlive the call of the kernel."""
 
     def draws_of(generator: np.random.Generator) -> list[int | None]:
         c = generator.bit_generator.ctypes
@@ -144,7 +144,7 @@ def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any
 
 @inner
 def generator_at(addresses: Any, run: int) -> Any:
-    """The generator in a row of :func:`addresses`."""
+    """Return the generator in row ``run`` of :func:`addresses`."""
     return _generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
 
 
@@ -152,7 +152,7 @@ def generator_at(addresses: Any, run: int) -> Any:
 
 
 def import_numba() -> Any:
-    """Numba, with the settings that kernels need."""
+    """Import Numba with the settings that kernels need, and return it."""
     with _IMPORTING:
         return _set_up_numba()
 
@@ -204,7 +204,7 @@ def _set_up_numba() -> Any:
 
 
 def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
-    """Compile a function as the decorator of this name says.
+    """Return a function compiled as the decorator of the name ``kind`` says.
 
     Raises CoarticError where Numba is set to compile nothing.
     """
@@ -316,7 +316,7 @@ class _MachineCode:
         return code
 
     def load(self, *wanted: Any) -> Any:
-        """The code of a signature, or None."""
+        """Return the code of a signature from disk; None if it is not there or cannot be read."""
         try:
             # Not load_overload, which first lists all that Numba could compile.
             return self.files._load_overload(*wanted)

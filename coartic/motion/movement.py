@@ -106,7 +106,7 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Number of steps during which the hand provably stays out of a disc.
+    """Return a number of steps, not rounded, during which the hand stays out of a disc for certain.
 
     Along the line of a movement every absolute link angle turns at a constant rate. So per step the
     hand moves by at most ``s = |Δbase| + Σ length |Δangle|``, and its velocity changes by at most
@@ -135,7 +135,8 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 @inner
 def set_off(at: Any, count: int, step: float) -> bool:
-    """Set rates, bounds and number of steps of every slot.
+    """Set rates, bounds and number of steps of the movements in the first ``count`` slots, with
+    steps of length ``step`` in joint space.
 
     Returns True if all angles stay in the range of the fast cosine.
     """
@@ -181,10 +182,11 @@ def _place_between(at: Any, count: int, step: float) -> None:
 
 @inner
 def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
-    """Evaluate the stopping rule, or skip the steps that are clear; slots that have ended.
+    """Evaluate the stopping rule in the first ``count`` slots; return how many have ended.
 
-    A movement stops within ``rims`` of goal and end, on arrival, length unit: at no larger
-    ``squares`` of the distances.
+    Each slot gets a status; one that goes on gets the next step that can end it. A movement stops
+    at most ``rims[0]`` from the goal's centre or, with ``stop_on_arrival``, ``rims[1]`` from where
+    its target puts the hand, length unit; ``squares`` are the squares (:func:`largest_square`).
     """
     ended = 0
     tip = len(at.length)
@@ -222,7 +224,8 @@ def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> Non
     """Move the first ``count`` slots until each has ended.
 
     Each run's ``q``, from which it started to its ``target``, becomes the configuration in
-    which it stopped; ``hit`` and ``ticks`` of its record are set.
+    which it stopped; ``hit`` and ``ticks`` of its record are set. ``robot`` is a record of
+    :func:`robot_parameters`.
     """
     at, evaluations, step = batch.at[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
@@ -312,6 +315,8 @@ def move(
     ------
     ValueError
         A shape is wrong, a figure is not finite or beyond 100,000, or there is no such hand.
+    TypeError
+        ``robot``, ``model`` or ``stop_on_arrival`` has another type.
 
     Notes
     -----
@@ -346,8 +351,9 @@ def _find_statuses(at: Any, count: int, square: float) -> None:
 
 @inlined
 def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int, bool]:
-    """q += α Jᵀ e in every slot that goes on, plus its rows ``pull`` where there is one (see
-    :func:`descend_to_goals`); number of slots that have ended, and :func:`are_near`."""
+    """Make an iteration of **A**, q += α Jᵀ e, in every slot that goes on, plus its rows ``pull``
+    unless kernel ``pull`` is None (:func:`descend_to_goals`). Return how many of the first
+    ``count`` slots have ended, and whether all angles are near (:func:`are_near`)."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -418,7 +424,7 @@ def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
 
 @inner
 def project(v: Any, x: Any, y: Any) -> None:
-    """Project joint changes ``v`` onto the null space of a Jacobian with the rows ``x`` and ``y``.
+    """Project joint changes ``v``, in place, onto the null space of a Jacobian with rows ``x, y``.
 
     v −= J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺. A singular value below a millionth of the larger counts as 0.
     """
@@ -466,13 +472,14 @@ def _pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
 
 @shared
 def pull_slots(batch: Any, count: int, robot: Any) -> None:
-    """**A** with the pull to the preferred posture in the first ``count`` slots."""
+    """Let **A** with the pull to the preferred posture descend in the first ``count`` slots
+    (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, _pull_to_preferred)
 
 
 @shared
 def correct_slots(batch: Any, count: int, robot: Any) -> None:
-    """The paper's **A** in the first ``count`` slots (:func:`descend_to_goals`)."""
+    """Let the paper's **A** descend in the first ``count`` slots (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, None)
 
 
@@ -522,7 +529,8 @@ def correct(
     Raises
     ------
     ValueError
-        A shape is wrong, a figure is not finite, there is no such hand, or another lock is named.
+        A shape is wrong, a figure is not finite or beyond 100,000, there is no such hand, or
+        ``locked_base`` has another entry.
 
     Notes
     -----
@@ -604,7 +612,8 @@ def follow(
 
 
 def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
-    """Return the points of a straight movement, ``(n + 1, dof)``, as the kernels round them."""
+    """Return the points of a straight movement from ``q`` to ``target``, both included, shape
+    ``(n + 1, dof)``, as the kernels round them."""
     difference, square = target - q, 0.0
     for value in difference.tolist():
         square += value * value
@@ -629,8 +638,8 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
 
 
 def configuration(robot: Robot, q: Any) -> Array:
-    """Return a contiguous copy of one configuration. Raises ValueError for a wrong shape or
-    figure."""
+    """Return a contiguous copy of one configuration, shape ``(dof,)``. Raises ValueError for a
+    wrong shape, and for an entry that is not finite or beyond ``LARGEST_ENTRY``."""
     return finite_array("configuration", q, (robot.dof,))
 
 
@@ -651,15 +660,15 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _check_arm(robot: Any, hand: Any) -> None:
-    """Raise TypeError for an object that is no robot, and ValueError for one that is no hand."""
+    """Raise TypeError if ``robot`` is no Robot, and ValueError if ``hand`` is no hand."""
     if not isinstance(robot, Robot):
         raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
     robot.arm(hand)
 
 
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
-    """Return the centre of a goal. Raises ValueError if it is not finite or beyond
-    ``LARGEST_ENTRY``."""
+    """Return the centre of a goal, x and y, as floats. Raises ValueError if it is not two numbers,
+    not finite or beyond ``LARGEST_ENTRY``, or for a radius that is not from 0 to it."""
     place = real_array("goal", centre)
     if place.shape != (2,):
         raise ValueError(f"goal is {brief_value(centre)}; it must be two numbers, x and y")

@@ -140,7 +140,7 @@ Refused = SolutionError | ValueError | TypeError | OverflowError
 
 
 def hands_in(movements: Iterable[Movement]) -> str:
-    """Return the hand used for each goal, such as ``"LRLR"``."""
+    """Return the hand of each goal that has a movement, in goal order, such as ``"LRLR"``."""
     by_goal = {movement.goal: movement.hand for movement in movements}
     return letters_of([by_goal[goal] for goal in sorted(by_goal)])
 
@@ -209,7 +209,7 @@ def hint_of(movements: Iterable[Movement]) -> str:
 
 
 def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
-    """Return the numbers of the goals that corrective movements alone were made for."""
+    """Return the numbers, from 1, of the goals for which corrective movements alone were made."""
     kinds = defaultdict[int, set[str]](set)
     for movement in movements:
         kinds[movement.goal].add(movement.kind)
@@ -221,8 +221,8 @@ def execute_many(
 ) -> list[Execution | Refused]:
     """:func:`execute` solutions of one task side by side, which takes a fraction of the time.
 
-    In their order, each as if it were alone; in place of an execution, the error that
-    :func:`execute` raises for such a solution.
+    Returns for each solution, in order, its execution, or the error that :func:`execute` would
+    raise; no such error is raised.
     """
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
@@ -375,11 +375,11 @@ def _execution_of(
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
-    """Joint travel of the arm that is not chosen, summed over the movements to each goal.
+    """Return the joint travel of the arm that does not hit, rad: the distance in the space of its
+    joints from hit to hit, the first from the start, summed over the goals.
 
-    ``hands`` hit the goals, with the robot in the configurations ``reached``, shape ``(G, dof)``.
-    In rad, from hit to hit; 0 where that arm keeps still, as in exploration conditions 1
-    and 3 of the learner.
+    ``hands`` has the hand for each goal, ``reached`` the configuration at each hit, shape
+    ``(G, dof)``. 0 where that arm keeps still, as in EC1 and EC3.
     """
     travel, before = 0.0, task.q0
     for hand, q in zip(hands, reached, strict=True):
@@ -469,7 +469,7 @@ def _check_point(task: Task, point: Any) -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Put locked base coordinates of points, ``(..., dof)``, back if they move by no more than
+    """Put locked base coordinates of points, ``(..., dof)``, back in place if they move by at most
     :data:`HELD`, and return the points. Raises ValueError where one moves by more."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
@@ -484,7 +484,9 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Return a copy of the targets. Raises ValueError for targets that do not fit the task."""
+    """Return a copy of targets, shape ``(N, G, dof)``, with locked base coordinates put back
+    (:func:`_hold_base`); NaN passes. Raises ValueError for another shape, for infinite entries and
+    for targets that move a locked base."""
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(

@@ -173,7 +173,7 @@ def account(run: Any, moved: int, goal: Any) -> None:
 
 @inlined
 def count_goal(goal: Any, counts: Any) -> None:
-    """Add the account of a goal to the counts of a trial."""
+    """Add the account of a goal to the counts of a trial, shape ``(5,)``, in place."""
     counts[TICKS] += goal.ticks
     counts[EVALUATIONS] += goal.evaluations
     counts[ITERATIONS] += goal.iterations
@@ -357,7 +357,8 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
-    """Let N arms reach for G goals each, in turn, until they miss one.
+    """Let N arms reach for G goals each, in turn, until they miss one. ``parameters`` come from
+    :func:`robot_parameters`.
 
     A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
     checked. Many arms are shared among threads.
@@ -449,8 +450,8 @@ def reach_goals(
     Raises
     ------
     ValueError
-        A shape is wrong, a number is not finite, a hand is neither, or the model does not
-        fit the radius. An arm with a target beyond 1e5 does not hit, without a movement.
+        A shape is wrong, a number is not finite, a hand is neither 0 nor 1, or the model does not
+        fit the radius. An arm with a target beyond 1e5 makes no movement and does not hit.
 
     Notes
     -----
@@ -501,9 +502,9 @@ _last_compiled: CompiledTask | None = None
 
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
-    """Return a task for the kernels; the last one is kept, as tasks do not change. Raises
-    ValueError for a task or a model that no trial can be made with: a copy of a task with changed
-    fields is unchecked."""
+    """Return a task for the kernels; the last one is kept: do not change its arrays. Raises
+    ValueError for a task or a model with which no trial can be made, such as an unchecked copy
+    of a task (``model_copy``)."""
     global _last_compiled
     last = _last_compiled  # another thread may replace it
     if last is not None and last.task is task and last.model is model:
@@ -529,7 +530,8 @@ _of_run: ContextVar[bool] = ContextVar("of_run", default=False)
 
 
 def count_trials(count: int) -> None:
-    """Count trials of a task as they are made, unless the session of a run makes them.
+    """Add to the number of trials outside sessions (:func:`trials_outside`), unless the session of
+    a run makes these trials (:func:`inside`).
 
     Called where trials are made, in the callers of the three loops and of single movements: no
     function that has trials made needs to count.
@@ -540,7 +542,8 @@ def count_trials(count: int) -> None:
 
 @contextmanager
 def inside(of_run: bool) -> Iterator[None]:
-    """Count no trials of this block, in its thread, if the session of a run makes them."""
+    """Let :func:`count_trials` count nothing in this block, in its thread, if ``of_run``: if the
+    session of a run makes the trials of the block."""
     before = _of_run.set(_of_run.get() or of_run)
     try:
         yield
@@ -567,8 +570,8 @@ def make_trials(
 
 
 def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
-    """Return the reason why a trial with these accounts of its goals was not completed; empty if
-    the trial was completed."""
+    """Return the reason why a trial with these accounts of its goals, shape ``(G,)``, was not
+    completed; empty if the trial was completed."""
     if goals["hit"][-1]:
         return ""
     number = int(goals["hit"].argmin())
@@ -585,7 +588,7 @@ class Trials(NamedTuple):
     """Results of N trials."""
 
     ticks: NDArray[np.int64]
-    """Control ticks of each, shape ``(N,)``."""
+    """Control ticks of each trial, shape ``(N,)``."""
     completed: NDArray[np.bool_]
     """True where every goal was hit, shape ``(N,)``."""
     corrections: NDArray[np.int64]
@@ -607,7 +610,8 @@ class Trials(NamedTuple):
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Return the results of trials from their accounts."""
+    """Return the results of trials from their accounts. They share memory with ``accounts``, in
+    which ``q`` becomes NaN for goals that are not hit."""
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
@@ -659,9 +663,9 @@ def ranked_sequences(
     """Make a trial by the corrective process alone with each hand sequence; best first, failed ones
     last.
 
-    Returns hands, reward (None where it fails), reason of the failure, and counts of the trial. Of
-    equal rewards the sequence with the fewest changes of hand comes first, then the one that was
-    given first.
+    Returns for each sequence its letters, the reward (None if the trial fails), the reason of the
+    failure (or empty), and the counts of the trial by :data:`COUNTED`. Of equal rewards the
+    sequence with the fewest changes of hand comes first, then the one that was given first.
     """
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
@@ -685,14 +689,15 @@ def ranked_sequences(
 
 
 def changes_of_hand(sequence: str) -> int:
-    """Count the pairs of successive goals that are hit by different hands."""
+    """Count the pairs of successive goals that different hands hit, of a sequence as ``"LRLR"``."""
     return sum(a != b for a, b in itertools.pairwise(sequence))
 
 
 def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
-    """List all sequences of some hands for a number of goals, in alphabetical order.
+    """List all sequences of some hands for a number of goals, such as ``"LRLR"``, in alphabetical
+    order.
 
-    Raises NotApplicableError, which names the task, where there are too many.
+    Raises NotApplicableError, which calls the task ``task``, if there are more than 4096.
     """
     ordered = [hand for hand in HANDS if hand in hands]
     if reason := too_many_sequences(task, goals, len(ordered)):
@@ -726,12 +731,12 @@ def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
 def search_initial_hands(
     task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
 ) -> tuple[str, Mapping[str, int]]:
-    """Find the hand sequence of trial 0; return it with the counts of the search, by the names of a
-    meter: no counts for a sequence that the task names.
+    """Find the hand sequence of trial 0; return it with the counts of the search, by names of
+    :class:`~coartic.method.Meter`: empty for a sequence that the task names.
 
-    Of a policy it is the sequence with which the corrective process alone gets the highest reward:
-    among sequences of one hand, or among all. Raises NotApplicableError where the process completes
-    the task with none of them, or there are too many.
+    By a policy it is the sequence with which the corrective process alone gets the highest reward:
+    among sequences of one hand, or among all, of ``hands`` (by default the task's). Raises
+    NotApplicableError if the process completes the task with none, or there are too many.
     """
     allowed = hands_among(task, hands)
     if not task.initial_is_policy:

@@ -60,7 +60,7 @@ def near_cosine(angle: float) -> float:
 
 @scalar
 def near_sine(angle: float) -> float:
-    """sin(angle) for |angle| < LARGEST, without a branch."""
+    """Return sin(angle), the same bits on every system, for |angle| < :data:`LARGEST` (1e5 rad)."""
     sin, cos, quarter = _reduced(angle)
     value: float = cos if quarter & 1 else sin
     return -value if quarter & 2 else value

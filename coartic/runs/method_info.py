@@ -63,7 +63,8 @@ class MethodInfo:
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
-        """Return the method with these parameters."""
+        """Import the method and return it with these parameters, and defaults for the others.
+        Raises ValueError for wrong parameters."""
         method = self.load()
         return method(method.Parameters(**parameters))
 
@@ -100,9 +101,11 @@ does not import method files."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
-    """Return the answer of a method to a question of :class:`MethodInfo`, as plain data.
+    """Return, as plain data, what the method of :class:`MethodInfo` that ``question`` names returns
+    (``"complete"``, ``"why_not"`` or ``"rules"``).
 
-    Raises CoarticError for wrong parameters, and if the method fails to answer.
+    ``arguments`` are parameters (none for ``"rules"``), then for ``"why_not"`` the entries of an
+    outline. Raises CoarticError for wrong parameters, and if the method fails to answer.
     """
     if question == "rules":
         config = method.Parameters.model_config
@@ -129,7 +132,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Return the info of a method that is imported from ``where``."""
+    """Return the info of a method; the other arguments are fields of :class:`MethodInfo`."""
     fields = method.Parameters.model_fields.items()
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
@@ -174,7 +177,8 @@ def methods_in(module: ModuleType) -> list[type[Method]]:
 
 
 def load_file(path: Path) -> ModuleType:
-    """Import a method file, which can import modules from its folder."""
+    """Import a method file anew, whatever it raises. Its folder is added to ``sys.path``, so that
+    it can import modules from there."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

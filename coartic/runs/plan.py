@@ -33,7 +33,7 @@ class Cell:
 
     @property
     def setting(self) -> str:
-        """Parameters that differ from the defaults, such as ``noise_sd=0.1``."""
+        """Parameters that differ from the defaults, such as ``noise_sd=0.1``; empty for none."""
         defaults = self.method.defaults
         return ", ".join(
             f"{name}={value}"
@@ -123,7 +123,7 @@ def run_seed(suite_seed: int, task: str, number: int) -> int:
 
 
 def hash_of(content: Any) -> str:
-    """Return the SHA-256 of plain data."""
+    """Return the SHA-256 of plain data, of its JSON with sorted keys, as hex digits."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 

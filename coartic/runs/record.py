@@ -40,7 +40,7 @@ have some thousands."""
 
 
 class Score(NamedTuple):
-    """The score of a part of a run, from its execution."""
+    """The score of a part of a run (:data:`PARTS`), from its execution; None where blank."""
 
     reward: int | None = None
     hands: str | None = None
@@ -153,12 +153,13 @@ class Run:
 
     @property
     def early_corrections(self) -> int | None:
-        """Corrective movements in the first tenth of a learner's trials after trial 0."""
+        """Corrective movements in the first tenth of a learner's trials after trial 0; None for
+        other methods."""
         return self._corrections()[1]
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials."""
+        """Corrective movements in the last tenth of a learner's trials; None for other methods."""
         return self._corrections()[-1]
 
     def _corrections(self) -> list[int | None]:
@@ -382,10 +383,10 @@ def rewards_from(content: bytes) -> Array:
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task side by side; scores come from these executions alone.
+    """Execute solutions of a task side by side under the paper's model; scores come from here.
 
     Returns for each solution its execution, or the error of a solution that breaks the rules of
-    the task.
+    the task or is too long (:func:`too_long`).
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
@@ -394,8 +395,8 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution that would take too long to execute; None for a solution
-    within the limits."""
+    """Return the error of a solution with more than 10,000 movements or more than
+    :data:`MOST_STEPS` steps; None for any other solution."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
     corners = [task.q0]

@@ -196,7 +196,8 @@ class Store:
             ]
 
     def made_with(self) -> dict[str, Any]:
-        """Return versions, platform, commit, command line and date of the last ``coartic run``."""
+        """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``,
+        by name."""
         with explain_errors(self.folder):
             row = self._one(
                 "SELECT content, command, date FROM suite JOIN environments ON id = environment"
@@ -316,7 +317,7 @@ class Store:
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run of the plan that made trials, with the rewards of its trials,
-        shape ``(trials,)``; NaN stands for a failed trial."""
+        shape ``(trials,)``; NaN stands for a trial that failed or whose reward is not kept."""
         query = """SELECT run_id, rewards, trials FROM asked
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
         with explain_errors(self.folder):
@@ -417,7 +418,7 @@ class Store:
             return frame.astype({name: _DTYPES[name] for name in names})
 
     def _wait_for(self, statement: str) -> None:
-        """Execute a statement as soon as other programs that have the file open allow it."""
+        """Execute a statement; wait as long as other programs that have the file open lock it."""
         for tries in itertools.count():
             if tries == 2:
                 warnings.warn(

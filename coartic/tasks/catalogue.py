@@ -15,7 +15,7 @@ TaskLike = Task | str | Path
 
 
 def builtin_tasks() -> tuple[str, ...]:
-    """The tasks that come with the package.
+    """List the tasks that come with the package.
 
     Returns
     -------
@@ -74,9 +74,9 @@ def load_task(name_or_path: str | Path) -> Task:
 
 
 def as_task(task: TaskLike) -> Task:
-    """The task itself, or that of a name or of a file.
+    """Return the task itself, or load it by its name or from its file (:func:`load_task`).
 
-    Raises TaskError where there is no such task, and TypeError for anything else.
+    Raises TaskError if there is no such task, and TypeError for anything else.
     """
     if isinstance(task, Task):
         return task

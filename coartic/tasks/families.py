@@ -52,16 +52,16 @@ from coartic.tasks.task import (
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
-"""Instances of each split that an agent is given, from the first one."""
+"""Number of instances of each split that an agent is given by default, from instance 0."""
 MOST_ATTEMPTS = 10_000
-"""Draws of one instance; a family that needs more cannot be used."""
+"""Most drafts of one instance; a family that needs more cannot be used."""
 Base = Literal["free", "rail", "locked"]
 LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
     "free": (),
     "rail": ("y",),
     "locked": ("x", "y"),
 }
-"""Base coordinates that cannot move."""
+"""Base coordinates that cannot move, by kind of base."""
 _PARTS = 1000  # of a unit of length, of a rad, of 1
 _STRUCTURE, _GEOMETRY = 0, 1  # what a block of the generator is for
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
@@ -78,11 +78,11 @@ def _in_thousandths(value: float) -> int:
 
 
 Thousandths = Annotated[int, BeforeValidator(_in_thousandths)]
-"""A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
+"""A length, an angle or a share: given with up to three decimals, kept in thousandths."""
 
 
 def _in_order(span: tuple[int, int]) -> tuple[int, int]:
-    """The lowest and the highest of some numbers, in this order."""
+    """Return the span itself. Raises a validation error if its first number is the larger."""
     if span[0] > span[1]:
         raise PydanticCustomError("order", "should have the lower number first")
     return span
@@ -90,7 +90,7 @@ def _in_order(span: tuple[int, int]) -> tuple[int, int]:
 
 _ordered = AfterValidator(_in_order)
 Span = Annotated[tuple[Thousandths, Thousandths], _ordered]
-"""From, to; every thousandth between as likely."""
+"""Lowest and highest value; every thousandth from one to the other is equally likely."""
 _GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
@@ -104,14 +104,14 @@ class _Region(FileData):
     y: Span
     """From, to, length unit."""
     scale: Span = (_PARTS, _PARTS)
-    """Share of both sides that an instance's own box has, from, to."""
+    """Length of the sides of an instance's own box, as a share of the region's, from, to."""
 
 
 class _Alignment(FileData):
     """Goals on a horizontal or vertical line, but for one that is neither first nor last."""
 
     steps: Span
-    """From goal to goal along the line, length unit, from, to."""
+    """Distance from goal to goal along the line, length unit, from, to."""
     off: Span
     """Distance of the one goal from the line, to either side, length unit, from, to."""
 
@@ -145,9 +145,9 @@ class Family(FileData):
     """
 
     name: str
-    """With the version, as ``two-armed/v1``."""
+    """Name with the version, such as ``two-armed/v1``."""
     title: Line
-    """For figures and tables."""
+    """Name in figures and tables."""
     description: Line
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
@@ -158,7 +158,7 @@ class Family(FileData):
     """Least and largest number of links of each arm; all links have one length (to a
     thousandth)."""
     reach: Thousandths = 4 * _PARTS
-    """Sum of an arm's links, length unit; the paper's."""
+    """Sum of the links of each arm, length unit; by default the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
     """Bases; each instance has one: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
@@ -178,7 +178,8 @@ class Family(FileData):
     clear: Thousandths = 200
     """Least distance of a hand at the start from a goal's rim, length unit."""
     within: Thousandths = 950
-    """Share of the reach within which goals are, where the base cannot come nearer."""
+    """Largest distance of a goal from a shoulder, as a share of the reach, measured along the base
+    coordinates that are locked."""
     bent: Thousandths = 200
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
 
@@ -218,8 +219,9 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 
 
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
-    """Goals in thousandths: in a box of their own within the region, or, of a family that has one,
-    on a line through the region but for one that is neither first nor last."""
+    """Draw ``count`` goals, x and y in thousandths of a length unit: in a box within the region,
+    or, if the family has a line, on a line (``vertical`` or horizontal) but for one goal that is
+    neither first nor last. Goals on a line may be outside the region."""
     region, line = family.region, family.line
     share, sides = draws.integer(*region.scale), []
     for low, high in (region.x, region.y):
@@ -244,12 +246,13 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
 
 @checked_arguments
 def broken_rule(family: Family, task: Task) -> str | None:
-    """The first rule that a draft breaks; None for a good one.
+    """Return the first rule of the family that a draft breaks; None if it breaks none.
 
     ``outside``: a goal is outside the region. ``overlap``: two goals are too near to each other.
-    ``reach``: a hand cannot come near enough to a goal, under some restriction. ``straight``: an
-    arm is straight at the start, or nearly. ``start-hit``: a hand is in a goal at the start, or
-    close by. ``corrective``: the corrective process cannot do the task, under some restriction.
+    ``reach``: a hand cannot come near enough to a goal, with the base of the draft or of a
+    restriction. ``straight``: an arm is straight at the start, or nearly. ``start-hit``: a hand is
+    in a goal at the start, or close by. ``corrective``: the corrective process alone does not
+    complete the task, with the base of the draft or of a restriction.
     """
     goals = [(_in_thousandths(x), _in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
@@ -307,9 +310,9 @@ def first_good(
 
 
 def instance_of(family: Family, address: Address) -> Task:
-    """The instance of a family at an address, with its initial hands.
+    """Return the instance of a family at an address, with its initial hand sequence.
 
-    Raises TaskError where no draw is good.
+    Raises TaskError if each of the first :data:`MOST_ATTEMPTS` drafts breaks a rule.
     """
     task, _ = first_good(family, address)
     name = str(address)
@@ -346,9 +349,11 @@ def instance(name: str) -> Task:
 
 @checked_arguments
 def named_by(text: str) -> list[str]:
-    """List the names of the instances of a range, ``two-armed/v1/i000..i039``, or the name itself.
+    """List the names of the instances of a range, ``two-armed/v1/i000..i039``, both ends included;
+    a text that is no range comes back alone, unchecked.
 
-    Raises TaskError for an empty range, and for a range of more than :data:`MOST_CELLS`.
+    Raises TaskError for a range that is malformed, goes backwards or is longer than
+    :data:`MOST_CELLS`.
     """
     if "/" not in text or ".." not in text or text.endswith(".toml"):
         return [text]
@@ -369,7 +374,7 @@ def named_by(text: str) -> list[str]:
 
 
 def shipped_families() -> dict[str, Family]:
-    """The shipped families by name with version, such as ``two-armed/v1``."""
+    """Return the shipped families by name with version, such as ``two-armed/v1``."""
     families = map(read_family, sorted(FAMILY_FOLDER.glob("*.v*.toml")))
     return {family.name: family for family in families}
 
@@ -378,7 +383,8 @@ def shipped_families() -> dict[str, Family]:
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     """Return the families of files by name.
 
-    Raises TaskError for a file that cannot be used, and for a name that is taken.
+    Raises TaskError for a file that cannot be used, and for a name that another of the files or a
+    shipped family has.
     """
     families: dict[str, Family] = {}
     for path in paths:
@@ -391,7 +397,8 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 @checked_arguments
 def load_family(name: str) -> Family:
-    """A shipped family by name with version, as ``two-armed/v1``. Raises TaskError."""
+    """Return a shipped family by name with version, as ``two-armed/v1``. Raises TaskError for an
+    unknown name."""
     shipped = shipped_families()
     if name not in shipped:
         raise TaskError(unknown("family", name, shipped))
@@ -400,9 +407,10 @@ def load_family(name: str) -> Family:
 
 @cache
 def read_family(path: Path) -> Family:
-    """A family from its file, ``two-armed/v1`` from ``two-armed.v1.toml``.
+    """Return a family from its file, ``two-armed/v1`` from ``two-armed.v1.toml``. A process reads
+    each path once.
 
-    Raises TaskError with one line per problem.
+    Raises TaskError, with one line per problem, for a file that is no family.
     """
     content, name = read_toml(path, error=TaskError), "/".join(path.stem.rsplit(".", 1))
     if "name" in content:
@@ -421,7 +429,8 @@ def read_family(path: Path) -> Family:
 def instance_names(
     family: str, split: Split, count: int | None = None, year: int | None = None
 ) -> list[str]:
-    """Names of the first ``count`` instances of a split of a family, by default as :data:`COUNTS`.
+    """List the names of instances 0 to ``count`` - 1 of a split of a family; by default ``count``
+    is that of :data:`COUNTS`.
 
     Raises ValueError for another split, for a count that is not from 1 to 10,000, and where fresh
     instances have no year or others have one; TaskError where there is no such family.

@@ -48,7 +48,8 @@ class KnownOptimum:
 
 @checked_arguments
 def essence(task: Task) -> str:
-    """Hash of what makes a task: start, goals, radius, hands, locks, robot."""
+    """Return a hash, 16 hex digits, of what defines a task: start, goals, radius, hands, locked
+    base, robot; not its name and initial hands."""
     content = task.model_dump(mode="json")
     text = json.dumps({key: content[key] for key in ("goals", *KEPT)}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -56,7 +57,7 @@ def essence(task: Task) -> str:
 
 @checked_arguments
 def best_shipped(task: Task) -> KnownOptimum | None:
-    """The best reward that is shipped of a task, however it is called.
+    """Return the best known reward of a task as it is shipped, whatever the task's name.
 
     None for a task that is not shipped, and for instances beyond the first 40 of a family.
     """
@@ -80,7 +81,7 @@ def _by_essence() -> dict[str, KnownOptimum]:
 
 
 def entries() -> list[dict[str, Any]]:
-    """The shipped data, an entry per task and restriction, as ``optima.json`` has it.
+    """Read the shipped data anew, an entry per task and restriction, as ``optima.json`` has it.
 
     ``task``, its :func:`essence`, ``base`` (directions in which it is locked; ``task``: as the task
     locks it), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``; then ``reward``,

@@ -20,7 +20,7 @@ _WEYL = 0x9E3779B9, 0xBB67AE85  # golden ratio, sqrt(3) - 1
 
 
 def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
-    """Four random words of 32 bits from a counter of four and a key of two."""
+    """Return four random words of 32 bits for a counter of four words and a key of two."""
     a, b, c, d = counter
     left, right = key
     for _ in range(_ROUNDS):
@@ -42,9 +42,9 @@ def hash_key(name: str) -> tuple[int, int]:
 
 
 class Draws:
-    """Integers drawn one after the other, from a key and three words of the counter.
+    """Integers drawn one after the other; equal keys and places give equal integers.
 
-    The fourth counts the blocks of four words that were used.
+    ``place`` is three words of the counter; the other word counts the blocks of four words used.
     """
 
     def __init__(self, key: tuple[int, int], *place: int) -> None:

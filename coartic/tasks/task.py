@@ -74,9 +74,10 @@ class Address(NamedTuple):
     """Address of an instance of a family of random tasks (:mod:`coartic.tasks.families`)."""
 
     family: str
-    """With its version, as ``two-armed/v1``."""
+    """Name of the family with its version, such as ``two-armed/v1``."""
     stream: str
-    """``d``, ``i``, or a year as ``2027-``: what the number in the name follows."""
+    """``d`` (development), ``i`` (test) or a year as ``2027-`` (fresh); in the name the number of
+    the instance follows it."""
     number: int
 
     @property
@@ -365,8 +366,9 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return how far the hand must stay at least from where the corrective process ends, at
-    ``tolerance`` from the centre of a goal, length unit; not positive within reach."""
+    """Return the least distance that a hand can have from a goal's centre, less ``tolerance``,
+    length unit: positive if the goal is out of reach. Base coordinates that are not locked can
+    take any value."""
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)
     dx = goal[0] - task.start.base[0] - arm.shoulder_x if "x" in task.locked_base else 0.0
@@ -394,7 +396,8 @@ def read_task(path: Path) -> Task:
 
 @cache
 def shipped_tasks() -> dict[str, Task]:
-    """Return the tasks that come with the package by name, in the paper's order."""
+    """Return the tasks that come with the package by name, in the paper's order. The dictionary is
+    cached: do not change it."""
     return {task.name: task for task in map(read_task, sorted(TASK_FOLDER.glob("*.toml")))}
 
 

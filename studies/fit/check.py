@@ -43,8 +43,9 @@ STILL = 1e-6
 
 
 def statistics_of(task, condition, trials, model, fitted, noise, plan):
-    """Return statistics by name, and the share and the SD of single outliers; None if no hit shows
-    anything."""
+    """Return :data:`STATISTICS` by name, and a pair of the share and the SD of single outliers;
+    None if no hit shows anything. ``fitted``: σ, ε and κ of the model; ``noise``: SD of motor
+    noise; ``plan`` as of :func:`models.plan_for`."""
     sigma, _, kappa = fitted
     rule = {"walk": "walk", "memoryless": "memoryless", "planner": "memoryless"}.get(model, "best")
     drifts = DRIFTS if model == "drawn" else (kappa,)
@@ -118,7 +119,7 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
 
 
 def compare(task, condition, trials, model, fitted, noise, plan):
-    """Compare a person with simulated people of a fitted model (σ, ε, κ).
+    """Compare a person with simulated people; parameters as of :func:`statistics_of`.
 
     Returns
     -------
@@ -164,7 +165,7 @@ def compare(task, condition, trials, model, fitted, noise, plan):
 
 
 def misfits(ratios):
-    """Return what does not fit, in words."""
+    """Return the words of :data:`STATISTICS` whose ratio of :func:`compare` is above 1, a list."""
     return [words for name, words in STATISTICS.items() if ratios[name] > 1]
 
 

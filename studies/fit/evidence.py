@@ -47,7 +47,7 @@ class Evidence(NamedTuple):
     """Probability of the chosen hand in exploration, shape ``(n,)``."""
 
     def at(self, kappa):
-        """Return residuals and shares at a drift."""
+        """Return residuals ``(m, dof)`` and shares ``(m,)`` at a value of κ."""
         if len(self.nodes) == 1:
             return self.nodes[0], self.shares[0]
         k = int(np.clip(np.searchsorted(self.kappas, kappa), 1, len(self.kappas) - 1))
@@ -132,7 +132,8 @@ def prior_of(elsewhere):
 
 def evidence_in(task, condition, trials, rule, plan=None, simulated=None, kappas=None):
     """Return the evidence on models with a rule of :func:`tables_before` in the trials of a
-    subject, at drifts ``kappas``; ``plan`` replaces tables where it has the hand."""
+    subject, at drifts ``kappas``; ``plan`` replaces tables where it has the hand, ``simulated`` as
+    of :func:`landings`."""
     rows = tables_before(task, condition, trials, rule)
     q = starts(task, trials, rows)
     follows = (rows.hand == (plan[0][rows.goal] if plan else rows.greedy)).to_numpy()

@@ -30,7 +30,8 @@ SIMULATED = 8
 
 
 def interval(log_likelihood, best, step, low, high):
-    """Return the 95 % profile interval around a maximum within bounds."""
+    """Return both ends of the 95 % profile interval around ``best``, the maximum of
+    ``log_likelihood``, within bounds; ends are sought in increments of ``step``."""
     drop = stats.chi2.ppf(0.95, 1) / 2
     least = log_likelihood(best) - drop
     ends = []
@@ -76,7 +77,8 @@ def bias(task, condition, trials, log_sigma, kappa):
 
 
 def with_intervals(evidence, noise, log_sigma, kappa):
-    """Return σ and κ with the ends of their 95 % profile intervals, a dictionary."""
+    """Return ``sigma`` and ``kappa`` with the ends ``_low`` and ``_high`` of their 95 % profile
+    intervals, a dictionary; ``noise``: SD of motor noise."""
 
     def value(log_sigma, kappa):
         return evidence.log_likelihood(np.exp(log_sigma), kappa, noise)
@@ -95,10 +97,10 @@ def with_intervals(evidence, noise, log_sigma, kappa):
 
 
 def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True):
-    """Fit all models to the trials of a subject; a dictionary of numbers.
-
+    """Fit all models to the trials of a subject; a dictionary of numbers, and ``misfit`` in words.
     ``sigma``, ``epsilon`` and ``kappa`` are of *keep the best, informed*; ``bic_`` of each model.
-    """
+    With ``intervals``, σ and κ have intervals, and their bias is taken off. ``noise`` as of
+    :func:`fit`."""
     row, plan, fitted = {}, plan or plan_for(task), {}
     for model in MODELS:
         if model not in LEARNERS[1:]:  # which have the same tables
@@ -149,7 +151,8 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
 
 
 def judge(row):
-    """Return the model of least BIC, and the models that are not clearly worse, best first."""
+    """Return the model of least BIC, and a list of the models that are not clearly worse, best
+    first, from a row of :func:`fit_subject`."""
     bic = {model: row[f"bic_{model}"] for model in MODELS}
     ordered = sorted(bic, key=bic.get)
     return ordered[0], [model for model in ordered[1:] if bic[model] - bic[ordered[0]] < CLEAR]

@@ -57,8 +57,8 @@ def explored_by(task, condition):
 
 
 def plan_for(task):
-    """Return hands and postures at the goals of a planner, which sees the current goal and the
-    next."""
+    """Return hands (places in HANDS) and postures ``(G, dof)`` at the goals of a planner, which
+    sees the current goal and the next."""
     done = execute(task, run_method(TwoGoals(), task)[0].solution)
     return np.array(["LR".index(letter) for letter in done.hands]), done.configurations
 
@@ -73,10 +73,11 @@ def projection(jacobian, explored):
 def tables_before(task, condition, trials, rule):
     """Return what the tables hold before each hit after the first complete trial, a frame.
 
-    ``hand`` was used and ``greedy`` has the highest value; ``stored`` is the trial of the stored
-    posture, -1 for none, and ``following`` of the stored posture of the next goal, for the
-    ``follower``, the hand that is best there. A complete trial replaces an entry if it is better
-    (``rule`` "best"), always ("walk"), or if the entry is empty ("memoryless").
+    ``trial`` and ``goal`` count from 0. ``hand`` was used and ``greedy`` has the highest value;
+    ``stored`` is the trial of the stored posture, -1 for none, and ``following`` of the stored
+    posture of the next goal, for the ``follower``, the hand that is best there. A complete trial
+    replaces an entry if it is better (``rule`` "best"), always ("walk"), or if the entry is empty
+    ("memoryless").
     """
     goals = len(task.goals)
     allowed = [HANDS.index(hand) for hand in HANDS if hand in condition.hands]
@@ -151,6 +152,7 @@ def landings(task, condition, trials, rows, kappas, plan, simulated):
 
 
 def starts(task, trials, rows):
-    """Return the postures in which the movements of ``rows`` began, shape ``(m, dof)``."""
+    """Return the postures in which the movements of ``rows`` (of :func:`tables_before`) began,
+    shape ``(m, dof)``."""
     before = trials.postures[rows.trial, np.maximum(rows.goal - 1, 0)]
     return np.where(rows.goal.to_numpy()[:, None] > 0, before, task.q0)

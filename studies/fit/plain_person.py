@@ -26,7 +26,9 @@ def places(q):
 
 
 def move(q, target, goal, stops):
-    """Return the posture where a straight movement ends, and its control steps."""
+    """Return the posture where a straight movement ends, and its control steps. It ends where the
+    hand hits the goal or the target is reached; with ``stops`` also where the hand is nearly as at
+    the target."""
     way = [b - a for a, b in zip(q, target, strict=True)]
     steps, end = math.ceil(math.hypot(*way) / STEP), places(target)[-1]
     for k in range(steps + 1):
@@ -49,7 +51,8 @@ def correct(q, goal):
 
 
 def practise(averages, trials, rng):
-    """Yield trial, goal, duration and recorded posture of each hit; trial 1 is clumsy."""
+    """Yield trial, goal (both from 1), duration (s) and recorded posture (rad) of each hit; trial 1
+    is clumsy. With ``averages`` what is kept moves half the way to each better trial."""
     kept, best = [None] * len(GOALS), math.inf
     for trial in range(1, trials + 1):
         q, hits, total = list(START), [], 0

@@ -57,12 +57,12 @@ def cells():
 
 @cache
 def plan_of(name):
-    """Return :func:`models.plan_for` of a task by its name."""
+    """Return :func:`models.plan_for` of a task by its name, from a cache."""
     return plan_for(load_task(name))
 
 
 def recover(cell):
-    """Simulate people of every model, and fit them; a row for each."""
+    """Simulate and fit people of every model of :data:`PEOPLE`; a frame with a row for each."""
     name, trials, data, _ = cell
     task, rows, (noise, lost, given) = load_task(name), [], DATA[data]
     plan, seed = plan_of(name), zlib.crc32(repr(cell).encode())

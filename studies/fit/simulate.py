@@ -124,7 +124,8 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
 
 
 def explored_hand(task, condition, q, goal, allowed, rng):
-    """Return the hand of an exploration: random, or the hand closest to the goal."""
+    """Return the hand of an exploration, a place in HANDS: random out of ``allowed`` (places in
+    HANDS), or the hand closest to the goal (from 0)."""
     if condition.hand_exploration == "closest":
         far = [np.linalg.norm(task.robot.forward_kinematics(q, hand) - task.goals[goal])
                for hand in HANDS]  # fmt: skip

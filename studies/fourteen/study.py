@@ -35,14 +35,15 @@ MANY = ["fourteen-one/v1", "fourteen-two/v1"]
 HALF = ["seven-one/v1", "seven-two/v1"]
 """Families with half as many goals, drawn alike."""
 FIRST = 28
-"""Tasks with two arms that were planned first."""
+"""Number of tasks with two arms that were planned first."""
 GAIN = 1.0
 """Per cent. The question is at which horizon a further goal gains less than this; it is also what
 counts as equivalent to a published reward."""
 
 
 def measure_plans(study):
-    """Return first plans, a row for each task and horizon, with what their goals ahead gain.
+    """Return plans, a row for each task and horizon, with what their goals ahead gain; only on the
+    tasks, and with the ``nodes``, of the plans without a goal ahead.
 
     With h goals ahead the planner sees more than with h - 1 at n - h movements of n alone. ``gain``
     is the difference of their ticks for each of those movements, as a share of a mean movement of
@@ -66,8 +67,9 @@ def measure_plans(study):
 
 
 def measure_repeats(study):
-    """Return every pair of plans with three and four goals ahead with two arms, also of more tasks,
-    and the ``gain`` of the fourth goal, as in :func:`measure_plans`."""
+    """Return the ticks of plans with ``three`` and ``four`` goals ahead with two arms, a row for
+    each task and number of ``nodes``, and the ``gain`` of the fourth goal, as in
+    :func:`measure_plans`."""
     plans = study.runs[(study.runs.method == PLANNER) & (study.runs.family == MANY[1])]
     plans = plans.astype({"reward": float, "best_known": float, "nodes": int})
     ticks = -plans.pivot_table("reward", ["task", "nodes", "best_known", "goals"], "horizon")
@@ -91,7 +93,8 @@ def tabulate(study, plans):
 
 
 def tabulate_others(study):
-    """Gaps of the other methods on tasks with fourteen goals, about other tasks and runs."""
+    """Tabulate the gaps of :data:`OTHERS` on tasks with fourteen goals, by family and method:
+    means, as shares, with intervals about other tasks and runs."""
     runs = study.runs[study.runs.family.isin(MANY) & study.runs.gap.notna()]
     rows = {}
     for method in OTHERS:
@@ -115,7 +118,8 @@ def at(plans, families, h, column):
 
 
 def fourth_gains(arms, than, gains):
-    """A claim on the fourth goal ahead: its statement, its test, and what was seen."""
+    """Return the statement, the test and the finding of a claim that the fourth goal ahead gains
+    ``more`` or ``less`` (``than``) than 1 %; ``gains``: per cent, a value for each task."""
     side = "greater" if than == "more" else "less"
     return (
         f"With {arms} the fourth goal ahead of fourteen gains {than} than 1 %.",
@@ -127,7 +131,8 @@ def fourth_gains(arms, than, gains):
 
 
 def signed_rank(gains, than):
-    """p of a one-tailed signed-rank test that gains are more or less than the margin."""
+    """Return p of a one-tailed signed-rank test that gains, per cent by task, are ``more`` or
+    ``less`` (``than``) than :data:`GAIN`."""
     side = "greater" if than == "more" else "less"
     return stats.wilcoxon(gains - GAIN, alternative=side).pvalue
 
@@ -162,7 +167,8 @@ def tabulate_fourth(repeats):
 
 
 def judge_claims(study, plans, repeats):
-    """The claims, as they were registered before the runs; with two arms by the rule above."""
+    """Judge the claims registered before the runs; those on the fourth goal ahead with two arms
+    need a signed-rank test as well."""
     one, two = at(plans, MANY[:1], 4, "gain"), 100 * repeats.groupby("task").gain.mean()
     pairs = [at(plans, families, h, "together").rename(lambda name: name.partition("-")[2])
              for families, h in ((MANY, 2), (HALF, 1), (HALF, 2))]  # fmt: skip

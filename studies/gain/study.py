@@ -79,7 +79,8 @@ def at_equal_gain(cells, how="linear"):
 
 
 def by_task(equal, name, column):
-    """Return a method's differences, a value for each task: means over its numbers of trials."""
+    """Return a method's differences in ``column``, a value for each task: means over its numbers of
+    trials; tasks without a value are left out."""
     of_method = equal[equal.name == name]
     return of_method.groupby("task", sort=False)[column].mean().dropna()
 

@@ -24,15 +24,17 @@ TICKS_OF_A_TURN = 5
 
 
 def unmoved(runs, model, arms):
-    """Return a model's paths by task, on tasks with this number of arms and few goals whose goals
-    are not moved."""
+    """Return a model's paths by task, on tasks with this number of arms and fewer than :data:`LONG`
+    goals of which none is moved."""
     short = (runs.moved == 0) & (runs.goals < LONG)
     ours = runs[short & (runs.model == model) & (runs.arms == arms)]
     return ours.set_index("task").path
 
 
 def moving(runs, model, goal):
-    """A model's paths where a goal moves, by task: a list of them by place, if there are three."""
+    """Return a dictionary by task of a model's paths where ``goal`` (from 1) is moved: Series of
+    lists of paths by place (y of the goal, length unit). Tasks with fewer than three places are
+    left out."""
     ours = runs[(runs.model == model) & (runs.moved == goal)]
     tasks = ours.groupby("origin", sort=False)
     by_task = {task: rows.groupby("place").path.agg(list) for task, rows in tasks}
@@ -48,7 +50,8 @@ def mean_by_task(values):
 
 
 def slope_norms(runs, model, distance):
-    """Length of the vector of slopes by task; with the sign of its square, which chance can turn.
+    """Return by task the length of the vector of slopes of a posture's joints on the place of a
+    goal; with the sign of its square, which chance can turn.
 
     Distance 1 and 2: the posture at goal 1 follows goal 2 or 3; -1: that at goal 2 follows goal 1.
     Slopes of joints are in rad or length unit per length unit. Their squares are mean products of
@@ -70,13 +73,14 @@ def slope_norms(runs, model, distance):
 
 
 def norms_by_practice(runs, model):
-    """Slope norms at distances 1 and 2 after practice, and after a hundredth of it."""
+    """Return slope norms at distances 1 and 2 after practice, then after a hundredth of it: four
+    columns, a row for each task."""
     norms = [slope_norms(runs, model + when, k) for when in ("", ", begun") for k in (1, 2)]
     return pd.concat(norms, axis=1, join="inner")
 
 
 def horizon_rise(rows):
-    """Rise of the slope norm at distance 2 with practice."""
+    """Rise of the slope norm at distance 2 with practice, from :func:`norms_by_practice`."""
     return (rows[:, 1] - rows[:, 3]).mean()
 
 
@@ -91,17 +95,15 @@ def ratio_of_means(pairs):
 
 
 def norms_and_benefits(runs, model):
-    """Slope norm at distance 1, and what preparing can save.
-
-    That is ticks with no goal ahead less the fewest of any run, where no goal moved.
-    """
+    """Return by task the slope norm at distance 1, and the ticks that preparing can save. These are
+    ticks with no goal ahead less the fewest of any run, where no goal moved."""
     alone = mean_by_task(unmoved(runs, "no goal ahead", arms=1).map(lambda path: path.ticks))
     saved = alone + runs.groupby("task").best.first()[alone.index]
     return pd.concat([slope_norms(runs, model, 1), saved], axis=1, join="inner")
 
 
 def kendalls_tau(pairs):
-    """Kendall's τ (b, for ties); 0 where one of both is the same on all tasks."""
+    """Kendall's τ (b, for ties) of two columns; 0 where one of them is the same on all tasks."""
     first, second = (np.sign(column[:, None] - column) for column in pairs.T)
     ordered = np.abs(first).sum() * np.abs(second).sum()
     return (first * second).sum() / np.sqrt(ordered) if ordered else 0.0
@@ -111,7 +113,8 @@ def kendalls_tau(pairs):
 
 
 def hand_path(path, goal):
-    """Places of the hitting hand from the goal before to this one, shape ``(k, 2)``."""
+    """Places of the hand that hits a goal (from 1), from the goal before to this one, shape
+    ``(k, 2)``."""
     return path.task.robot.forward_kinematics(path.subtask(goal), path.hands[goal - 1])
 
 
@@ -129,13 +132,15 @@ def turn(first, second):
 
 
 def bows(runs, model):
-    """Bow of each path between two others, turn to the next, turn from the last (left positive)."""
+    """Return a row for each path from goal to goal between two others, by task: its bow (mean
+    distance from the chord, length unit), the turn to the next and the turn from the last, rad
+    (left positive)."""
     rows = unmoved(runs, model, arms=1).map(bows_of_path).explode()
     return pd.DataFrame([*rows], rows.index)
 
 
 def bows_of_path(path):
-    """The rows of :func:`bows` of one run."""
+    """Return the rows of :func:`bows` of one run, a list without the task."""
     chords = np.diff([hand_path(path, 1)[0], *path.task.goal_array], axis=0)
     rows = []
     for k in range(1, len(chords) - 1):
@@ -147,14 +152,15 @@ def bows_of_path(path):
 
 
 def slope_of_bows(rows):
-    """Slope of the bow on the next turn, given the last one."""
+    """Slope of the bow on the turn to the next path, given the turn from the last one."""
     bow, to_next, from_last = rows.T
     columns = np.column_stack([to_next, from_last, np.ones(len(bow))])
     return np.linalg.lstsq(columns, bow)[0][0]
 
 
 def turn_saved(runs, model):
-    """Turn at goals under the corrective process alone less that of the model, on one arm."""
+    """Turn at goals (:func:`turn_at_goals`) of the corrective process alone less that of the model,
+    by task with one arm, rad."""
     alone, ours = (
         mean_by_task(unmoved(runs, name, arms=1).map(turn_at_goals))
         for name in ("corrective process alone", model)
@@ -163,7 +169,7 @@ def turn_saved(runs, model):
 
 
 def turn_at_goals(path):
-    """Mean angle by which the hand turns at goals that others follow, 0 to π rad."""
+    """Mean angle by which the hand turns at all goals but the last, 0 to π rad."""
     angles = []
     for goal in range(1, len(path.task.goals)):
         before = hand_path(path, goal)[-1 - TICKS_OF_A_TURN :]
@@ -173,7 +179,8 @@ def turn_at_goals(path):
 
 
 def apart_by_stop(runs, model):
-    """How far apart hand paths to goal 1 lie before two places of goal 2: stopping, passing."""
+    """How far apart hand paths to goal 1 lie before two places of goal 2, by task, length unit: in
+    the first column of the model that stops at goals, in the second of the model itself."""
     apart = [
         {task: distance_of_ends(by_place) for task, by_place in moving(runs, name, 2).items()}
         for name in (f"{model}, stopping", model)
@@ -182,7 +189,8 @@ def apart_by_stop(runs, model):
 
 
 def distance_of_ends(by_place):
-    """Mean distance of the hand's first paths to goal 1 at both ends, station by station."""
+    """Mean distance of the hand's paths to goal 1, station by station, of the first runs at the
+    first and at the last place of ``by_place`` (:func:`moving`)."""
     first, last = (stations(hand_path(by_place.iloc[k][0], 1)) for k in (0, -1))
     return np.linalg.norm(first - last, axis=1).mean()
 
@@ -191,7 +199,8 @@ def distance_of_ends(by_place):
 
 
 def ticks_alone(path, goal, hand):
-    """Ticks in which the corrective process alone reaches a goal from the one before, or NaN."""
+    """Ticks in which the corrective process alone reaches a goal (from 1) with a hand (``left`` or
+    ``right``) from where the path hit the goal before; NaN if it does not."""
     same = {name: getattr(path.task, name) for name in ("robot", "hands", "radius", "locked_base")}
     alone = Task(goals=[path.task.goals[goal - 1]], q0=path.subtask(goal)[0], **same)
     trial = corrective_trial(alone, hand[0].upper())
@@ -199,7 +208,8 @@ def ticks_alone(path, goal, hand):
 
 
 def excess_of_first(runs, model):
-    """Ticks to goal 1 beyond the way to it alone, where the other hand hits goal 2."""
+    """Ticks to goal 1 beyond those of the corrective process alone, by task, where the other hand
+    hits goal 2."""
     paths = unmoved(runs, model, arms=2)
     paths = paths[[path.hands[0] != path.hands[1] for path in paths]]
     alone = paths.map(lambda path: ticks_alone(path, 1, path.hands[0]))
@@ -207,14 +217,15 @@ def excess_of_first(runs, model):
 
 
 def near_tie_repeats(runs, model):
-    """Return for each near tie whether the hand stays the same, 0 or 1; NaN if all tasks have
-    few."""
+    """Return by task, for each near tie, whether the hand stays the same, 0 or 1; all NaN if all
+    tasks together have fewer than :data:`FEWEST_TIES`."""
     repeats = unmoved(runs, model, arms=2).map(repeats_of_path).explode().dropna().astype(float)
     return repeats if len(repeats) >= FEWEST_TIES else repeats * np.nan
 
 
 def repeats_of_path(path):
-    """Return whether the hand stays the same at each goal that both hands reach as soon alone."""
+    """Return, for each goal from the second on that either hand alone reaches in nearly the same
+    ticks (:data:`NEAR_TIE`), whether the hand stays the same."""
     repeats = []
     for goal in range(2, len(path.hands) + 1):
         few, many = np.sort([ticks_alone(path, goal, hand) for hand in ("left", "right")])
@@ -224,7 +235,8 @@ def repeats_of_path(path):
 
 
 def sufficient_horizon(runs, model):
-    """The fewest goals ahead with which the planner is within 1 % of all goals in view."""
+    """Return by task the fewest goals ahead with which the planner is within 1 % of all goals in
+    view; empty for other models than ``all goals ahead``."""
     values = {}
     planner = runs[(runs.model == "any goals ahead") & (runs.goals >= LONG)]
     for task, rows in planner.groupby("task", sort=False):

@@ -103,12 +103,14 @@ def measure_effects(study):
 
 
 def by_model(words):
-    """Words on models by model, where some are on a group of them."""
+    """Return words by model; ``words`` has them by model or by group of models (:data:`GROUPS`)."""
     return {model: text for name, text in words.items() for model in GROUPS.get(name, [name])}
 
 
 def judge_test(measured, model, test, level, silent):
-    """Apply one test of a finding to a model; ``silent``: why nothing follows for the model."""
+    """Apply one test of a finding to a model; return its columns of :func:`measure_effects`.
+    ``measured``: function of measure and model that returns values; ``level``: of the interval,
+    two-sided; ``silent``: why nothing follows for the model, or empty."""
     name, (side, word) = test["measure"], (1, "above") if "above" in test else (-1, "below")
     bound, statistic = test[word], MEASURES[name][1]
     values = pd.Series() if silent else measured(name, model)
@@ -135,8 +137,9 @@ def bootstrap(sides, statistic, level):
     """Return a statistic of all tasks with its interval over tasks, and their number.
 
     ``sides``: values by task; of two, the statistic of the first less that of the second, on the
-    tasks that both have. Percentiles, wider by √(k / (k − 1)) for k tasks, by which resamples fall
-    short of the spread. NaN without tasks, and without an interval of one.
+    tasks that both have. ``level``: error of the interval, two-sided. Percentiles, wider by √(k /
+    (k − 1)) for k tasks, by which resamples fall short of the spread. NaN without tasks, and
+    without an interval of one.
     """
     tasks = [task for task in sides[0].index.unique() if all(task in side.index for side in sides)]
     rows = [[pd.DataFrame(side).loc[[task]].to_numpy() for task in tasks] for side in sides]
@@ -157,7 +160,8 @@ def bootstrap(sides, statistic, level):
 
 
 def verdict_of(tests):
-    """The verdict of a finding, from those of its tests: one on the wrong side disagrees."""
+    """Return the verdict of a finding from the verdicts of its tests: the common one if all are
+    alike, else ``disagrees`` or ``no cases`` if a test has it, else ``undecided``."""
     if len(set(tests)) == 1:
         return tests[0]
     return next((kind for kind in ("disagrees", "no cases") if kind in tests), "undecided")
@@ -174,7 +178,7 @@ def tabulate(effects):
 
 @figures.styled
 def draw(table):
-    """A grid with a mark for each verdict; in a circle where it follows from how it is built."""
+    """A grid with a mark for each verdict, circled where it follows from how the model is built."""
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 4.6))
     models = table.drop(columns="finding").rename(columns=lambda name: name.removeprefix("of "))
     for (y, x), verdict in np.ndenumerate(models):

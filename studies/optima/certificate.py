@@ -136,7 +136,8 @@ class ProofSearch:
         return max(0, self._claim - 1 - moves) * PAPER.step
 
     def branch(self, node):
-        """Split a subproblem into others that together hold every solution in it."""
+        """Split the subproblem of a node that is no longer in the heap into others that together
+        hold every solution in it, and add these."""
         problem, q = node.problem, node.relaxed.q
         moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
@@ -168,12 +169,13 @@ class ProofSearch:
                     self.add(problem._replace(box=box), node.length)
 
     def miss(self, q, goal):
-        """Return how far the nearer hand is from a goal."""
+        """Return how far the nearer hand is from the centre of a goal (from 0), length unit."""
         places = (self._task.robot.forward_kinematics(q, hand) for hand in self._hands)
         return min(math.dist(place, self._task.goals[goal]) for place in places)
 
     def add(self, problem, parent):
-        """Bound a subproblem; add it to the open ones if its bound is too low."""
+        """Bound a subproblem; add it to the open ones unless no solution in it beats the claimed
+        ticks. ``parent``: bound on the path of the subproblem that it is a part of, or 0."""
         if problem.moves >= self._claim:
             return
         root = self.relaxation(problem.hands, problem.merged)
@@ -193,5 +195,5 @@ class ProofSearch:
         heapq.heappush(self.heap, node)
 
     def shortfall(self, lagrangian, box, moves):
-        """Return by how much a bound is short of the longest path of interest."""
+        """Return by how much a bound on the path is short of the longest path of interest."""
         return self.longest(moves) - (lagrangian.bound(box) - TOLERANCE)

@@ -18,7 +18,8 @@ _SETTINGS = {
 
 
 class Programme:
-    """Canonical data of a problem of CVXPY with one parameter, in a solver.
+    """Canonical data of a problem of CVXPY with one parameter, whose first values are ``values``,
+    in a solver.
 
     Constraints have the order of the canonical data: equations, inequalities, second-order cones.
     Each number of the parameter is planted as a number of its own, which shows its places.
@@ -51,11 +52,9 @@ class Programme:
         return [numbers for numbers, _, _ in self._places]
 
     def solve(self, values):
-        """Return the values of the variables, and the multipliers of the constraints.
-
-        If there is no solution, the multipliers are far out on a ray, along which the dual
-        objective grows. If the solver fails, they may be any numbers.
-        """
+        """Return the values of the variables, and the multipliers of the constraints, two lists,
+        for values of the parameter. If there is no solution, the multipliers are far out on a ray,
+        along which the dual objective grows. If the solver fails, they may be any numbers."""
         matrix, right = self._fill(values)
         self._solver.update(A=matrix, b=right)
         solution = self._solver.solve()

@@ -53,7 +53,8 @@ def distance(entry):
 
 
 def prove(entry, seconds):
-    """Return what the log has of a proof: bound, nodes, seconds, and a solution if it is better."""
+    """Return the row of the log on a proof within ``seconds`` of CPU time: bound, nodes, seconds,
+    and a solution if it is better."""
     task, still = load_task(entry["task"]), entry["other_arm"] == "still"
     restricted = with_locks(task, entry["base"])
     proof = certify(restricted, -entry["reward"], most_seconds=seconds, still=still)
@@ -69,7 +70,8 @@ def prove(entry, seconds):
 
 
 def polished(task, chains, still):
-    """Return the solution of fewest ticks that plans from these starts lead to; None without."""
+    """Return the solution of fewest ticks (PlanInTicks) that plans from the starts ``chains`` lead
+    to; None if none does. ``still`` holds the arm that is not chosen."""
     session = Session(task, 0, REWARD_INFORMATION, model=PAPER, trusted=True)
     problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
     try:

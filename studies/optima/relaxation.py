@@ -59,8 +59,9 @@ class Relaxed(NamedTuple):
 class Relaxation:
     """Cone programme of one hand sequence; its parameters are the half-spaces of a box.
 
-    ``merged`` are the goals that are hit without a movement; their hands are all decided. A box has
-    the absolute link angles of the chosen arms at the goals whose hand is decided, goal by goal.
+    ``merged`` are the goals (from 0) that are hit without a movement; their hands are all decided.
+    ``still`` holds the arm that is not chosen. A box has the absolute link angles of the chosen
+    arms at the goals whose hand is decided, goal by goal, shape ``(links, 2)``, rad.
     """
 
     def __init__(self, task, hands, merged, still):
@@ -98,7 +99,7 @@ class Relaxation:
         return np.stack([self._start_angles - reach, self._start_angles + reach], axis=1)
 
     def state(self):
-        """Return the programme in CVXPY, with its half-spaces as the parameter; q and u."""
+        """Return the CVXPY problem, its parameter (the half-spaces), and its variables q and u."""
         goals, links = len(self._radii), len(self._lengths)
         q, u, distances = cp.Variable(self.held.shape), cp.Variable((links, 2)), cp.Variable(goals)
         changes = q - cp.vstack([self._q0[None], q[:-1]])

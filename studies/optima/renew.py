@@ -25,7 +25,7 @@ MADE_BY = "coartic", "commit", "model_code", "python", "date"
 
 
 def ships(task, restriction):
-    """Return whether rewards of a task under a restriction ship."""
+    """Return whether rewards of a task under a restriction (base, other arm) ship."""
     if task.family not in shipped_families():
         return task.name in builtin_tasks()
     is_early = task.split == "test" and int(task.name.rpartition("/i")[2]) < MOST
@@ -33,7 +33,7 @@ def ships(task, restriction):
 
 
 def take_over(study, known):
-    """Take over what the runs of a folder improve; return the number of new entries.
+    """Take over into ``known`` what the runs of a folder improve; return the number of new entries.
 
     The first 500 runs of a method with its parameters on a task count. Raises CoarticError for a
     solution that does not give its reward on the shipped task of this name.

@@ -67,7 +67,8 @@ def soonest(task, hands, last, cost):
 
 
 def efficient(points):
-    """Return points (of one or two coordinates) without those that another is as soon as in all."""
+    """Return the points, tuples of one or two times, that no other point equals or precedes in
+    every time."""
     kept = []
     for point in sorted(points):
         if not kept or point[-1] < kept[-1][-1]:

@@ -79,8 +79,8 @@ def judge_claims(study, names):
 
 
 def judge_rules(study, names, rules, tests):
-    """Judge claims by rules, corrected within groups; also return the ids of the runs that each
-    rule read, without the rules for which the folder lacks runs or tasks."""
+    """Judge claims by rules, corrected within groups; also return by claim the ids of the runs that
+    its rule read, without the claims for which the folder lacks runs or tasks."""
     findings, run_ids = {}, {}
     for name in names:
         read = Reader(study)

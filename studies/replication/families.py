@@ -56,7 +56,8 @@ def in_every_family(read, families, comparisons):
 
 
 def reported_instances(read, family):
-    """Return the best known rewards of a family's instances, without development instances."""
+    """Return the best known rewards of a family's instances by name, without development instances.
+    Raises MissingError if the folder has none."""
     tasks = read.study.tasks
     reported = {
         name: best
@@ -74,7 +75,8 @@ def most_exploring(read, task):
 
 
 def earns(first, second):
-    """Compare the rewards of two methods."""
+    """Return words and a function that compares the rewards of two methods on a task, for
+    :func:`in_every_family`."""
     words = " > ".join(label.removeprefix(LEARNER) for label in (first, second))
     return f" {words}", lambda read, task: Higher(
         read.reward(task, first), read.reward(task, second)
@@ -82,14 +84,14 @@ def earns(first, second):
 
 
 def shows(signature, *, by=0.0):
-    """Compare a signature of the learner with 0."""
+    """Return words and a function that compares a signature of the learner with 0, by a margin."""
     return "", lambda read, task: Higher(
         read.signature(signature, task, most_exploring(read, task)), None, by
     )
 
 
 def shows_beyond_random_search(signature):
-    """Compare a signature of the learner with the same signature of random search."""
+    """Return words and a function that compares a signature of the learner with random search."""
 
     def compare(read, task):
         label = most_exploring(read, task)

@@ -60,7 +60,8 @@ def more_slower_hands_than_random_search(read):
 
 
 def fisher_test(count, total, other, of_other, side="two-sided"):
-    """Compare two shares of runs by Fisher's exact test."""
+    """Compare two shares of runs, ``count`` of ``total`` and ``other`` of ``of_other``, by Fisher's
+    exact test; the value of the estimate is the first less the second."""
     table = [[count, total - count], [other, of_other - other]]
     p = float(scipy.stats.fisher_exact(table, alternative=side).pvalue)
     return Estimate(count / total - other / of_other, n=(total, of_other), p=p)
@@ -84,7 +85,8 @@ def chosen_slower(cell, initial):
 
 
 def most_do(words, does, *, claimed=True):
-    """Test that more than three quarters of the runs do something; or fewer, if not ``claimed``."""
+    """Test that more than three quarters of the runs do something, or fewer, if not ``claimed``.
+    ``does``: a truth value for each run; ``words`` begin the evidence."""
     count, total = sum(does), len(does)
     side, other = ("greater", "less") if claimed else ("less", "greater")
     test, contrary = (share_test(count, total, MARGINS.most, which) for which in (side, other))
@@ -97,7 +99,8 @@ def most_do(words, does, *, claimed=True):
 
 
 def runs_that(read, task, label, what, does):
-    """Say how many runs do something, with the hand sequences of all runs."""
+    """Say how many runs do something (``what``, in words; ``does``, a truth value for each run),
+    with the hand sequences of all runs."""
     counts = sorted(Counter(read.hands(task, label)).items(), key=lambda item: (-item[1], item[0]))
     each = ", ".join(f"{hands} {count}" for hands, count in counts)
     who = f"{read.title(task)} {read.who(label)}"
@@ -105,7 +108,8 @@ def runs_that(read, task, label, what, does):
 
 
 def half_find(read, task, label, hands):
-    """Test that neither few nor most runs learn these hands, against the published share."""
+    """Test that neither few nor most runs (:data:`MARGINS`) learn these hands; the opposite is that
+    their share differs from the published one."""
     does = [each == hands for each in read.hands(task, label)]
     count, total = sum(does), len(does)
     share = count / total

@@ -194,7 +194,7 @@ class Reader:
 
 
 def there(reads):
-    """Yield the measurements for which the folder has runs."""
+    """Yield what the functions ``reads`` return, but for those that raise MissingError."""
     for read in reads:
         with suppress(MissingError):
             yield read()

@@ -85,7 +85,8 @@ def draw_solutions(solutions):
 
 
 def draw_posture(axes, task, q, colour, marked=""):
-    """Draw base, arms and goals in a configuration, with the joints of the marked hand's arm."""
+    """Draw base, arms and goals in a configuration; joints of the arm of the ``marked`` hand, ``L``
+    or ``R``, have markers."""
     axes.fill(*task.robot.base_outline(q).T, facecolor="none", edgecolor=colour, linewidth=0.5)
     for hand in task.hands:
         letter = hand[0].upper()

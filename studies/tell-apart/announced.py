@@ -20,11 +20,10 @@ def changed(task, goals):
 
 
 def moves(task, seed):
-    """Yield each goal that has one after it, a distance, and the task with that one moved.
-
-    The direction is random, the same for all distances; the moved goal stays apart from its
-    neighbours.
-    """
+    """Yield, for each goal but the last and each distance, the goal (from 0), the distance, and the
+    task with the goal after it moved by this distance. The direction is random, the same for all
+    distances; the moved goal stays apart from its neighbours. A goal for which no direction is
+    found is left out."""
     rng, goals = np.random.default_rng([68, seed]), task.goal_array
     for g in range(len(goals) - 1):
         neighbours = np.delete(goals, g + 1, axis=0)[max(g - 1, 0) : g + 2]
@@ -43,10 +42,9 @@ def moves(task, seed):
 
 
 def trials_to_half(shares, after):
-    """Return the logarithm of the trials until a share of the final shift is a half, interpolated.
-
-    ``shares``: after each number of trials in ``after``. NaN without a shift.
-    """
+    """Return the logarithm, base 10, of the trials until a share of the final shift is a half,
+    interpolated. ``shares``: after each number of trials in ``after``. NaN if the last share is
+    below a half."""
     if not shares[-1] >= HALF:
         return np.nan
     k = int((shares >= HALF).argmax())

@@ -30,18 +30,17 @@ PLANNERS = {
 
 
 def learned(task, seed, start):
-    """Return what the learner has learned after :data:`AFTER` trials from a first solution."""
+    """Return :func:`look` at what the learner has learned after each of :data:`AFTER` trials from
+    the first solution ``start``."""
     runs = (learn(task, condition(task), seed=seed, trials=n, start=start) for n in AFTER)
     return [look(task, run.solution) for run in runs]
 
 
 def informed_next(before, task, q, hands, g, movements):
-    """Movements in which the posture at goal ``g`` is corrected for the goal after it.
-
-    The corrective process finds from the posture how the robot would hit the next goal, before
-    and after the change. Half of the difference is added to the posture, which the process then
-    brings back to its goal.
-    """
+    """Return ``movements`` with the posture ``q`` at goal ``g`` (from 0) corrected for the goal
+    after it, which the change from task ``before`` to ``task`` has moved. The corrective process
+    finds from the posture how the robot would hit the next goal, before and after the change. Half
+    of the difference is added to the posture, which the process then brings back to its goal."""
 
     def process(q, hand, goal):
         return correct(task.robot, q, hand, goal, locked_base=task.locked_base).q
@@ -78,7 +77,7 @@ def evolve(cost, point, rng):
 
 
 def hit(task, cost, point):
-    """As :func:`look`, for a point of an objective."""
+    """Return postures and ticks as :func:`look` does, for a point of an objective (``cost``)."""
     targets = np.full((1, *cost.joints.shape), np.nan)
     targets[0][cost.joints] = point
     session = Session(task, 0, [Information.REWARD_BY_TRIAL, Information.CORRECTIVE_PROCESS])
@@ -90,9 +89,9 @@ def change_goals(task, seed):
     """Rows of a task: a model each, for a goal before a change and a distance.
 
     ``dot_N``: shift of the posture at the goal after N trials, times the shift after all of them;
-    ``square``: the latter squared. ``ticks_N``: of a trial then. ``same`` and ``anew``: such a
-    product for practice without a change, and the squared distance to those who learn the changed
-    task anew; ``among``: between those.
+    ``square``: the latter squared. ``ticks_N``: of a trial then. ``same``: such a product for
+    practice without a change; ``anew``: mean squared distance to two learners of the changed task,
+    with ``ticks_anew``; ``among``: squared distance between the two.
     """
     cases = list(moves(task, seed))
     if task.name in ("ascending", "descending"):

@@ -16,7 +16,8 @@ def condition(task):
 
 
 def look(task, movements):
-    """Postures in which the goals are hit, shape ``(G, dof)``, and ticks of a trial."""
+    """Return the postures at the hits of the goals, shape ``(G, dof)``, and the ticks of a
+    trial."""
     done = execute(task, movements)
     return done.configurations, done.ticks
 
