@@ -27,10 +27,8 @@ class ShortestPlans(NamedTuple):
 
     by_hands: dict[HandSequence, PathPlan]
     """The shortest plan of each hand sequence that has one."""
-    solves: int
-    """Number of solves, one for each start."""
-    failed: int
-    """Number of solves that did not converge."""
+    solves: int  # one for each start
+    failed: int  # solves that did not converge
 
     @property
     def ranked(self) -> list[PathPlan]:

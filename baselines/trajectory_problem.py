@@ -132,8 +132,7 @@ class PathPlan:
     """IPOPT's return status."""
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
-    cost: float
-    """Value of the problem's cost; minus the depth in the discs if the solve asked for depth."""
+    cost: float  # of the problem; minus the depth in the discs if the solve asked for depth
     durations: Array
     """Durations of the segments, shape ``(G,)``, with mean 1; all 1 for costs without rates."""
     rates: Array

@@ -249,7 +249,6 @@ class Session:
         self._used: set[Information] = set()
         self.seed = seed
         self.rng = np.random.default_rng(seed)
-        """Generator of the run's random numbers."""
         self.model = model
         self._trusted = trusted
         self._of_run = of_run
