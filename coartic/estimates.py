@@ -101,7 +101,7 @@ def varies(values: Array) -> Array:
 @checked_arguments
 def centred(values: Array) -> Array:
     """Return values less their mean over the first axis; 0 where they do not differ."""
-    return np.where(varies(values), values - values.mean(axis=0), 0.0)
+    return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
 
 @checked_arguments
@@ -141,6 +141,7 @@ def mean_of_means(
     """
     if not samples:
         raise ValueError("needed is a sample at least")
+    samples = [*map(vector, samples)]
     parts = [*zip(samples, weights, strict=True)]
     value = float(sum(weight * sample.mean() for sample, weight in parts))
     n = tuple(map(len, samples))

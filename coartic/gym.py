@@ -550,7 +550,8 @@ def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
     """Return the table of :func:`score` from the rewards of policies on K tasks, shapes
     ``(K, trials)``, NaN where a trial failed, and the best known rewards, shape ``(K, 1)``, NaN
     where none is known. Raises ValueError for other shapes."""
-    shapes = [np.shape(earned) for earned in (best, *rewards.values())]
+    best, rewards = np.asarray(best), {name: np.asarray(each) for name, each in rewards.items()}
+    shapes = [earned.shape for earned in (best, *rewards.values())]
     if any(len(shape) != 2 or shape[0] != len(best) for shape in shapes):
         raise ValueError(f"rewards have shapes {shapes}; needed is a row for each task")
     rows, known = {}, np.isfinite(best[:, 0])

@@ -31,6 +31,7 @@ from coartic import (
     builtin_tasks,
     correct,
     corrective_trial,
+    estimates,
     execute,
     gym,
     hand_sequences,
@@ -527,6 +528,39 @@ def test_no_wrong_argument_gets_an_error_of_python(call, usual):
         if value is MASKED and name in hints:
             is_array = re.search("Array|Config|Sequence.float", str(hints[name].annotation))
             assert words or not is_array, name
+
+
+def as_lists(value):
+    """A value with lists in place of arrays."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: as_lists(each) for key, each in value.items()}
+    return [as_lists(each) for each in value] if isinstance(value, list) else value
+
+
+@pytest.mark.parametrize(
+    ("call", "usual"),
+    [
+        *CALLS,
+        *((function, {"values": np.array([1.0, 2.0])}) for function in (
+            estimates.centred, estimates.standard_deviation, estimates.varies)),
+        (estimates.mean_of_means, {"samples": [np.arange(3.0)], "weights": [1.0]}),
+        (other_tasks, {"scores": {"a": [np.array([1.0, 2.0])] * 3}}),
+        (gym.compare, {"rewards": {"a": np.array([[-2.0]])}, "best": np.array([[-1.0]])}),
+    ],
+)  # fmt: skip
+def test_arrays_may_be_lists(call, usual):
+    def outcome(arguments):
+        try:
+            return None, call(**arguments)
+        except Exception as error:
+            return repr(error), None
+
+    (refused, expected), (error, found) = outcome(usual), outcome(as_lists(usual))
+    assert error == refused
+    if isinstance(expected, np.ndarray | float | estimates.Estimate) and "rng" not in usual:
+        assert repr(found) == repr(expected)
 
 
 @pytest.mark.parametrize("name", OF_STUDY)

@@ -91,7 +91,7 @@ def list_contexts(study: Study) -> Rows:
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
                 **(control := beside_control(study, shared)),
-                "verdict": verdict_of(study, shared, control),
+                "verdict": verdict_of(study, shared, control, adjusted),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **run_ids(*(study.cells[task.name, label] for task in shared.tasks)),
@@ -213,12 +213,15 @@ def draw_coarticulation(study: Study) -> Parts | None:
     return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
 
 
-def verdict_of(study: Study, shared: TwoContexts, control: Row | None = None) -> str:
+def verdict_of(
+    study: Study, shared: TwoContexts, control: Row | None = None, p: float = math.nan
+) -> str:
     """Return in words whether the posture at a shared goal depends on the next goal.
 
-    For stochastic methods by the permutation test, p uncorrected; methods that select their
-    solution from trials are compared with random search, too. ``control`` is the result of
-    :func:`beside_control` for ``shared``; None: computed here.
+    For stochastic methods by the permutation test; methods that select their solution from trials
+    are compared with random search, too. ``control`` is the result of :func:`beside_control` for
+    ``shared``; None: computed here. ``p`` is the p-value corrected for all shared goals of the
+    method; NaN: that of ``shared`` alone.
     """
     method: Any = study.methods.loc[shared.method]
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
@@ -226,7 +229,7 @@ def verdict_of(study: Study, shared: TwoContexts, control: Row | None = None) ->
         return "too few runs"
     if not method.stochastic and shared.posture_difference <= SAME:
         return "the same posture"
-    if method.stochastic and not shared.p < LEVEL:
+    if method.stochastic and not (shared.p if math.isnan(p) else p) < LEVEL:
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"

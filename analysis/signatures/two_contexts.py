@@ -72,7 +72,7 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
         )
     equivalent, other = (
         float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
-        for basis in (scipy.linalg.null_space(jacobian), scipy.linalg.orth(jacobian.T))
+        for basis in (scipy.linalg.null_space(jacobian), scipy.linalg.orth(np.transpose(jacobian)))
     )
     return equivalent, other
 

@@ -74,8 +74,12 @@ def other_tasks(scores: Scores) -> Estimate:
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
+    scores = {
+        family: [real_array("runs", runs) for runs in instances]
+        for family, instances in scores.items()
+    }
     values = {
-        family: np.array([real_array("runs", runs).mean() for runs in instances])
+        family: np.array([runs.mean() for runs in instances])
         for family, instances in scores.items()
     }
     mean = float(np.mean([instances.mean() for instances in values.values()]))

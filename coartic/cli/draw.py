@@ -29,7 +29,7 @@ def draw(
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
-    from coartic.internal.files import check_ending, publish, write_output
+    from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
@@ -41,9 +41,11 @@ def draw(
     from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
     from coartic.analysis.sections.tasks import picture_of_tasks
 
-    drawing = picture_of_tasks(chosen[:_PICTURED])
     if out.suffix:
         check_ending(out, FORMATS)
+        check_output(out, replace=replace)
+    drawing = picture_of_tasks(chosen[:_PICTURED])
+    if out.suffix:
         write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
