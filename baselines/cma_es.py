@@ -157,6 +157,8 @@ class GoalByGoal(Method):
                     strategies[hands] = Strategy(session, attempts, hands, self.parameters.sigma)
                 elif strategies[hands].reward > -math.inf:
                     strategies[hands].generation()
+                elif not self.parameters.epsilon:
+                    break  # the same hands would be chosen again
                 pairs = [hands[max(goal - 1, 0) : goal + 1] for goal in range(len(hands))]
                 for entry in enumerate(pairs):
                     values[entry] = max(values[entry], strategies[hands].reward)

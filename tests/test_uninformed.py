@@ -13,7 +13,7 @@ from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Meter, MethodError, Session
 from coartic.optimisers import OPTIMISER_INFORMATION
-from tests.support.strategies import solve, tiny_task
+from tests.support.strategies import failing_task, solve, tiny_task
 
 METHODS = (HillClimbing, CMAES, GoalByGoal)
 ONE_GOAL = tiny_task(
@@ -31,6 +31,8 @@ def test_hands_chosen_goal_by_goal():
     narrow, *_ = solve(GoalByGoal, task, trials=100, epsilon=0.0)
     assert narrow.details["sequences"] == 1  # nothing else is worth more than what was tried
     assert {movement.hand for movement in narrow.solution} == {"right"}
+    with pytest.raises(MethodError):  # without exploration the same hands fail again and again
+        solve(GoalByGoal, failing_task(hands="L"), trials=100, epsilon=0.0)
     many = task.model_copy(update={"goals": task.goals[:2] * 7, "initial_hands": "R" * 14})
     result, *_ = solve(GoalByGoal, many, trials=400)
     assert result.details["sequences"] > 4  # of 16,384, which are too many to try
