@@ -147,7 +147,7 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """Draw a legend of so many columns, or fewer if the figure is narrow, below all panels; for
+    """Draw a legend of ``columns`` columns, or fewer if the figure is narrow, below all panels; for
     more than two lines of entries the figure becomes taller."""
     widest = 0.45 + 0.06 * max(len(str(handle.get_label())) for handle in handles)  # inches
     columns = min(columns, max(1, int(figure.get_figwidth() // widest)))

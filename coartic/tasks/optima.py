@@ -81,7 +81,7 @@ def _by_essence() -> dict[str, KnownOptimum]:
 
 
 def entries() -> list[dict[str, Any]]:
-    """Read the shipped data anew, an entry per task and restriction, as ``optima.json`` has it.
+    """Read the shipped data again, an entry per task and restriction, as ``optima.json`` has it.
 
     ``task``, its :func:`essence`, ``base`` (directions in which it is locked; ``task``: as the task
     locks it), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``; then ``reward``,
