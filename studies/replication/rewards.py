@@ -116,9 +116,9 @@ def equivalence(difference, margin):
 def spread_p(values, published, runs, *, of_mean=False):
     """Test whether ``runs`` runs like ours could have a published spread, two-tailed.
 
-    That many of our ``values`` are drawn with replacement, and p is twice the share of samples whose
-    standard deviation, or standard error with ``of_mean``, is at least as far on the side of the
-    published spread. NaN with fewer than ten values.
+    That many of our ``values`` are drawn with replacement, and p is twice the share of samples
+    whose standard deviation, or standard error with ``of_mean``, is at least as far on the side of
+    the published spread. NaN with fewer than ten values.
     """
     if len(values) < 10:
         return math.nan
