@@ -152,8 +152,9 @@ def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Float
 
 
 def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """Return the points of a path as columns, shape ``(dof, points)``, at most ``most`` + 1. Point
-    k, from 0, lies k steps along the path; the last lies at its end if no point is left out."""
+    """Return points along a path from ``q`` through ``waypoints``, a row each, as columns,
+    shape ``(dof, points)``. Point k, from 0, lies k steps of ``model`` along the path, and the
+    last point at its end; of a longer path only the first ``most`` + 1 points are returned."""
     corners = np.array([q, *waypoints])
     ends = np.append(0.0, np.cumsum(np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))))
     last = math.ceil(ends[-1] / model.step)

@@ -229,11 +229,12 @@ class TrajectoryProblem:
         """Return a locally cheapest plan, sought from one configuration per goal, ``start``
         ``(G, dof)``.
 
-        ``lengths`` ``(G,)`` fixes the joint-space lengths of segments where it is not NaN
-        (path-length cost only); with ``deep`` (goals, from 0) the hands are then as deep inside the
-        discs of these goals as those lengths allow, and the path is not made short. ``stops`` holds
-        all rates at the goals at 0 (smoothness costs only). A plan has converged if IPOPT says so
-        and every constraint holds; one that has not is returned as well.
+        Only for path length: ``lengths`` ``(G,)`` are upper bounds of the joint-space lengths
+        of the segments, NaN where a length is free. With ``deep`` (goals, from 0) the path is
+        not made short; the least depth of the hands inside the discs of these goals is made as
+        large as ``lengths`` allow. Only for smoothness costs: ``stops`` holds all rates at the
+        goals at 0. A plan has converged if IPOPT says so and every constraint holds; one that
+        has not is returned as well.
         """
         goals, at = self.goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)

@@ -134,7 +134,7 @@ class Rounding:
         """Return the locally shortest plan from the configurations ``start``, shape ``(G, dof)``;
         it may not have converged.
 
-        ``lengths``, shape ``(G,)``, are the lengths of the movements in joint space; NaN where a
+        ``lengths``, shape ``(G,)``, bound the lengths of the movements in joint space; NaN where a
         length is free. Goals in ``merged`` (from 0) are hit without a movement. With ``deep``
         (goals, from 0) the hands are as deep inside the discs of these goals as the lengths allow,
         and the path is not made short. The session counts the solver's effort.

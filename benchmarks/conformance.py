@@ -70,9 +70,10 @@ def check_method(
         return info.why_not(task, parameters) is None
 
     laws = _laws_of_declaration(info)
-    tasks = list(filter(applies, tasks or map(load_task, builtin_tasks())))
+    given = [*map(load_task, builtin_tasks())] if tasks is None else tasks
+    tasks = list(filter(applies, given))
     if not tasks:
-        problem = "it applies to none of the shipped tasks, so nothing can be checked"
+        problem = "it applies to none of the tasks, so nothing can be checked"
         return [*laws, Law("solution", False, problem)]
     jobs = {}
     for kind, seed, budget in (

@@ -227,7 +227,8 @@ class Worker:
 
     @property
     def is_late(self) -> bool:
-        """True if the current job has exceeded its limit of wall time."""
+        """True if the current job has exceeded its limit of wall time. The worker must have a
+        job."""
         return time.monotonic() > self.since_s + self.wall_limit_s
 
     @property
@@ -350,8 +351,8 @@ def _limit_cpu_time(limit_s: float) -> None:
 
 
 def _bound_resources(workers: int) -> None:
-    """Limit memory and file size of this process, so that a method gets an error before the machine
-    swaps."""
+    """Limit memory and file size of this process, one of ``workers`` that share the machine,
+    so that a method gets an error before the machine swaps."""
     try:
         import resource
 
@@ -360,8 +361,10 @@ def _bound_resources(workers: int) -> None:
         return
     share = max(total * 8 // (10 * workers), _LEAST_MEMORY)
     for what, most in ((resource.RLIMIT_DATA, share), (resource.RLIMIT_FSIZE, _LARGEST_FILE)):
+        soft, _ = resource.getrlimit(what)
         with contextlib.suppress(ValueError):  # a limit from outside is lower
-            resource.setrlimit(what, (most, most))
+            lower = most if soft == resource.RLIM_INFINITY else min(soft, most)
+            resource.setrlimit(what, (lower, most))
 
 
 # Processes are forked from a server that has imported their modules, if the system has such servers

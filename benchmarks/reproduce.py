@@ -26,7 +26,8 @@ from coartic.trajectories import Trajectory, trajectory
 def find_run(prefix: str, folder: Path) -> Run:
     """Find the run whose id begins with ``prefix`` in a results folder or any folder below it.
 
-    Raises CoarticError if there is no such run, or more than one.
+    Raises CoarticError if there is no such run, or more than one; without such a run also for a
+    folder that cannot be read.
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-"):
         raise CoarticError(
@@ -39,10 +40,15 @@ def find_run(prefix: str, folder: Path) -> Run:
         raise CoarticError(
             f"cannot read {folder}: {error.strerror}. Name a folder with --in."
         ) from None
-    folder_of: dict[str, Path] = {}
+    folder_of, unread = dict[str, Path](), list[CoarticError]()
     for path in sorted(folder.rglob(RUNS_FILE)):
-        with open_store(path.parent) as store:
-            folder_of |= dict.fromkeys(store.ids(prefix), path.parent)
+        try:
+            with open_store(path.parent) as store:
+                folder_of |= dict.fromkeys(store.ids(prefix), path.parent)
+        except CoarticError as error:
+            unread.append(error)
+    if unread and not folder_of:
+        raise unread[0]
     if not folder_of:
         raise CoarticError(
             f"there is no run {prefix!r} in {folder}. Name another folder with --in."

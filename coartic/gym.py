@@ -572,9 +572,11 @@ def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
 
 
 def _options_of(env: Any) -> dict[str, Any]:
-    """Return the options of an environment of this package, or of its id.
+    """Return ``task``, ``ahead`` and ``model`` of an environment of this package, or the
+    options with which an id is registered. The dictionary is no copy: do not change it.
 
-    Raises ValueError for an unknown id, and TypeError for anything else.
+    Raises ValueError for an unknown id, and TypeError for anything else and for an environment
+    in a wrapper that is not among :data:`ADDED`.
     """
     if isinstance(env, str):
         if env not in IDS:

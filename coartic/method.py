@@ -164,7 +164,8 @@ class Meter:
     that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add counts to the counters of these names, unchecked."""
+        """Add each count to the counter of that name, not to the times. Signs and sizes are
+        not checked."""
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 

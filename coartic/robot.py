@@ -145,7 +145,7 @@ class Robot:
 
     @cached_property
     def most_links(self) -> int:
-        """Number of links of the longer arm."""
+        """Number of links of the arm that has more of them."""
         return max(len(self.left_links), len(self.right_links))
 
     @cached_property

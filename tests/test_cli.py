@@ -20,6 +20,7 @@ from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
 from coartic.runs.plan import run_seed
+from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
@@ -140,8 +141,11 @@ def test_reproduce(coartic, tmp_path):
     out = tmp_path / "out"
     assert coartic(*SMALL, "--out", out)[0] == 0
     first, second = load(out).runs.run_id
-    code, text, _ = coartic("reproduce", first, "--in", out)
+    (tmp_path / "earlier").mkdir()  # a folder that cannot be read is next to it
+    (tmp_path / "earlier" / RUNS_FILE).write_text("no database")
+    code, text, _ = coartic("reproduce", first, "--in", tmp_path)
     assert code == 0
+    assert "earlier" in coartic("reproduce", "0123456789", "--in", tmp_path)[2]
     assert text.splitlines()[-1] == "Performed again: identical."
     assert "1 run performed again: none with another" in coartic("verify", out, "--again", 1)[1]
     edit(out, "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?", second)

@@ -280,6 +280,12 @@ def test_settings_stand_behind_their_method_in_the_ranking():
     means = [1480 / 3, 1492 / 3]
     assert of_settings.gap.tolist() == pytest.approx([(mean - 292) / 292 for mean in means])
     assert (of_settings.gap_low < of_settings.gap_high).all()
+    # A setting of an ablation stands behind the ablation.
+    ablation = f"{EC1}-subtask"
+    of_ablation = runs_of("ascending", ablation, [-520] * 3)
+    of_ablation += runs_of("ascending", ablation, [-510] * 3, setting="noise_sd=0.1")
+    both = TABLES["ranking"](with_settings("", more=of_ablation)).index.tolist()
+    assert both == [EC1, ablation, f"{ablation} noise_sd=0.1"]
     without = with_settings("noise_sd=0.1", "noise_sd=0.2", more=between)
     assert TABLES["ranking"](without).index.tolist() == [settings[0], "hill-climbing", settings[1]]
 

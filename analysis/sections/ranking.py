@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -125,17 +126,24 @@ def list_ranking(study: Study) -> Rows:
 
 
 def ranked(study: Study) -> list[str]:
-    """Return the labels of the methods of the ranking by mean gap, then of the methods without a
-    gap in the order of :attr:`.Study.methods`.
+    """Return the labels of the methods of the ranking: methods from files, then built-in ones.
 
-    Methods from files come first, and settings after their method.
+    In both groups the smallest mean gap is first, and methods without a gap follow in the
+    order of :attr:`.Study.methods`. But a setting or an ablation stands after its method, if
+    that method is in the list.
     """
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
     names.sort(key=lambda method: bool(study.methods.built_in[method]))
     under = study.methods.under
-    of_method = {first: [m for m in names if under[m] == first] for first in names}
-    return [m for first in names if under[first] not in names for m in (first, *of_method[first])]
+
+    def with_settings(first: str) -> Iterator[str]:
+        yield first
+        for method in names:
+            if under[method] == first:
+                yield from with_settings(method)
+
+    return [m for first in names if under[first] not in names for m in with_settings(first)]
 
 
 @figure(

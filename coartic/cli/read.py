@@ -42,7 +42,9 @@ def report(
     say_part("")
     tables = sum(name.endswith(".csv") for name in files)
     figures = sum(name.endswith(".svg") for name in files)
-    what = f"CSV and LaTeX) and {counted(figures, 'figure')} (SVG and PDF" if for_paper else "CSV"
+    latex = sum(name.endswith(".tex") for name in files)
+    paper = f"CSV, {latex} as LaTeX) and {counted(figures, 'figure')} (SVG and PDF"
+    what = paper if for_paper else "CSV"
     say(
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
         f"{counted(tables, 'table')} ({what})."
@@ -58,9 +60,13 @@ def report(
 
 
 def say_ranking(study: Study, *more: tuple[str, str]) -> None:
-    """Print ten rows of the ranking, the nearest methods with the learner and random search,
-    coarticulation and cost in a line each, numbers of runs and trials that are not those of the
-    paper, the failed runs, and further pairs of word and text."""
+    """Print a table, then pairs of a word and a text.
+
+    The table has at most ten methods of the ranking, without settings and ablations: those
+    with the smallest gaps and, wherever they rank, the learner and random search. The pairs
+    are the findings on coarticulation and on cost, numbers of runs and trials that are not
+    those of the paper, the failed runs, and ``more``.
+    """
     from coartic.analysis.report.about import RUNS, finding, leading, limits
     from coartic.analysis.sections import SECTIONS, TABLES
     from coartic.analysis.words import interval, number

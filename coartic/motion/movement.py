@@ -221,11 +221,12 @@ def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -
 
 @shared
 def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> None:
-    """Move the first ``count`` slots until each has ended.
+    """Move the arms in the first ``count`` slots, loaded by :func:`start`, until each movement
+    has ended; afterwards the slots are free.
 
-    Each run's ``q``, from which it started to its ``target``, becomes the configuration in
-    which it stopped; ``hit`` and ``ticks`` of its record are set. ``robot`` is a record of
-    :func:`robot_parameters`.
+    In the record of each run ``q`` becomes the configuration in which the run stopped, ``hit``
+    and ``ticks`` are set, and ``evaluations`` grows by the evaluations made. ``robot`` is a
+    record of :func:`robot_parameters`.
     """
     at, evaluations, step = batch.at[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance

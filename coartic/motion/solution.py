@@ -469,8 +469,9 @@ def _check_point(task: Task, point: Any) -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Put locked base coordinates of points, ``(..., dof)``, back in place if they move by at most
-    :data:`HELD`, and return the points. Raises ValueError where one moves by more."""
+    """Set locked base coordinates of points, ``(..., dof)``, to those of the start, in the
+    array itself, and return the array. Raises ValueError where one differs by more than
+    :data:`HELD`; NaN stays."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
         moved = np.abs(points[..., k] - task.q0[k])

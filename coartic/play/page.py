@@ -79,7 +79,7 @@ def up_or_down() -> dict[str, Any]:
 
 
 def part_of_page(name: str) -> str:
-    """A file beside this one, as a part of a page."""
+    """Return the text of a file beside this one, without a first line ``"use strict";``."""
     return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
 
 

@@ -571,8 +571,9 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
 
 
 def _check_files(folder: Path) -> None:
-    """Raise CoarticError if a file of a results folder is a link, which would make SQLite change
-    another file, or no file."""
+    """Raise CoarticError if ``runs.sqlite``, or a file that SQLite keeps beside it, is a
+    symbolic link, through which SQLite would change another file, or a folder, pipe or device.
+    Missing files pass."""
     for ending in ("", "-journal", "-wal", "-shm"):
         path = folder / f"{RUNS_FILE}{ending}"
         if path.is_symlink():
