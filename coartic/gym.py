@@ -221,22 +221,21 @@ class TaskVectorEnv(Recorded, VectorEnv):
         state.q[rows] = self._starts[state.task[rows]]
         observe(*self.state)
 
-    def _move(self, actions: ArrayLike, rows: RowIndex = slice(None)) -> None:
+    def _move(self, actions: Array, rows: RowIndex = slice(None)) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
         of these rows.
 
         Raises ValueError for actions of another shape, or that are not finite.
         """
-        chosen, shape = real_array("actions", actions), self.state.actions[rows].shape
-        if chosen.shape != shape:
-            raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
-        if not np.isfinite(chosen).all():
-            row = int(np.argmin(np.isfinite(chosen).all(axis=1)))
-            which = f" of robot {np.arange(self.num_envs)[rows][row]}" if self.num_envs > 1 else ""
+        shape = self.state.actions[rows].shape
+        if actions.shape != shape:
+            raise ValueError(f"actions have shape {actions.shape}; it must be {shape}")
+        self.state.actions[rows] = actions
+        begun = step_robots(*self.state)
+        if begun < 0:
+            which = f" of robot {-1 - begun}" if self.num_envs > 1 else ""
             raise ValueError(f"the action{which} is not finite; it must be numbers")
-        self.state.actions[rows] = chosen
-        count_trials(int(np.count_nonzero(self.state.going & (self.state.goal == 0))))
-        step_robots(*self.state)
+        count_trials(begun)
 
     def infos(self) -> dict[str, Any]:
         """Return ``task``, the name of each robot's task, and ``is_success``, whether it has hit
@@ -283,7 +282,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         state = self.state
         if not state.going.all():
             raise ResetNeeded("no trial goes on: reset first")
-        self._move(actions)
+        self._move(real_array("actions", actions))
         final, ended = {}, ~state.going
         if ended.any():
             last = np.full(self.num_envs, None, dtype=object)
@@ -539,7 +538,7 @@ def _rollout(
     robots, totals = TaskVectorEnv(len(rows), **options), np.zeros(len(rows))
     robots._begin(rows, rows // trials)
     while len(rows):
-        robots._move(act(robots.state.seen[rows]), rows)
+        robots._move(real_array("actions", act(robots.state.seen[rows])), rows)
         totals[rows] += robots.state.rewards[rows]
         rows = np.flatnonzero(robots.state.going)
     return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)

@@ -202,11 +202,20 @@ def observe(*fields: Any) -> None:
 
 
 @entry
-def step_robots(*fields: Any) -> None:
+def step_robots(*fields: Any) -> int:
     """Let all robots whose trial goes on reach for their next goal; change the arrays ``fields``,
-    the entries of a :class:`VectorState`, in place."""
+    the entries of a :class:`VectorState`, in place.
+
+    Returns the number of trials that begin; -1 - n, without a movement, if the action of robot n is
+    not finite.
+    """
     state = VectorState(*fields)
-    last = len(state.task) - 1
+    last, begun = len(state.task) - 1, 0
+    for n in range(last + 1):
+        begun += state.going[n] and state.goal[n] == 0
+        for k in range(state.actions.shape[1]):
+            if not math.isfinite(state.actions[n, k]):
+                return -1 - n
     for kind in range(len(state.parameters)):  # robots of a kind are moved together
         count = 0
         for n in range(last + 1):
@@ -217,3 +226,4 @@ def step_robots(*fields: Any) -> None:
                 _step_lot(count, state.parameters[kind], state)
                 count = 0
     observe(*state)
+    return begun
