@@ -44,7 +44,7 @@ docs: $(VENV)/.docs
 	$(BIN)/python docs/check_links.py build/docs
 	@echo "Look at build/docs/index.html."
 
-# make speed LONG=1 adds suite comparison and 50,000 runs.
+# make speed LONG=1 adds suite comparison.
 speed: $(READY)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py $(if $(LONG),--long)
 

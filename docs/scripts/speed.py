@@ -3,8 +3,7 @@
     python docs/scripts/speed.py [--long]
 
 writes the ways into the page ``docs/how-fast.md``. Times depend on the machine; compare ratios, and
-times of one call. ``--long`` also runs suite ``comparison`` and 50,000 runs of a suite, which takes
-minutes.
+times of one call. ``--long`` also runs suite ``comparison``, which takes minutes.
 """
 
 from __future__ import annotations
@@ -175,17 +174,6 @@ def _us_a_trial(task: Task, condition: str, runs: int) -> float:
     return (time.thread_time() - clock) / runs / TRIALS * 1e6
 
 
-TINY = """
-title = "Tiny runs"
-description = "Many runs of two trials each."
-runs = 50_000
-trials = 2
-[[blocks]]
-tasks = ["ascending"]
-methods = ["dual-process/EC1"]
-"""
-
-
 class Spent(NamedTuple):
     """Time and memory of a command."""
 
@@ -203,14 +191,11 @@ def show_commands(*, is_long: bool) -> None:
         f"{'wall s':>9}{'MB':>7} of its own"
     )
     with tempfile.TemporaryDirectory() as folder:
-        results, tiny = f"{folder}/quick", f"{folder}/tiny.toml"
-        Path(tiny).write_text(TINY, encoding="utf-8")
-        compared = f"{folder}/comparison"
+        results, compared = f"{folder}/quick", f"{folder}/comparison"
         long = [
             ("run comparison", ["run", "comparison", "--out", compared], 1),
             ("report of comparison", ["report", compared], 3),
             ("verify of comparison", ["verify", compared], 3),
-            ("run, 50,000 runs", ["run", tiny, "--out", f"{folder}/tiny"], 1),
         ]
         for name, command, repeats in [
             ("first check, compiling", ["check", "EC4"], 1),
