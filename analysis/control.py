@@ -63,7 +63,7 @@ def with_control(
     ... # doctest: +SKIP
     """
     of_method = study.signature_by_hands(signature, task, label)
-    total = len(solved(study.cells[task, label]))
+    total = len(study.executed(task, label).runs)
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
         if len(values) >= LEAST_SHARE * total:

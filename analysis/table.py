@@ -31,7 +31,8 @@ class Column(NamedTuple):
     """Name in the CSV file; the beginning of names if ``ending`` is ``*``."""
     ending: str = ""
     """``[]``: the column has an interval (``gap_low``, ``gap_high``); ``±``: the column has a
-    standard deviation (``ours_sd``); ``*``: all columns that begin with the name."""
+    standard deviation (``ours_sd``); ``*``: all columns that begin with the name; ``[*]``: these,
+    each with an interval."""
     header: str = ""
     """Heading; ``{}`` is the rest of a name after its beginning, such as a task. Shares are in per
     cent if the heading has ``(%)``. Empty: only the CSV file has the column."""
@@ -47,7 +48,7 @@ def _column_of(text: str) -> Column:
     """
     name, dot, digits = text.rpartition(" .")
     name, _, header = (name if dot else text).partition(": ")
-    ending = next((each for each in ("[]", "±", "*") if name.endswith(each)), "")
+    ending = next((each for each in ("[]", "±", "[*]", "*") if name.endswith(each)), "")
     name = name.removesuffix(ending)
     header = "" if header == "-" else header or name.replace("_", " ")
     return Column(name, ending, header, digits if dot else "")
@@ -78,7 +79,8 @@ class Table:
     def column(self, name: str) -> Column:
         """Return the column to which a name in the CSV file belongs. Raises KeyError for others."""
         for column in self.columns:
-            if name == column.name or (column.ending == "*" and name.startswith(column.name)):
+            begins = column.ending in ("*", "[*]") and name.startswith(column.name)
+            if name == column.name or begins:
                 return column
         raise KeyError(name)
 
@@ -121,7 +123,7 @@ def _rows_of(study: Study, table: Table) -> pd.DataFrame:
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
     names: list[str] = []
     for name, ending, *_ in table.columns:
-        if ending == "*":
+        if ending in ("*", "[*]"):
             names += [each for each in rows.columns if each.startswith(name)]
         else:
             names += [name + each for each in endings[ending]]
@@ -151,7 +153,8 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
 def is_setting(frame: pd.DataFrame) -> pd.Series:
     """Return for each row of a :class:`Table`'s frame True if it is of a setting or ablation of a
     method that has a row, too."""
-    label = frame.method if "method" in frame else frame.index.to_series()
+    named = next((name for name in ("own", "method") if name in frame), "")
+    label = frame[named] if named else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
 
 

@@ -168,8 +168,7 @@ def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Fl
 
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     """Return the configuration where a movement from ``q`` stops, its ticks, and whether the hand
-    hits its goal there. ``task`` is from :func:`stored_task`. A movement that would take more ticks
-    than are stored is cut: it takes one more than stored, and where it stops means nothing."""
+    hits its goal there. A movement that takes more ticks than are stored is cut one tick later."""
     _, goal, hand, kind, most, corners = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
     points = path(q, corners, model, most) if on_path else line(q, corners[-1], model, most)

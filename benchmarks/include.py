@@ -102,6 +102,9 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         {name: part[0] for name, part in plans.items()} | {"this command": plan[0]}, parts
     )
     methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
+    for job in plan:  # failures are performed again where the code is here
+        if methods[job.cell.method.name].code == job.cell.method.code:
+            methods[job.cell.method.name] = job.cell.method
     jobs: dict[str, Job] = {}
     for job in itertools.chain(plan, *plans.values()):
         digest = job.cell.digest

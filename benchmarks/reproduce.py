@@ -106,12 +106,12 @@ def perform_some_again(
     each run with its differences to the stored run (:func:`compare_runs`). Runs count whose methods
     still have the code of the run. Raises CoarticError if there is no such run."""
     with open_store(folder) as store:
+        plan = store.plan()
         ids = [
-            job.run_id(number)
-            for job in store.plan()
-            if job.cell.method.name in registered
-            and registered[job.cell.method.name].code == job.cell.method.code
-            for number in job.numbers
+            plan[position].run_id(number)
+            for position, number, *_ in store.present()
+            if (method := plan[position].cell.method).name in registered
+            and registered[method.name].code == method.code
         ]
         if not ids:
             raise CoarticError(f"{folder} has no run of a method whose code is the same here")

@@ -557,7 +557,8 @@ def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
     for name, earned in {**rewards, "best known": best}.items():
         gap = ((best - earned) / np.abs(best))[known]
         values = gap.ravel() if len(best) == 1 else gap.mean(axis=1)
-        usable = len(values) > 0 and np.isfinite(values).all()
+        failed = name != "best known" and not np.isfinite(earned).all()
+        usable = len(values) > 0 and np.isfinite(values).all() and not failed
         rows[name] = {
             "reward": earned.mean(axis=1).mean(),
             **(mean(values) if usable else Estimate(np.nan)).columns("gap"),

@@ -46,9 +46,10 @@ SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
 
 @pytest.mark.usefixtures("in_this_process")
 def test_run_resumes(coartic, tmp_path):
-    out = tmp_path / "results"
+    out = tmp_path / "my results"
     code, text, error = coartic(*SMALL, "--out", out)
     assert code == 0
+    assert f"coartic report '{out}'" in " ".join(text.split())
     assert text.startswith("2 runs in ")
     assert len(text.splitlines()) <= 12
     assert max(map(len, text.splitlines())) <= max(80, len(str(out)) + 40)
@@ -148,6 +149,10 @@ def test_reproduce(coartic, tmp_path):
     assert "earlier" in coartic("reproduce", "0123456789", "--in", tmp_path)[2]
     assert text.splitlines()[-1] == "Performed again: identical."
     assert "1 run performed again: none with another" in coartic("verify", out, "--again", 1)[1]
+    part = tmp_path / "part"  # of an array, and of all methods those for one arm
+    own = ("--methods", "dual-process/*", "--runs", "2..3")
+    assert coartic(*SMALL, *own, "--out", part)[0] == 0
+    assert "2 runs performed again: none with another" in coartic("verify", part, "--again", 2)[1]
     edit(out, "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?", second)
     code, text, _ = coartic("verify", out, "--again", 2)
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
@@ -413,6 +418,10 @@ def test_draw(coartic, tmp_path, monkeypatch):
         many = (f"long/v1/i001..i00{count}", "--out", tmp_path / f"{count}.svg")
         assert coartic("draw", *many)[1].endswith(f": {words}\n")
     assert (tmp_path / "2.svg").read_bytes() == (tmp_path / "3.svg").read_bytes()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 2.1]"), "utf-8")
+    files = [tmp_path / "mine.toml", tmp_path / "other" / "mine.toml"]
+    assert "two tasks are called 'mine'" in coartic("draw", *files, "--out", tmp_path / "two")[2]
     drawing = tmp_path / "own.svg"
     assert coartic("draw", tmp_path / "mine.toml", "--out", drawing)[0] == 0
     before = drawing.read_bytes()

@@ -334,6 +334,21 @@ def test_results_are_packed_again_where_they_have_not_changed(
 
 
 @pytest.mark.usefixtures("in_this_process")
+def test_crashed_runs_of_a_source_are_performed_again(tmp_path, coartic):
+    flag, mine = tmp_path / "flag", tmp_path / "mine.py"
+    crash = f"assert not __import__('os').path.exists({str(flag)!r})"
+    text = Path(template.__file__).read_text("utf-8")
+    mine.write_text(text.replace("while True:", f"{crash}\n        while True:"), "utf-8")
+    command = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
+    own = (*command, "--methods", "NAME", "--method-file", mine)
+    flag.touch()
+    assert coartic(*own, "--out", tmp_path / "first")[0] == 1
+    flag.unlink()
+    assert coartic(*own, "--include", tmp_path / "first", "--out", tmp_path / "second")[0] == 0
+    assert load(tmp_path / "second").runs.status.tolist() == ["ok"] * 2
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_command(packed, parts, tmp_path, coartic):
     """A method is written by a command, run beside the shipped results, and there when that is
     repeated; a colleague includes the folder with another one, without the method's file."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import html
 import math
+import re
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from typing import Any
@@ -59,7 +60,7 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
     A task goes by its title, with † where it is reconstructed.
     """
     headers, titles = {}, frame.attrs.get("titles", {})
-    names = [n for n in frame.columns if not n.endswith(("_low", "_high", "_sd"))]
+    names = [name for name in frame.columns if not _is_end(table, frame, name)]
     for name in names:
         column = table.column(name)
         if not column.header:
@@ -68,12 +69,21 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
         header = column.header.replace("{}", titles.get(what, what))
         if header == "gap (%)" and not frame.attrs.get("best_known", True):
             header = "gap to the best of this folder (%)"
-        if f"{name}_sd" in frame:
+        ends = [end for end in ("_low", "_sd") if _is_end(table, frame, f"{name}{end}")]
+        if "_sd" in ends and f"{name}_sd" in frame:
             header += " ± SD"
-        has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
+        has_interval = (
+            f"{name}_low" in frame and "_low" in ends and frame[f"{name}_low"].notna().any()
+        )
         interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
         headers[name] = f"{header}{interval}"
     return headers
+
+
+def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
+    """Return whether a column is the end of an interval, or the SD, of another column."""
+    start = re.sub("_(low|high|sd)$", "", name)
+    return start != name and start in frame and table.column(start).ending in ("[]", "±", "[*]")
 
 
 def _is_number(values: pd.Series) -> bool:
@@ -89,7 +99,10 @@ def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
         return [NONE if pd.isna(each) else shown[each] or NONE for each in frame[name]]
     _, _, header, digits = table.column(name)
     decimals, is_p = int(digits) if digits.isdigit() else None, digits == "p"
-    columns = [f"{name}{ending}" for ending in ("", "_low", "_high", "_sd")]
+    columns = [name] + [
+        f"{name}{end}" if _is_end(table, frame, f"{name}{end}") else ""
+        for end in ("_low", "_high", "_sd")
+    ]
     values = frame.reindex(columns=columns).apply(pd.to_numeric).to_numpy(float, na_value=math.nan)
     texts = []
     for value, low, high, sd in ((100.0 if "(%)" in header else 1.0) * values).tolist():

@@ -70,7 +70,7 @@ SECTIONS = (
         (ranking.list_ranking,),
         (ranking.draw_ranking,),
         sentence="""\
-{% set complete = rows[rows.tasks == rows.tasks.max()] %}
+{% set complete = rows[rows.missing == 0].dropna(subset=["gap"]) %}
 {% for use in uses %}
 {% for row in leading(complete[complete.information == use]) %}
 {% if loop.first %}

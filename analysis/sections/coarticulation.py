@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -18,7 +17,7 @@ from matplotlib.patheffects import withStroke
 from coartic.analysis.control import contexts_of_control, selects, with_control
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.method_frame import headline_methods
+from coartic.analysis.method_frame import headline_methods, with_joined_learners
 from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
@@ -144,7 +143,9 @@ def list_signatures(study: Study) -> Rows:
         gains = good.reward.to_numpy(float) - study.corrective_best[name]
         for hands, row in rows.items():
             gained = gains[good.hands == hands] if hands else gains
-            row |= mean(gained).columns("gain") | {"hands": hands}
+            row |= {"hands": hands}
+            if math.isfinite(study.corrective_best[name]):
+                row |= mean(gained).columns("gain")
             row |= mean(gained / possible).columns("share") if possible > 0 else {}
             key = " ".join(filter(None, (name, label, hands)))
             yield key, row_of_cell(study, study.cells[name, label]) | row
@@ -170,11 +171,14 @@ def _against_gain(study: Study) -> pd.DataFrame:
     signatures = {name: study.signature(name) for name in AGAINST_GAIN}
     runs = solved(study.runs.assign(gain=gain, **signatures))
     columns, tasks, rows = ["gain", *AGAINST_GAIN], common_tasks(study), []
-    for method, parts in study.methods.parts[~study.methods.is_search].items():
-        of_method = runs[runs.label.isin(parts)]
+    by_method = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
+    for method in study.methods.index[~study.methods.is_search]:
+        of_method = by_method.get(method, runs[:0])
         of_tasks = of_method.groupby("task")[columns].mean().reindex([*tasks])
-        if of_tasks.gain.notna().all():
-            row: Row = {"method": method, "base": re.sub(r"(, )?trials=\w+", "", str(method))}
+        if len(of_method) and tasks and of_tasks.gain.notna().all():
+            name, _, setting = method.partition(" ")
+            others = [part for part in setting.split(", ") if not part.startswith("trials=")]
+            row: Row = {"method": method, "base": f"{name} {', '.join(others)}".strip()}
             row |= {"trials": of_method.trials.max(), "tasks": len(tasks)}
             rows.append(row | of_tasks.mean().to_dict())
     return pd.DataFrame(rows, columns=["method", "base", "trials", "tasks", *columns])
@@ -189,9 +193,9 @@ def _against_gain(study: Study) -> pd.DataFrame:
 def draw_coarticulation(study: Study) -> Parts | None:
     """Draw signatures against gain, a point for each method."""
     data = _against_gain(study)
-    if len(data) < 2:
-        return None
     shown = [name for name in AGAINST_GAIN if data[name].notna().any()]
+    if len(data) < 2 or not shown:
+        return None
     drawing, panels = style.panels((1, len(shown)), (style.TWO, 2.8))
     lasts = data.sort_values("trials").drop_duplicates("base", keep="last").sort_index()
     looks: Any = looks_in(study, lasts.method)

@@ -288,7 +288,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     at, grey = panels[0].get_yaxis_transform(), style.GREY
     panels[0].text(0.01, 51, "half of the targets", color=grey, va="bottom", transform=at)
     style.letters(panels)
-    ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
+    ends = data.groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share).sort_values("share")
     height = -math.inf
     for end in ends.to_dict("records"):

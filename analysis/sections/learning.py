@@ -126,6 +126,8 @@ def learning_curves(study: Study) -> pd.DataFrame:
         # Until every run has a solution (NaN before) there is no mean of them.
         steps = [learned[run_id] for run_id in map(str, runs.run_id)]
         best = np.array([np.append(np.nan, b)[np.searchsorted(t, at, "right")] for t, b in steps])
+        if np.isnan(best).any(axis=0).all():
+            continue
         low, high = np.quantile(best, [0.25, 0.75], axis=0)
         curve = {"trial": at, "best": best.mean(axis=0), "best_low": low, "best_high": high}
         named = {"task": task, "method": label, "runs": len(runs)}

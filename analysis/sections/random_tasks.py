@@ -37,7 +37,7 @@ def _by_family(runs: pd.DataFrame) -> Scores:
 
 @table(
     "Gap to the best known reward, in per cent of it: mean over instances",
-    "method; instances; gap[]: gap (%) .1; in *: {} (%) .1",
+    "method; instances; gap[]: gap (%) .1; in [*]: {} (%) .1",
 )
 def list_family_gaps(study: Study) -> Rows:
     """List gaps to the best known reward over families with two arms, and in each family, with

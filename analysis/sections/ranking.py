@@ -22,6 +22,7 @@ from coartic.analysis.standings import (
     compared,
     reference,
     shown_name,
+    solved_tasks,
 )
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, one_by_one, solved
@@ -113,8 +114,9 @@ def list_ranking(study: Study) -> Rows:
         row: Row = {"method": method, "information": study.methods.information[method]}
         row |= {f"on {task}": gaps.get(task, math.nan) for task in single}
         row |= {"runs": len(of_method), "failed": len(of_method) - len(solved(of_method))}
-        row |= {"missing": sum(task not in gaps for task in common_tasks(study))}
         row |= over.get(method, {})
+        on = {*solved_tasks(study, method)}
+        row |= {"missing": sum(task not in on for task in common_tasks(study))}
         pairs = {f"{task} {label}" for task, label in of_method[["task", "label"]].to_numpy()}
         tests = tested[tested.index.isin(pairs)]
         # With Holm's correction over its tasks: could any of its tests have distinguished them?
@@ -158,7 +160,7 @@ def ranked(study: Study) -> list[str]:
 def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of every method, a mean over tasks, with its name."""
     rows, tasks = board(study), common_tasks(study)
-    rows = rows[rows.under == ""].reset_index(names="method")
+    rows = rows[~rows.under.isin(rows.index)].reset_index(names="method")
     if not len(rows):
         return None
     shown = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})

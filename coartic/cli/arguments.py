@@ -119,8 +119,9 @@ def method_names(registered: Registry) -> Mapping[str, str]:
     return named | dict.fromkeys(EVERY_CONDITION, "")
 
 
-def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
-    """Return the ids of methods from names and wildcards that users write.
+def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = True) -> list[str]:
+    """Return the ids of methods from names and wildcards that users write; wildcards themselves
+    without ``expand``.
 
     Raises CoarticError for an unknown name.
     """
@@ -130,7 +131,8 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
     ids, meant = method_names(registered) if names else {}, list[str]()
     for name in names:
         try:
-            meant += methods_named(_id_named(name, ids), registered)
+            found = methods_named(_id_named(name, ids), registered)
+            meant += found if expand or len(found) == 1 else [name]
         except CoarticError:
             check_kind(name)  # a thing of another kind has its own sentence
             if os.path.isfile(file := file_name(name)):

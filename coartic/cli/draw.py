@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -38,6 +39,8 @@ def draw(
     meant = given.tasks_meant(tasks or builtin_tasks())
     names = [name for text in meant for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
+    if twice := [name for name, count in Counter(t.name for t in chosen).items() if count > 1]:
+        raise CoarticError(f"two tasks are called {twice[0]!r}: give one of them another name")
     from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
     from coartic.analysis.sections.tasks import picture_of_tasks
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -92,7 +93,7 @@ def run(
     if suite is None:
         raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
     chosen, registered = load_suite(suite), registry(method_file or ())
-    names = given.methods_meant(given.names_in(methods), registered)
+    names = given.methods_meant(given.names_in(methods), registered, expand=False)
     if include and not names:  # the user's own methods alone
         names = [name for name, info in registered.items() if info.where.endswith(".py")]
     request = request_for(
@@ -121,10 +122,11 @@ def run(
         progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
     if isinstance(runs, range):
-        part = f"{out} has a part of the runs: --include {out}, with all other parts, joins them"
+        named = quote(str(out))
+        part = f"{out} has a part of the runs: --include {named}, with all other parts, joins them"
         say_pairs([("Next", part)])
     else:
-        say_ranking(load(out), ("Next", f"coartic report {out}"))
+        say_ranking(load(out), ("Next", f"coartic report {quote(str(out))}"))
     if progress.crashed:
         sys.exit(1)
 
@@ -357,13 +359,14 @@ def new(
     add_methods(registry(with_code=False), [method_info(mine, "coartic new", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
+    file = quote(str(path))
     say_pairs(
         [
             ("Written", f"{path}: change it as you like"),
-            ("Check", f"coartic check {name} --method-file {path}"),
+            ("Check", f"coartic check {name} --method-file {file}"),
             (
                 "Run",
-                f"coartic run comparison --method-file {path} --include shipped --out results/mine",
+                f"coartic run comparison --method-file {file} --include shipped --out results/mine",
             ),
         ]
     )

@@ -1,0 +1,165 @@
+"""Results that users can have: methods that fail, settings without their method, odd names."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import load_task
+from coartic.analysis.control import with_control
+from coartic.analysis.optima import BestKnown
+from coartic.analysis.report import about
+from coartic.analysis.report.render import columns_of, texts_of
+from coartic.analysis.sections import FIGURES, SECTIONS, TABLES
+from coartic.analysis.table import is_setting
+from tests.support.made_up import runs_of, study_of, study_of_trials
+
+ONE, TWO, THREE = "ascending", "two-armed-1", "two-armed-2"
+BEST = {ONE: -292, TWO: -465, THREE: -306, "descending": -292}
+SECTION = {section.id: section for section in SECTIONS}
+
+
+def behind(task, method, *ticks, **more):
+    """Runs whose rewards are so many ticks behind the best known one; None: without a solution."""
+    rewards = [None if each is None else BEST[task] - each for each in ticks]
+    return runs_of(task, method, rewards, **more)
+
+
+def planted(rows, **more):
+    """The study of these runs, whose tasks have proven optima."""
+    tasks = dict.fromkeys(row["task"] for row in rows)
+    return study_of(
+        rows, optima={task: BestKnown(BEST[task], BEST[task]) for task in tasks}, **more
+    )
+
+
+def without_signatures(study):
+    """The study with signatures of 0, so that no movements are needed."""
+    object.__setattr__(study, "signature", lambda name, **_: pd.Series(0.0, study.runs.index))
+    return study
+
+
+def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
+    rows = [
+        row
+        for task in (TWO, THREE)
+        for row in (
+            *behind(task, "mine", 10, 11, 12),
+            *behind(task, "mine", 20, 21, 22, setting="sigma=0.1"),
+            *behind(task, "hill-climbing", 15, 14, 13),
+            *behind(task, "dual-process/EC4", 30, 31, 32),
+        )
+    ]
+    table = TABLES["own"](planted(rows))
+    assert (is_setting(table) == (table.own == "mine sigma=0.1")).all()
+    assert is_setting(table).sum() == 3
+
+
+def test_a_setting_without_its_method_is_drawn():
+    rows = [
+        row
+        for task in (TWO, THREE)
+        for row in (
+            *behind(task, "cma-es/bandit", 10, 11, None),
+            *behind(task, "cma-es/bandit", 20, 21, 22, setting="sigma=0.1"),
+            *behind(task, "hill-climbing", 15, 14, 13),
+        )
+    ]
+    drawn = FIGURES["ranking"](planted(rows)).data.method
+    assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
+
+
+def test_the_sentence_of_the_ranking_is_of_methods_on_the_common_tasks():
+    """An own method that solved more tasks, but others, is not among them."""
+    rows = [
+        row for task in (ONE, TWO) for method in ("random-search", "hill-climbing", "cma-es/bandit")
+        for row in behind(task, method, 15, 14, 13)
+    ]  # fmt: skip
+    rows += [row for task in (ONE, THREE, "descending") for row in behind(task, "mine", 15, 14, 13)]
+    study = planted(rows)
+    (said,) = [line for line in about.finding(study, SECTION["ranking"]) if "trial" in line]
+    assert "hill climbing" in said
+    assert "mine" not in said
+
+
+def test_missing_tasks_are_those_without_a_solution_of_every_run():
+    rows = [
+        row
+        for task in (ONE, TWO, THREE)
+        for row in (
+            *(row for method in ("mine", "hill-climbing")
+              for row in behind(task, method, 10, 11, 12 if task == ONE else None)),
+            *behind(task, "random-search", 15, 14, 13),
+        )
+    ]  # fmt: skip
+    missing = TABLES["ranking"](planted(rows)).missing
+    assert missing.to_dict() == {"mine": 2, "hill-climbing": 2, "random-search": 0}
+
+
+def test_names_of_tasks_may_end_as_columns_of_intervals_do():
+    base, names = load_task(TWO), ("reach", "reach_low", "reach_high", "reach_sd")
+    tasks = [base.model_copy(update={"name": name, "title": name}) for name in names]
+    rows = []
+    for place, name in enumerate(names):
+        rows += runs_of(name, "mine", [-470 - 10 * place] * 3)
+        rows += runs_of(name, "hill-climbing", [-480] * 3)
+    study = study_of(rows, tasks, optima={name: BestKnown(-465, -465) for name in names})
+    table = TABLES["ranking"]
+    frame = table(study)
+    assert {f"on {name}" for name in names} <= columns_of(table, frame).keys()
+    assert texts_of(table, frame, "on reach") == ["1.1", "3.2"]
+
+
+def test_a_learner_over_all_tasks_has_the_gain_of_its_own_conditions():
+    """EC1 ran on a task with two arms as well, on which EC4 stands for the learner."""
+    rows = [*behind(ONE, "dual-process/EC1", 8, 8), *behind(TWO, "dual-process/EC1", 35, 35)]
+    rows += [*behind(TWO, "dual-process/EC4", 5, 5), *behind(ONE, "hill-climbing", 8, 8)]
+    rows += behind(TWO, "hill-climbing", 5, 5)
+    study = without_signatures(planted(rows))
+    gain = FIGURES["coarticulation"](study).data.set_index("method").gain
+    assert gain["dual-process (EC1, EC4)"] == gain["hill-climbing"]
+
+
+def test_numbers_of_trials_are_joined_with_the_default_number():
+    rows = [
+        row for setting in ("", "trials=100", "trials=1000", "sigma=0.1, trials=100")
+        for row in behind(TWO, "hill-climbing", 5, 6, setting=setting)
+    ]  # fmt: skip
+    data = FIGURES["coarticulation"](without_signatures(planted(rows))).data
+    assert data.base.tolist() == ["hill-climbing"] * 3 + ["hill-climbing sigma=0.1"]
+
+
+def test_without_a_best_known_reward_nothing_is_drawn_against_gain():
+    rows = behind(TWO, "mine", None, None) + behind(TWO, "hill-climbing", None, None)
+    assert FIGURES["coarticulation"](without_signatures(study_of(rows))) is None
+
+
+def test_without_a_reward_of_the_corrective_process_there_is_no_gain(monkeypatch):
+    rows = behind(TWO, "hill-climbing", 5, 15, 25) + behind(TWO, "random-search", 5, 15, 25)
+    study = planted(rows, corrective_best={TWO: np.nan})
+    where = "coartic.analysis.sections.coarticulation.with_control"
+    monkeypatch.setattr(where, lambda *_: {"": (np.ones(3), np.ones(3))})
+    assert TABLES["signatures"](study).gain.isna().all()
+
+
+def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
+    hands = ["RRRR", "LRLR", "LRLR", "LRLR"] * 500
+    study = study_of(runs_of(TWO, "hill-climbing", [-470] * 2000, hands=hands))
+    some = {"LRLR": np.ones(375), "RRRR": np.ones(125)}
+    object.__setattr__(study, "signature_by_hands", lambda *_: some)
+    object.__setattr__(study, "executed", lambda *_: type("", (), {"runs": [0] * 500}))
+    assert [*with_control(study, "first", TWO, "hill-climbing")] == ["LRLR", "RRRR"]
+
+
+def test_a_method_without_evaluations_has_its_name_in_the_figure_of_costs():
+    rewards = {(TWO, "mine"): [[-520, -480, -470]] * 3, (TWO, "hill-climbing"): [[-520, -490]] * 3}
+    study = study_of_trials(rewards, [], forward_kinematics=5)
+    study.runs.loc[study.runs.method == "mine", "forward_kinematics"] = 0
+    plot = FIGURES["runtimes"](study)
+    texts = [text.get_text() for axes in plot.figure.axes for text in axes.texts]
+    assert {"mine", "hill climbing"} <= {*texts}
+
+
+@pytest.mark.parametrize("first", [[np.nan] * 8 + [-480.0, -470.0]])
+def test_runs_that_all_have_a_solution_at_no_number_of_trials_have_no_curve(first):
+    study = study_of_trials({(TWO, "mine"): [first, [-480.0] * 5]}, [], forward_kinematics=5)
+    assert FIGURES["learning-curves"](study) is None
