@@ -54,15 +54,21 @@ def files_of(method: Path) -> set[Path]:
 
 
 def _imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[Path]:
-    """Yield the files that a module imports; a pair of ``places`` is a root of imports and the
-    folder in which files count."""
+    """Yield the files that a module imports, and those of the packages around them, but for the
+    packages of coartic; a pair of ``places`` is a root of imports and the folder in which files
+    count."""
     for level, module, names in syntax(path.read_bytes())[1]:
         for root, within in places:
             base = os.path.join(path.parents[level - 1] if level else root, *module.split("."))
             for name in names:
                 place = os.path.join(base, *name.split(".")).rstrip(os.sep)
                 found = filter(os.path.isfile, (f"{place}.py", f"{place}/__init__.py"))
-                yield from (f for f in map(Path, found) if within in f.parents and f != _API)
+                for file in map(Path, found):
+                    if within in file.parents and file != _API:
+                        yield file
+                        if root != PACKAGE.parent:
+                            around = [p / "__init__.py" for p in file.parents if root in p.parents]
+                            yield from filter(Path.is_file, around)
 
 
 @cache

@@ -92,7 +92,14 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
                 except BaseException as error:
                     why = f"{shown}: cannot be imported: {error_line(error)}"
                     raise CoarticError(why) from None
-                methods = {method.name: method for method in methods_in(module)}
+                found = dict.fromkeys(methods_in(module))
+                methods = {method.name: method for method in found}
+                if len(methods) < len(found):
+                    names = [method.name for method in found]
+                    twice = next(name for name in names if names.count(name) > 1)
+                    raise CoarticError(
+                        f"{shown}: two classes are called {twice!r}: give one another name"
+                    )
                 infos = _methods_of_module(module, methods.values(), shown, path)
                 content = [asdict(info) for info in infos]
             else:

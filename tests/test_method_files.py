@@ -44,6 +44,7 @@ FILES = {
     "mine.py": f"from mine_helper import STEP\nimport mine_parts.more\n{TEXT}    files = ('w',)",
     "mine_helper.py": "'Numbers.'\n__version__ = '1'\nSTEP = 1  # at least",
     "mine_parts/more.py": "def more(x):\n    return x + 1",
+    "mine_parts/__init__.py": "RATE = 1",
     "w": "weights",
 }
 
@@ -66,11 +67,12 @@ def test_what_counts_as_the_code_of_a_method(tmp_path, monkeypatch):
     changes = (
         {"mine_helper.py": "STEP = 2"},
         {"mine_parts/more.py": "def more(x):\n    return x + 2"},
+        {"mine_parts/__init__.py": "RATE = 2"},
         {"w": "other weights"},
         {"mine.py": FILES["mine.py"].replace("ge=0", "ge=1")},
     )
     codes = [code_of(tmp_path, **change) for change in changes]
-    assert len({first, *codes}) == 5
+    assert len({first, *codes}) == 6
     assert code_of(tmp_path) == first
 
 
@@ -88,6 +90,8 @@ AT_IMPORT = {
     "os._exit(0)": "cannot be imported: its process ended with exit code 0",
     "os.kill(os.getpid(), 9)": "is not read: SIGKILL ended the process that reads it",
     "def f(): f()\nf()": "cannot be imported: RecursionError",
+    "METHODS = ['nearest-hand']": "",
+    f"{TEXT}\nclass Twice(NearestHand): pass": "two classes are called 'nearest-hand'",
 }
 
 

@@ -157,10 +157,11 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 
     A change of ``code``, the hash of a file, makes the process import the file again.
     """
-    module = load_file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
-    for method in [*getattr(module, "METHODS", ()), *methods_in(module)]:
+    is_file = where.endswith(".py")
+    module = load_file(Path(where)) if is_file else importlib.import_module(where)
+    for method in methods_in(module) if is_file else module.METHODS:
         if method.name == name:
-            return method  # type: ignore[no-any-return]
+            return method
     raise CoarticError(f"{where} defines no method {name!r}")
 
 
