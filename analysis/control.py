@@ -24,7 +24,7 @@ import numpy as np
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.methods import RANDOM_SEARCH
 from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.study import Study, cached, solved
+from coartic.analysis.study import MOST_EXECUTED, Study, cached, solved
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
@@ -63,7 +63,7 @@ def with_control(
     ... # doctest: +SKIP
     """
     of_method = study.signature_by_hands(signature, task, label)
-    total = len(study.executed(task, label).runs)
+    total = min(len(solved(study.cells[task, label])), MOST_EXECUTED)
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
         if len(values) >= LEAST_SHARE * total:

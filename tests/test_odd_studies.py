@@ -146,7 +146,6 @@ def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
     study = study_of(runs_of(TWO, "hill-climbing", [-470] * 2000, hands=hands))
     some = {"LRLR": np.ones(375), "RRRR": np.ones(125)}
     object.__setattr__(study, "signature_by_hands", lambda *_: some)
-    object.__setattr__(study, "executed", lambda *_: type("", (), {"runs": [0] * 500}))
     assert [*with_control(study, "first", TWO, "hill-climbing")] == ["LRLR", "RRRR"]
 
 
