@@ -69,8 +69,7 @@ CPU microseconds of one core for a trial, by the function that makes it: medians
 """
 FOOT = """
 *Plain loop*: the model as a programmer would first write it, with Numba or in C
-(`docs/scripts/plain_loop.c`); *bounds* skip steps in which the hand provably misses, as this package
-does.
+(`docs/scripts/plain_loop.c`); *bounds* skip steps in which the hand provably misses, as here.
 """
 
 
