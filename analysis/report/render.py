@@ -69,21 +69,20 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
         header = column.header.replace("{}", titles.get(what, what))
         if header == "gap (%)" and not frame.attrs.get("best_known", True):
             header = "gap to the best of this folder (%)"
-        ends = [end for end in ("_low", "_sd") if _is_end(table, frame, f"{name}{end}")]
-        if "_sd" in ends and f"{name}_sd" in frame:
+        if _is_end(table, frame, f"{name}_sd"):
             header += " ± SD"
-        has_interval = (
-            f"{name}_low" in frame and "_low" in ends and frame[f"{name}_low"].notna().any()
-        )
+        low = f"{name}_low"
+        has_interval = _is_end(table, frame, low) and frame[low].notna().any()
         interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
         headers[name] = f"{header}{interval}"
     return headers
 
 
 def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
-    """Return whether a column is the end of an interval, or the SD, of another column."""
+    """Return whether a frame has a column that is the end of an interval, or the SD, of another."""
     start = re.sub("_(low|high|sd)$", "", name)
-    return start != name and start in frame and table.column(start).ending in ("[]", "±", "[*]")
+    both = start != name and {start, name} <= {*frame.columns}
+    return both and table.column(start).ending in ("[]", "±", "[*]")
 
 
 def _is_number(values: pd.Series) -> bool:

@@ -71,8 +71,8 @@ def list_family_gaps(study: Study) -> Rows:
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Draw gaps to the best known rewards of instances, by method and family."""
-    methods = study.methods[(study.methods.under == "") & (study.methods.parts.map(len) == 1)]
-    runs = on_instances(study)
+    runs, single = on_instances(study), study.methods.parts.map(len) == 1
+    methods = study.methods[~study.methods.under.isin(runs.method) & single]
     runs = runs[runs.method.isin(methods.index)]
     if not len(runs):
         return None
