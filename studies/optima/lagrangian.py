@@ -13,6 +13,7 @@ has a closed form. Joints that no link angle stands for change by no more than t
 import math
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,10 +34,6 @@ class Lagrangian(NamedTuple):
     sizes: Array
     towards: Array
 
-    def at(self, angles):
-        """Return the term of each link at its angle, shape ``(..., links)``."""
-        return self.slopes * angles + self.sizes * np.cos(angles - self.towards)
-
     def bound(self, box):
         """Return the bound on paths whose link angles are in a box, shape ``(links, 2)``, rad."""
         return self.constant + float(least(*self[1:], *box.T).sum())
@@ -49,27 +46,38 @@ class Lagrangian(NamedTuple):
         than its size. A low end above the high one says that nothing is left.
         """
         limit = least(*self[1:], *box.T) + slack
-        size = np.maximum(self.sizes, 1e-12)
         inwards = np.array([[1.0], [-1.0]])
-        ends = box.T
-        for _ in range(_PARABOLAS):
-            excess = np.maximum(self.at(ends) - limit, 0.0)
-            rise = inwards * (self.slopes - self.sizes * np.sin(ends - self.towards))
-            safe = (rise + np.sqrt(rise**2 + 2.0 * size * excess)) / size
-            ends = np.where(excess > 0.0, ends + inwards * safe, ends)
-        return ends.T
+        return moved_inwards(*self[1:], limit, inwards, box.T).T
 
 
-def least(slopes, sizes, towards, low, high):
-    """Return the least values of ``slope φ + size cos(φ - towards)`` from low to high, exactly.
+@numba.vectorize
+def moved_inwards(slope, size, towards, limit, inwards, end):
+    """Return an end of an interval, moved in the direction ``inwards``, 1 or -1, while a parabola
+    below the term is above ``limit``."""
+    bend = max(size, 1e-12)
+    for _ in range(_PARABOLAS):
+        excess = slope * end + size * math.cos(end - towards) - limit
+        if excess > 0.0:
+            rise = inwards * (slope - size * math.sin(end - towards))
+            end += inwards * (rise + math.sqrt(rise * rise + 2.0 * bend * excess)) / bend
+    return end
+
+
+@numba.vectorize
+def least(slope, size, towards, low, high):
+    """Return the least value of ``slope φ + size cos(φ - towards)`` from low to high, exactly.
 
     The term is least at an end or in a valley. Valleys are one turn apart: the first one is the
     lowest if the slope is upwards, else the last one.
     """
-    steep = np.clip(slopes / np.maximum(sizes, 1e-300), -1.0, 1.0)
-    valley = towards + (math.pi - np.arcsin(steep))
-    first = valley + _TURN * np.ceil((low - valley) / _TURN)
-    last = valley + _TURN * np.floor((high - valley) / _TURN)
-    inside = np.clip(np.where(slopes >= 0.0, first, last), low, high)
-    ends = np.broadcast_arrays(low, inside, high)
-    return np.min(slopes * ends + sizes * np.cos(ends - towards), axis=0)
+    valley = towards + (math.pi - math.asin(min(1.0, max(-1.0, slope / max(size, 1e-300)))))
+    if slope >= 0.0:
+        valley += _TURN * math.ceil((low - valley) / _TURN)
+    else:
+        valley += _TURN * math.floor((high - valley) / _TURN)
+    valley = min(max(valley, low), high)
+    return min(
+        slope * low + size * math.cos(low - towards),
+        slope * valley + size * math.cos(valley - towards),
+        slope * high + size * math.cos(high - towards),
+    )

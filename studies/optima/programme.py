@@ -13,7 +13,7 @@ _PLANTED = 1e6  # more than any number of the programme
 # Any multipliers give a bound: those of the solver need not be exact.
 _SETTINGS = {
     "verbose": False, "max_threads": 1, "presolve_enable": False, "input_sparse_dropzeros": False,
-    "tol_gap_abs": 1e-3, "tol_gap_rel": 1e-3, "tol_feas": 1e-5,
+    "tol_feas": 1e-5,
 }  # fmt: skip
 
 
@@ -36,14 +36,14 @@ class Programme:
         self._variables = [(first.get(each.id, 0), each.shape) for each in variables]
         self._ends = np.cumsum([constraint.size for constraint in problem.constraints])[:-1]
         self._fill(values)
-        dims, settings = data["dims"], clarabel.DefaultSettings()
+        dims, self._settings = data["dims"], clarabel.DefaultSettings()
         for name, value in _SETTINGS.items():
-            setattr(settings, name, value)
+            setattr(self._settings, name, value)
         cones = [clarabel.ZeroConeT(dims.zero), clarabel.NonnegativeConeT(dims.nonneg)]
         cones += [clarabel.SecondOrderConeT(size) for size in dims.soc]
         quadratic = sparse.csc_array((len(data["c"]),) * 2)
         self._solver = clarabel.DefaultSolver(
-            quadratic, data["c"], data["A"], data["b"], cones, settings
+            quadratic, data["c"], data["A"], data["b"], cones, self._settings
         )
 
     def _fill(self, values):
@@ -51,12 +51,14 @@ class Programme:
             numbers[places] = values.ravel()[sources]
         return [numbers for numbers, _, _ in self._places]
 
-    def solve(self, values):
+    def solve(self, values, gap):
         """Return the values of the variables, and the multipliers of the constraints, two lists,
-        for values of the parameter. If there is no solution, the multipliers are far out on a ray,
-        along which the dual objective grows. If the solver fails, they may be any numbers."""
+        for values of the parameter, up to a duality gap of ``gap``, absolute or relative. If there
+        is no solution, the multipliers are far out on a ray, along which the dual objective grows.
+        If the solver fails, they may be any numbers."""
         matrix, right = self._fill(values)
-        self._solver.update(A=matrix, b=right)
+        self._settings.tol_gap_abs = self._settings.tol_gap_rel = gap
+        self._solver.update(A=matrix, b=right, settings=self._settings)
         solution = self._solver.solve()
         x, z = finite(solution.x), finite(solution.z)
         if solution.status == clarabel.SolverStatus.PrimalInfeasible:

@@ -117,11 +117,12 @@ class Relaxation:
         ]
         return cp.Problem(cp.Minimize(cp.sum(distances)), constraints), half_spaces, [q, u]
 
-    def solve(self, box):
-        """Return the relaxation's shortest path in a box, and multipliers for the box."""
+    def solve(self, box, gap=1e-3):
+        """Return the relaxation's shortest path in a box, and multipliers for the box, up to a
+        duality gap of ``gap``, length unit and share."""
         values = half_spaces(box)
         self._programme = self._programme or Programme(*self.state(), values)
-        (q, u), (held, speeds, _, pulls, forces, _) = self._programme.solve(values)
+        (q, u), (held, speeds, _, pulls, forces, _) = self._programme.solve(values, gap)
         pulls, forces = (-each.reshape(len(q), -1)[:, 1:] for each in (pulls, forces))
         pulls[self.held] += held
         angles = self._sums @ q.ravel()
