@@ -367,7 +367,9 @@ class TaskEnv(Recorded, gymnasium.Env):
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _info(self) -> dict[str, Any]:
-        return {name: values.item() for name, values in self.robots.infos().items()}
+        state, number = self.robots.state, self.robots.state.task.item()
+        is_success = state.goal.item() == state.counts.item(number)
+        return {"task": self.robots.names[number], "is_success": is_success}
 
 
 def _check_no_options(options: Mapping[str, Any] | None) -> None:

@@ -42,7 +42,6 @@ from coartic.motion.trial import (
     Trials,
     compiled_task,
     hand_codes,
-    inside,
     make_trials,
     search_initial_hands,
     too_many_sequences,
@@ -342,7 +341,7 @@ class Session:
         Raises UndeclaredError if the method does not declare the corrective process, and
         SolutionError for what is no sequence.
         """
-        if not isinstance(solution, Sequence):
+        if not isinstance(solution, (tuple, list, Sequence)):  # in the order of their speed
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
         for m in solution:
             if getattr(m, "kind", "") == "corrective" and m.target is None:
@@ -410,8 +409,7 @@ class Session:
         self.check_solution(solution)
         with self.lock:
             self._affordable(1)
-            with inside(self._of_run):
-                (execution,) = execute_many(self._compiled, [solution])
+            (execution,) = execute_many(self._compiled, [solution], outside=not self._of_run)
             if isinstance(execution, Exception):
                 raise execution
             self._count(
@@ -493,8 +491,7 @@ class Session:
     ) -> Accounts:
         """Make trials that fit the task and the budget, as :meth:`trials` does, with hands of shape
         ``(N, G)``."""
-        with inside(self._of_run):
-            accounts = make_trials(self._compiled, codes, targets[:, :, None])
+        accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]
             if better.any():
@@ -512,8 +509,9 @@ class Session:
         Raises NotApplicableError where no sequence completes the task, or there are too many.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
-        with inside(self._of_run):
-            chosen, spent = search_initial_hands(self._task, hands, model=self.model)
+        chosen, spent = search_initial_hands(
+            self._task, hands, model=self.model, outside=not self._of_run
+        )
         self._meter.add(**spent)
         return chosen
 

@@ -48,6 +48,8 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
     anything else: text, complex numbers, True and False, rows of unequal length, masked entries."""
     import numpy as np  # which the command line's help does without
 
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
     refuse_entries(name, value)
     try:
         array = np.asarray(value)

@@ -76,8 +76,10 @@ class Movement:
     to ``waypoints[-1]``, length unit (base) and rad (joints); None for the other kinds."""
 
     def __post_init__(self) -> None:
-        refuse_entries("target", self.target)
-        refuse_entries("waypoints", self.waypoints)
+        if type(self.target) is not np.ndarray:
+            refuse_entries("target", self.target)
+        if self.waypoints is not None:
+            refuse_entries("waypoints", self.waypoints)
 
     def __repr__(self) -> str:
         named = ("goal", "hand", "kind", "target", "ticks", "waypoints")
@@ -217,12 +219,12 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 
 
 def execute_many(
-    compiled: CompiledTask, solutions: Iterable[Iterable[Movement]]
+    compiled: CompiledTask, solutions: Iterable[Iterable[Movement]], *, outside: bool = True
 ) -> list[Execution | Refused]:
     """:func:`execute` solutions of one task side by side, which takes a fraction of the time.
 
     Returns for each solution, in order, its execution, or the error that :func:`execute` would
-    raise; no such error is raised.
+    raise; no such error is raised. ``outside``: see :func:`coartic.motion.trial.count_trials`.
     """
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
@@ -231,8 +233,10 @@ def execute_many(
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
             executions.append(error)
         else:
-            executions.append(_make_one_by_one(compiled, plan) if _has_path(plan) else plan)
-    straight = iter(_make_straight(compiled, [x for x in executions if isinstance(x, list)]))
+            with_path = _has_path(plan)
+            executions.append(_make_one_by_one(compiled, plan, outside) if with_path else plan)
+    plans = [each for each in executions if isinstance(each, list)]
+    straight = iter(_make_straight(compiled, plans, outside))
     return [next(straight) if isinstance(x, list) else x for x in executions]
 
 
@@ -260,7 +264,7 @@ def _with_targets(movements: list[Movement]) -> list[Movement | None]:
     return given
 
 
-def _make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
+def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool) -> list[Execution]:
     """Return the executions of plans without paths, made side by side."""
     if not plans:
         return []
@@ -274,6 +278,7 @@ def _make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execut
         np.array(hands).reshape(shape[:2]),
         np.array([stay if m is None else m.target for m in rows]).reshape(*shape, len(stay)),
         np.array([m is None or m.kind != "corrective" for m in rows]).reshape(shape),
+        outside=outside,
     ).goals
     made = movements_in(accounts, compiled.task.robot.dof, given)
     goals = accounts[..., 0]
@@ -290,7 +295,8 @@ def movements_in(
     returns them; the movements returned have their kinds.
     """
     names = ("hand", "hit", "ticks", "corrections")
-    columns = [accounts[name][..., 0].tolist() for name in names] + [accounts["moved"].tolist()]
+    first = accounts[..., 0]
+    columns = [first[name].tolist() for name in names] + [accounts["moved"].tolist()]
     targets, trials = accounts["target"][..., :dof], []
     for n, of_trial in enumerate(given):
         movements: list[Movement] = []
@@ -315,9 +321,10 @@ def movements_in(
     return trials
 
 
-def _make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
+def _make_one_by_one(compiled: CompiledTask, plan: Plan, outside: bool) -> Execution:
     """Return the execution of a plan with paths, made one movement after the other."""
-    count_trials(1)
+    if outside:
+        count_trials(1)
     task, q = compiled.task, compiled.starts[0]
     model = compiled.model.for_radius(task.radius)
     made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
@@ -405,12 +412,11 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
-        for name, kind in (("goal", (int, np.integer)), ("hand", str), ("kind", str)):
-            if not isinstance(value := getattr(movement, name), kind):
-                raise SolutionError(
-                    f"task {task.name!r}: {name} of a movement is {brief_value(value)}; it must be "
-                    f"{'a text' if kind is str else 'a whole number'}"
-                )
+        if not isinstance(movement.goal, (int, np.integer)):
+            raise SolutionError(
+                f"task {task.name!r}: goal of a movement is {brief_value(movement.goal)}; it must "
+                "be a whole number"
+            )
         if not plan or plan[-1][0].goal != movement.goal:
             plan.append([])
         of_goal = plan[-1]
@@ -431,11 +437,11 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
     """Return the movement, a path with its target. Raises SolutionError or ValueError if the
     movement lacks what its kind needs or leads to a configuration that the task does not allow."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
-    if movement.hand not in task.hands:
+    if not isinstance(movement.hand, str) or movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
         hand = brief_value(movement.hand).strip("'")
         raise SolutionError(f"the robot has no {hand} hand; it has {known}")
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise SolutionError(f"unknown kind {brief_value(kind)}; known: {KINDS}")
     if kind == "path":
         if waypoints is None or not isinstance(waypoints, Iterable) or len([*waypoints]) == 0:

@@ -20,9 +20,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
@@ -526,29 +524,17 @@ def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
 # ---- Trials outside the session of a run, of which honest methods make none ----
 
 _outside = 0
-_of_run: ContextVar[bool] = ContextVar("of_run", default=False)
 
 
 def count_trials(count: int) -> None:
-    """Add to the number of trials outside sessions (:func:`trials_outside`), unless the session of
-    a run makes these trials (:func:`inside`).
+    """Add to the number of trials outside sessions (:func:`trials_outside`).
 
-    Called where trials are made, in the callers of the three loops and of single movements: no
-    function that has trials made needs to count.
+    Called where trials are made, in the callers of the three loops and of single movements, unless
+    ``outside`` is False: then the session of a run makes the trials. No function that has trials
+    made needs to count.
     """
     global _outside
-    _outside += 0 if _of_run.get() else count
-
-
-@contextmanager
-def inside(of_run: bool) -> Iterator[None]:
-    """Let :func:`count_trials` count nothing in this block, in its thread, if ``of_run``: if the
-    session of a run makes the trials of the block."""
-    before = _of_run.set(_of_run.get() or of_run)
-    try:
-        yield
-    finally:
-        _of_run.reset(before)
+    _outside += count
 
 
 def trials_outside() -> int:
@@ -561,10 +547,14 @@ def make_trials(
     hands: Hands,
     targets: Configs,
     stops: NDArray[np.bool_] = ALL_STOP,
+    *,
+    outside: bool = True,
 ) -> Accounts:
     """Make N trials of a task and return their accounts: ``hands`` has shape ``(N, G)``;
-    ``targets`` and ``stops`` are as in :class:`Requests`."""
-    count_trials(len(targets))
+    ``targets`` and ``stops`` are as in :class:`Requests`, ``outside`` as in
+    :func:`count_trials`."""
+    if outside:
+        count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
     return reach(compiled.task.robot, arms, compiled.parameters)
 
@@ -658,7 +648,7 @@ MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 
 
 def ranked_sequences(
-    task: Task, sequences: Collection[str], *, model: MotionModel = PAPER
+    task: Task, sequences: Collection[str], *, model: MotionModel = PAPER, outside: bool = True
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
     """Make a trial by the corrective process alone with each hand sequence; best first, failed ones
     last.
@@ -669,7 +659,7 @@ def ranked_sequences(
     """
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
-    accounts = make_trials(compiled, codes, targets)
+    accounts = make_trials(compiled, codes, targets, outside=outside)
     trials = []
     for hands, goals, counts in zip(
         sequences, accounts.goals[..., 0], accounts.counts, strict=True
@@ -729,7 +719,11 @@ def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
 
 
 def search_initial_hands(
-    task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
+    task: Task,
+    hands: tuple[Hand, ...] | None = None,
+    *,
+    model: MotionModel = PAPER,
+    outside: bool = True,
 ) -> tuple[str, Mapping[str, int]]:
     """Find the hand sequence of trial 0; return it with the counts of the search, by names of
     :class:`~coartic.method.Meter`: empty for a sequence that the task names.
@@ -742,12 +736,12 @@ def search_initial_hands(
     if not task.initial_is_policy:
         return task.initial_hands, {}
     ordered = tuple(hand for hand in HANDS if hand in allowed)
-    return _search_by_policy(task.model_dump_json(), ordered, model)
+    return _search_by_policy(task.model_dump_json(), ordered, model, outside)
 
 
 @lru_cache(maxsize=64)
 def _search_by_policy(
-    task_json: str, hands: tuple[Hand, ...], model: MotionModel
+    task_json: str, hands: tuple[Hand, ...], model: MotionModel, outside: bool
 ) -> tuple[str, Mapping[str, int]]:
     """Return the best hand sequence that the task's ``initial_hands`` allows, each tried by the
     corrective process alone, and the counts of the search; the last 64 searches are kept.
@@ -761,7 +755,7 @@ def _search_by_policy(
         candidates = [letters_of([hand] * goals) for hand in hands]
     else:
         candidates = sequences_with(hands, goals, task.name)
-    ranked = ranked_sequences(task, candidates, model=model)
+    ranked = ranked_sequences(task, candidates, model=model, outside=outside)
     best, reward, reason, _ = ranked[0]
     if reward is None:
         raise NotApplicableError(
