@@ -35,7 +35,7 @@ from speed import TOLERANCE, least_ticks
 from coartic import PAPER
 
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
-_EXACTNESS = 0.03  # gap of a programme's solution, in what its parent's bound is short of a proof
+_NEAR = 0.97  # share of the path to be proven from which programmes are solved exactly
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
@@ -180,9 +180,9 @@ class ProofSearch:
         if problem.moves >= self._claim:
             return
         root = self.relaxation(problem.hands, problem.merged)
-        # The nearer to a proof, the more exact: a thousandth may be the tick that is missing.
-        gap = _EXACTNESS * (1.0 - parent / max(self.longest(problem.moves), PAPER.step))
-        relaxed = root.solve(problem.box, min(max(gap, 1e-6), 1e-2))
+        # A hundredth may be the tick that is missing, but gives more nodes before.
+        is_near = parent > _NEAR * self.longest(problem.moves)
+        relaxed = root.solve(problem.box, 1e-5 if is_near else 1e-2)
         self.nodes += 1
         lagrangian = root.lagrangian(relaxed.multipliers, self.longest(0))
         slack = self.shortfall(lagrangian, problem.box, problem.moves)
