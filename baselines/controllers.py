@@ -197,9 +197,9 @@ class Control(Method):
             return self.search(controller, candidates)
 
     def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
-        """Return the paths, a movement for each goal, of the hand sequence among ``candidates`` with
-        the fewest ticks: the sequence with the fewest ticks so far is extended by a leg until one is
-        complete. Of equal sequences the one with the fewest changes of hand is kept, then the
+        """Return the paths, a movement for each goal, of the candidate (hand sequence) with the
+        fewest ticks: the candidate with the fewest ticks so far is extended by a leg until one is
+        complete. Of equal candidates the one with the fewest changes of hand is kept, then the
         first. Raises MethodError if the hand gets stuck in all of them."""
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())

@@ -26,8 +26,8 @@ class GivenHands(Method):
     stochastic = False
 
     def solve(self, session: Session) -> Result:
-        """Make one trial in which **A** alone goes to each goal with the task's initial hands.
-        Raises MethodError if the trial misses a goal."""
+        """Make one trial in which the corrective process alone goes to each goal with the task's
+        initial hands; return its movements. Raises MethodError if the trial misses a goal."""
         hands = session.find_initial_hands()
         with session.solving():
             execution = session.trial(corrective_movements(hands))

@@ -66,8 +66,8 @@ class NextGoalController(HandController):
     """Approach a posture of the next goal. The memory is that posture, shape ``(dof,)``."""
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return the posture in which the corrective process hits the next goal from ``q``; ``q``
-        where there is no next goal, or the process does not converge."""
+        """Return, as the memory of a leg, the posture in which the corrective process hits the next
+        goal from ``q``; ``q`` itself for no next goal, or if the process does not converge."""
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
             if correction.converged:

@@ -538,8 +538,9 @@ def _rollout(
 
 @checked_arguments
 def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
-    """Return the table of :func:`score` from the rewards of policies on K tasks, shapes
-    ``(K, trials)``, NaN where a trial failed, and the best known rewards, shape ``(K, 1)``, NaN
+    """Return a table with reward, gap and share of completed trials, a row for each policy and one
+    for the best known (:func:`score`). ``rewards``, by policy, have shapes ``(K, trials)`` for K
+    tasks, NaN where a trial failed; ``best`` has the best known rewards, shape ``(K, 1)``, NaN
     where none is known. Raises ValueError for other shapes."""
     best, rewards = np.asarray(best), {name: np.asarray(each) for name, each in rewards.items()}
     shapes = [earned.shape for earned in (best, *rewards.values())]
@@ -564,12 +565,10 @@ def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
 
 
 def _options_of(env: Any) -> dict[str, Any]:
-    """Return ``task``, ``ahead`` and ``model`` of an environment of this package, or the
-    options with which an id is registered. The dictionary is no copy: do not change it.
-
+    """Return the options ``task``, ``ahead`` and ``model`` of an environment of this package, or
+    the options with which an id is registered, as a dictionary, not a copy: do not change it.
     Raises ValueError for an unknown id, and TypeError for anything else and for an environment
-    in a wrapper that is not among :data:`ADDED`.
-    """
+    in a wrapper that is not among :data:`ADDED`."""
     if isinstance(env, str):
         if env not in IDS:
             raise ValueError(unknown("environment", env, IDS))

@@ -263,7 +263,7 @@ class Session:
 
     @property
     def task_name(self) -> str:
-        """Name of the task."""
+        """Name of the task, such as ``"ascending"``."""
         return self._task.name
 
     @property
@@ -378,8 +378,9 @@ class Session:
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
-        """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1); count its
-        iterations, Jacobians and evaluations. Needs ``corrective process``."""
+        """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1), and return
+        the configuration that it finds; no movement is made. Count its iterations, Jacobians and
+        evaluations. Needs ``corrective process``."""
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
         correction = correct(
@@ -607,9 +608,9 @@ class Session:
         return self._task
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
-        """Keep the rewards of the trials of a compiled method of this project (None for a failed
-        trial), and its time for them, s; in a batch, an equal share of the batch's time. Raises
-        UndeclaredError for any other method."""
+        """Add rewards of trials that a compiled method of this project made (None for a failed
+        trial) to :attr:`rewards`, and the time that it took, s, to ``solve_s``; no other count is
+        changed. Raises UndeclaredError for any other method."""
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))
         self._meter.solve_s += solve_s

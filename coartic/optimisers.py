@@ -221,10 +221,8 @@ class Objective:
 
     @property
     def hand_sequences(self) -> list[str]:
-        """All hand sequences of the task, in alphabetical order, such as ``"LLLR"``.
-
-        Raises NotApplicableError where there are more than 4096.
-        """
+        """All hand sequences of the task, such as ``"LLLR"``, a list in alphabetical order. Raises
+        NotApplicableError if there are more than 4096."""
         session = self._session
         return sequences_with(session.hands, session.goals_count, session.task_name)
 
@@ -241,11 +239,9 @@ class Objective:
 
     def evaluations_to(self, targets: ArrayLike) -> Any:
         """Return the number of evaluations after which the best cost was at or below each of
-        ``targets``, ticks: a float for one target, an array of the same shape for several. The
-        number is infinite for a target not reached so far.
-
-        Raises ValueError for a target that is no cost, from 0 to ``FAILED``.
-        """
+        ``targets``, ticks: a float for one target, an array of the same shape for several; infinite
+        for a target not reached so far. Raises ValueError for a target that is not from 0 to
+        ``FAILED``."""
         wanted = real_array("targets", targets)
         if not ((wanted >= 0) & (wanted <= FAILED)).all():
             raise ValueError(
@@ -297,11 +293,8 @@ class Objective:
         return movements_of(chosen, np.where(after, task.q0, targets))
 
     def fresh(self) -> Objective:
-        """Return a new objective of the same task and options, with nothing evaluated but the first
-        trials and the whole budget, for another run.
-
-        Raises UndeclaredError in a method.
-        """
+        """Return a new objective of the same task and options, with no point evaluated and a budget
+        of its own, for another run. Raises UndeclaredError in a method."""
         session = Session(self.task, 0, OPTIMISER_INFORMATION, model=self._session.model)
         return Objective(session, task=self.task, **self._asked)
 

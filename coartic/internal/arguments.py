@@ -74,8 +74,7 @@ def checker_of(function: Callable[..., Any]) -> Callable[..., None]:
 
 
 def fits(name: str, value: Any, hint: Any) -> bool:
-    """Return whether a value is of the type that a type hint says; True for a hint of a form that
-    is not known here.
+    """Return whether a value fits a type hint; True for a hint of a form that is not known here.
 
     Raises ValueError, which calls the value ``name``, for a number out of the limits of
     ``Annotated``, an unknown text of a ``Literal``, and an array that is not of real numbers.

@@ -92,18 +92,16 @@ def check_inside(folder: Path, path: Path) -> None:
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write one file, whole or not at all; over a file of that name only with ``replace``.
-
-    Raises CoarticError if the file may not be written (:func:`check_output`) or writing fails.
-    """
+    """Write one file, whole or not at all; over a file of that name only with ``replace``. Raises
+    CoarticError if the file may not be written (:func:`check_output`) or writing fails."""
     check_output(path, replace=replace)
     with errors_in_words(path):
         write_atomically(path, data)
 
 
 def check_ending(path: Path, endings: Collection[str]) -> None:
-    """Raise CoarticError unless the name of a file ends in one of ``endings``, small letters with
-    the dot, such as ``.svg``; capital letters in the name count as small ones."""
+    """Raise CoarticError unless the name of a file ends in one of ``endings``, in small letters,
+    such as ``.svg``; ``.SVG`` passes, too."""
     if path.suffix.lower() not in endings:
         raise CoarticError(f"{path}: the name must end in {' or '.join(endings)}")
 

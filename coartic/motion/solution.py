@@ -121,7 +121,7 @@ class Execution:
 
     @property
     def reward(self) -> int | None:
-        """Total reward, -1 a tick; None where the task was not completed."""
+        """Total reward, minus the number of ticks; None if the task was not completed."""
         return -self.ticks if self.completed else None
 
     @property

@@ -187,8 +187,8 @@ def count_goal(goal: Any, counts: Any) -> None:
 
 @shared
 def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
-    """Move those of the first ``count`` runs that are acting to their targets, in place; with
-    ``stops`` a movement ends on arrival, too."""
+    """Move those of the first ``count`` runs whose ``acting`` is True to their targets, in place;
+    a movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near it."""
     at, slot = batch.at[0], 0
     for i in range(count):
         if batch.runs[i].acting:
@@ -429,16 +429,16 @@ def reach_goals(
     robot : Robot
         The robot of all arms.
     q : ndarray, shape (N, dof)
-        Where they are, length unit (base) and rad (joints).
+        Configurations in which the arms start, length unit (base) and rad (joints).
     hands : ndarray of int, shape (N,)
-        Their hands: 0 left, 1 right.
+        Hand of each arm: 0 left, 1 right.
     goals : ndarray, shape (N, 2)
-        Centres of their goals, x and y, length unit.
+        Centre of the goal of each arm, x and y, length unit.
     radius : float
         Radius of all goals, length unit.
     targets : ndarray, shape (N, dof), optional
-        Where to move first. A joint whose target is NaN keeps its value, and an arm whose row is
-        NaN has no target, as all arms by default: the corrective process acts alone.
+        Targets of the first movements. A joint whose target is NaN keeps its value, and an arm
+        whose row is NaN has no target, as all arms by default: the corrective process acts alone.
     checks : bool
         Whether the hand of an arm without a target may be in its goal already; else the corrective
         process begins at once.
@@ -657,13 +657,11 @@ MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 def ranked_sequences(
     task: Task, sequences: Collection[str], *, model: MotionModel = PAPER, outside: bool = True
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
-    """Make a trial by the corrective process alone with each hand sequence; best first, failed ones
-    last.
-
-    Returns for each sequence its letters, the reward (None if the trial fails), the reason of the
-    failure (or empty), and the counts of the trial by :data:`COUNTED`. Of equal rewards the
-    sequence with the fewest changes of hand comes first, then the one that was given first.
-    """
+    """Make a trial by the corrective process alone with each hand sequence; return a list, ordered
+    by reward, the best first and failed trials last. An entry has the sequence, the reward (None if
+    the trial failed), the reason of the failure (or empty), and the counts of the trial by
+    :data:`COUNTED`. Of equal rewards the sequence with the fewest changes of hand comes first, then
+    the sequence given first."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets, outside=outside)

@@ -82,7 +82,8 @@ class Address(NamedTuple):
 
     @property
     def split(self) -> Split:
-        """Purpose of the instance: to tune on, to report on, or drawn after both were done."""
+        """Split of the instance: ``"development"`` (to tune on), ``"test"`` (to report on), or
+        ``"fresh"`` (drawn after both were done)."""
         return SPLITS.get(self.stream, "fresh")
 
     def __str__(self) -> str:
@@ -302,7 +303,7 @@ class Task(FileData):
         )
 
     def _repr_html_(self) -> str:
-        """Return the picture that a notebook shows: base, arms and numbered goals at the start."""
+        """Return the HTML that a notebook shows: base, arms and numbered goals at the start."""
         arms = [self.robot.joint_positions(self.q0, hand) for hand in HANDS]
         lines = [(arms[0], "grey"), (arms[1], "currentColor")]
         corners = self.robot.base_outline(self.q0)
@@ -383,8 +384,8 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
 
 
 def check_task(task: Task) -> Task:
-    """Return the task itself. Raises TaskError for goals that the paper's corrective process cannot
-    reach."""
+    """Return the task itself. Raises TaskError if a goal is out of reach: no hand, or not its
+    initial hand, can come as near as the paper's corrective process has to."""
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
