@@ -238,8 +238,8 @@ def _nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
 
 @inlined
 def _best_hand(entries: Any, hands: Any) -> int:
-    """Return that of ``hands``, 0 left and 1 right, whose record in ``entries`` has the highest
-    value Q; of equal hands the first."""
+    """Return the hand, 0 left or 1 right, among ``hands`` whose record in ``entries`` (by hand) has
+    the highest value Q; of equal hands the first."""
     best = hands[0]
     for hand in hands[1:]:
         if entries[hand].value > entries[best].value:

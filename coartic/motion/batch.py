@@ -201,8 +201,8 @@ def _copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
 
 @inlined
 def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
-    """Copy goal, base and joints of ``run``, which is run ``number`` (from 0), and shoulder and
-    links of its ``arm`` into column ``slot`` of the rows ``at``."""
+    """Copy goal, base and joints of ``run``, which is run ``number`` (from 0) of its batch, and
+    shoulder and links of its ``arm`` into slot ``slot``, a column of the arrays ``at``."""
     at.run[slot], at.first[slot], at.links[slot] = number, arm.first, len(arm.links)
     at.shoulder[0, slot] = arm.shoulder_x
     at.shoulder[1, slot] = arm.shoulder_y
@@ -214,8 +214,8 @@ def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
 
 @inlined
 def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
-    """Load a run into a slot (:func:`load`), with the start, the target and the squared joint-space
-    length of its movement, so that :func:`move_slots` can make the movement."""
+    """Copy a run into slot ``slot`` (:func:`load`), with start, target and squared joint-space
+    length of its movement to its target, which :func:`move_slots` can then make."""
     load(at, slot, number, run, arm)
     _copy_arm(at.start, slot, run.q, arm)
     _copy_arm(at.target, slot, run.target, arm)

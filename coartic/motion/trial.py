@@ -100,15 +100,17 @@ def account_type(width: int) -> np.dtype[np.void]:
 
 @inlined
 def set_off(run: Any, q: Any) -> None:
-    """Put a run, in place, at configuration ``q``, where its trial starts, with no evaluations."""
+    """Put a run (record of a robot in its trial), in place, at configuration ``q``, where the trial
+    starts: the trial goes on, and no evaluations are counted yet."""
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
 
 
 @inlined
 def begin(run: Any, goal: Any) -> None:
-    """Set the next goal, x and y, of a run, in place: phase 1, *begin*. A run whose trial has ended
-    becomes idle; without a target by *aim* a run only checks whether its hand is in the goal."""
+    """Set the next goal, x and y, of a run (record of a robot in its trial), in place: phase 1,
+    *begin*. Unless *aim* sets a target, the run only checks whether its hand is in the goal; a run
+    whose trial has ended does nothing."""
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
     run.action = CHECK if run.going else IDLE
@@ -117,8 +119,8 @@ def begin(run: Any, goal: Any) -> None:
 
 @inlined
 def aim(run: Any, target: Any) -> None:
-    """Set the target of a run, in place: phase 2, *aim*. A joint whose entry of ``target`` is NaN
-    stays where it is; if all entries are NaN, no movement is made."""
+    """Set the target of a run (record of a robot in its trial), in place: phase 2, *aim*. A joint
+    whose entry of ``target`` is NaN stays where it is; if all are NaN, no movement is made."""
     for j in range(len(target)):
         if not math.isnan(target[j]):
             run.target[j] = target[j]
@@ -127,8 +129,9 @@ def aim(run: Any, target: Any) -> None:
 
 @inlined
 def move(count: int, robot: Any, batch: Any) -> None:
-    """Let each of the first ``count`` runs do its action, in place: phase 3, *move*. ``q``, ``hit``
-    and ``ticks`` are set; a run that only checks its hand, or is idle, takes 0 ticks."""
+    """Move each of the first ``count`` runs of a batch (records of robots) to its target, or check
+    whether its hand is in the goal, as its ``action`` says: phase 3, *move*. ``q``, ``hit`` and
+    ``ticks`` change in place; a run without a movement takes 0 ticks."""
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action
@@ -201,7 +204,8 @@ def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
 @inlined
 def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
     """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
-    for each of the first ``count`` runs that missed it; ``converged`` becomes True if it did."""
+    for each of the first ``count`` runs that missed it; no run moves. ``converged`` of a run
+    becomes True if **A** found a target."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
