@@ -89,7 +89,7 @@ class Controller(ABC):
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
         """Simulate control steps until the hand of the first of ``aims`` is in its goal, from the
-        end of the leg ``before``, or from the task's start if it is None; return them as a leg.
+        end of the leg ``before``, or, for None, from the task's start; return them as a leg.
         Further aims are the goals ahead. Raises StuckError if the hand comes no nearer to its goal,
         and MethodError if the solver fails."""
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"

@@ -123,7 +123,7 @@ class EvolutionStrategy:
 
     def tell(self, points: Array, costs: Array) -> None:
         """Update mean, covariance and step size, in place, from the points ``(λ, dim)`` of the last
-        :meth:`ask` and their costs ``(λ,)``, finite, of which the least is best."""
+        :meth:`ask` and their costs ``(λ,)``, finite; the least cost is best."""
         self._generation += 1
         least = int(np.argmin(costs))
         if costs[least] < self._best:

@@ -65,7 +65,7 @@ class PostureBasedParameters(Parameters):
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
-    """Random postures in the store, beside the starting posture."""
+    """Random postures in the store, in addition to the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
     """Rounds of generation until the deadline."""
 

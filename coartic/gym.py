@@ -377,7 +377,7 @@ class TaskEnv(Recorded, gymnasium.Env):
 
 
 def _check_no_options(options: Mapping[str, Any] | None) -> None:
-    """Raise ValueError unless the options of a reset are None or an empty mapping."""
+    """Raise ValueError if a reset has options; None and an empty mapping pass."""
     if options is not None and not (isinstance(options, Mapping) and not options):
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 

@@ -163,8 +163,8 @@ class Meter:
     that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add each count, in place, to the counter of that name, which must exist. No sign, sum or
-        budget is checked."""
+        """Add each count to the counter of that name (not to the times), in place. Neither the sign
+        of a count nor the sum is checked, nor a budget."""
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 

@@ -40,8 +40,8 @@ class MotionModel(NamedTuple):
 
     @checked_arguments
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
-        """Return a copy of the model for goals of ``radius``, length unit: a tolerance (of arrival,
-        of correction) that is None becomes a tenth of ``radius``."""
+        """Return a copy of the model for goals of ``radius``, length unit: a tolerance of None (of
+        arrival or of correction) becomes a tenth of ``radius``."""
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
 

@@ -400,8 +400,8 @@ class Objective:
         return targets
 
     def _check(self, points: Array) -> None:
-        """Raise ValueError if points ``(N, dim)`` have a goal some of whose entries alone are NaN,
-        or an infinite entry."""
+        """Raise ValueError if points ``(N, dim)`` have an infinite entry, or a goal that has NaN
+        for some of its joints but not for all."""
         if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
             return
         missing = (np.isnan(self._targets_of(points)) & self.joints).sum(axis=2)

@@ -80,7 +80,7 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new group of processes, with the first
     ``streams`` of input, output and errors connected to the null device. When the parent process
-    has ended, a thread removes ``folder``, unless it is None, and kills the group."""
+    has ended, a thread removes ``folder``, if one is given, and kills the group."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:

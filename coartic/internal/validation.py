@@ -128,8 +128,8 @@ def sentence_error(text: str) -> PydanticCustomError:
 
 
 def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
-    """Return one sentence about a problem, with its key. ``keys``: the known keys, of which an
-    unknown key may be a misspelling; argument k (from 0) without a name has name ``keys[k]``."""
+    """Return one sentence about a problem, with its key. ``keys``: the known keys, among them the
+    one meant by an unknown key; argument k (from 0) without a name has the name ``keys[k]``."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and part < len(keys):

@@ -355,9 +355,9 @@ def _find_statuses(at: Any, count: int, square: float) -> None:
 
 @inlined
 def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int, bool]:
-    """Make an iteration of the corrective process **A**, q += α Jᵀ e, in every slot that goes on,
-    plus the rows ``pull`` unless ``pull`` is None (:func:`descend_to_goals`). Return how many of
-    the first ``count`` slots have ended, and the result of :func:`are_near` afterwards."""
+    """Make an iteration of the corrective process **A**, q += α Jᵀ e, in every slot that goes on;
+    with a kernel ``pull`` its rows are added (:func:`descend_to_goals`). Return how many of the
+    first ``count`` slots have ended, and the result of :func:`are_near` afterwards."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -397,9 +397,9 @@ def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
     failed. In the record of each run ``target`` becomes the last iterate, ``converged`` and
     ``iterations`` are set, and ``evaluations`` grows.
 
-    ``pull`` is None or a kernel; called with the rows of slots, ``count``, robot and runs, it fills
-    in the rows ``pull``: what an iteration adds to the base and to the joints of the arm, 0 for
-    locked coordinates of the base.
+    ``pull`` can be a kernel, else None. Called with the rows of slots, ``count``, robot and runs,
+    the kernel fills in the rows ``pull``: what an iteration adds to the base and to the joints of
+    the arm, 0 for locked coordinates of the base.
     """
     at, iteration = batch.at[0], 0
     square = largest_square(robot.model.correction_tolerance)

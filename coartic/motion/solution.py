@@ -198,7 +198,7 @@ def execute(
 
 def hint_of(movements: Iterable[Movement]) -> str:
     """Return a question on the first movement, unless corrective, whose target has a joint angle
-    beyond 20 rad, as if it were meant in degrees; an empty text if there is none."""
+    beyond 20 rad, as if it were meant in degrees; an empty text without such a movement."""
     for movement in movements:
         if movement.kind != "corrective" and movement.target is not None:
             angle = max(movement.target[BASE_DOF:].tolist(), key=abs)

@@ -349,8 +349,8 @@ def check_hands(task: Task, hands: str) -> str:
 
 def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Return a sentence on the first goal that no hand of the task, or not the hand that
-    ``initial_hands`` gives it, can reach; None if there is none. ``tolerance`` is the distance from
-    a goal's centre at which the corrective process ends, length unit.
+    ``initial_hands`` gives it, can reach; None if all can be reached. ``tolerance`` is the distance
+    from a goal's centre at which the corrective process ends, length unit.
     """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
