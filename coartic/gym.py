@@ -330,8 +330,9 @@ class TaskEnv(Recorded, gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin a trial, of a random task of a family; return observation ``(O,)`` and info. None
-        as ``seed`` keeps the random generator. Raises ValueError for any option."""
+        """Begin a trial, of the task or of a random instance of the family; return observation
+        ``(O,)`` and info. With ``seed`` None the generator goes on. Raises ValueError for any
+        option, and for a seed that is no whole number from 0."""
         super().reset(seed=_whole_seed(seed))
         _check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))

@@ -278,7 +278,7 @@ class Session:
 
     @property
     def initial_hands(self) -> str:
-        """Hand sequence, or policy, that the task names for a first solution."""
+        """Hand sequence of trial 0, such as ``"RRRR"``, or name of a policy that finds one."""
         return self._task.initial_hands
 
     @property
@@ -336,10 +336,11 @@ class Session:
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Note a use of the corrective process if a corrective movement in it has no target.
+        """Note a use of the corrective process if a corrective movement of a solution has no
+        target: the corrective process finds the target.
 
-        Raises UndeclaredError if the method does not declare the corrective process, and
-        SolutionError if the solution is no sequence. Nothing else is checked.
+        Raises UndeclaredError if the method does not declare it, and SolutionError if the solution
+        is no sequence. Nothing else is checked.
         """
         if not isinstance(solution, (tuple, list, Sequence)):  # in the order of their speed
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
