@@ -51,7 +51,7 @@ class Solution(NamedTuple):
 
 
 def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
-    """Solve both levels.
+    """Solve level 1, then level 2, and return the changes x of the joints.
 
     ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
     ``(m,)``; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver fails.
@@ -68,7 +68,8 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
 def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
-    """The variables of a level, the slack of level 1 before the changes, and the iterations."""
+    """Solve one level, 1 or 2; return its variables (the changes; for level 1 the slack s, then the
+    changes) and the number of iterations. Raises MethodError if the solver fails."""
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))
     matrix[:task, :-joints] = -1.0

@@ -72,8 +72,9 @@ class Strategy:
         self._evolution: EvolutionStrategy
 
     def generation(self) -> None:
-        """Make the trials of one generation, or those that are left, and learn from their rewards;
-        only for a sequence that **A** completes."""
+        """Make the trials of one generation, or as many as are left, and learn from their rewards
+        if the generation is whole. To be called only for a sequence that the corrective process
+        completes."""
         if self._restarts < 0 or self._evolution.has_ended():
             self._restarts += 1
             size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
@@ -105,7 +106,8 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Search until the trials are used up; the solution is the best trial's."""
+        """Make generations of trials until the trials are used up; return the movements of the best
+        trial. Raises MethodError if no trial hit every goal."""
         attempts = Attempts(session, self.parameters)
         with session.solving():
             strategies = []
@@ -144,7 +146,9 @@ class GoalByGoal(Method):
     Parameters = GoalByGoalParameters
 
     def solve(self, session: Session) -> Result:
-        """Search until the trials are used up; the solution is the best trial's."""
+        """Make trials until they are used up, or until all hand sequences were tried and none
+        succeeds; return the movements of the best trial. Raises MethodError if no trial hit every
+        goal."""
         attempts = Attempts(session, self.parameters)
         letters = sorted(hand[0].upper() for hand in session.hands)
         values: dict[tuple[int, str], float] = defaultdict(lambda: -math.inf)

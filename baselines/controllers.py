@@ -75,22 +75,23 @@ class Controller(ABC):
 
     @abstractmethod
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
-        """Return the memory, what the controller keeps from step to step, at the beginning of a leg
-        from ``q`` to the goal of the first aim; ``memory`` is the memory at the end of the leg
-        before, or None."""
+        """Return the memory (what the controller keeps from step to step) with which it begins the
+        leg from configuration ``q`` to the goal of the first of ``aims``, pairs of hand and goal;
+        ``memory`` is the memory at the end of the leg before, None for the first leg."""
 
     @abstractmethod
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Any, first: bool
     ) -> tuple[Solution, Array, Any]:
-        """Return the solution for a control step from ``q``, the changes that the joints prefer,
-        both of the joints that are not locked and in control steps, and the memory after the step;
-        ``first``: it is the first step of a leg."""
+        """Return three things for a control step from ``q``: the solution of the cascade; the
+        changes that the joints prefer; the memory after the step. Changes are of the joints that
+        are not locked, in lengths of a control step. ``first``: it is the first step of a leg."""
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
-        """Return the path to the goal of the first aim, from the end of the leg ``before``, or from
-        the start if it is None; further aims are the goals ahead. Raises StuckError if the hand
-        does not get there, MethodError if the solver fails."""
+        """Simulate control steps until the hand of the first of ``aims`` is in its goal, from the
+        end of the leg ``before``, or, for None, from the task's start; return them as a leg.
+        Further aims are the goals ahead. Raises StuckError if the hand comes no nearer to its goal,
+        and MethodError if the solver fails."""
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         _, tolerance = model.tolerances(radius)
@@ -128,7 +129,8 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Solve the cascade as :func:`solve_cascade` does; the session counts the iterations."""
+        """Solve the cascade (:func:`solve_cascade`) and return its solution; count two programmes
+        in ``solves``, and the iterations in the session."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
@@ -180,11 +182,13 @@ class Control(Method):
     """Goals after the current one that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
-        """Return why a task has too many hand sequences to simulate; None if it has not."""
+        """Return a sentence that a task has too many hand sequences to simulate; None if it has
+        not."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """Simulate the hand sequences and return the best one's paths."""
+        """Simulate the control of all hand sequences as far as they can be best; return the paths
+        of the sequence with the fewest ticks (:meth:`search`)."""
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)
         ordered = [hand for hand in HANDS if hand in task.hands]
@@ -193,10 +197,10 @@ class Control(Method):
             return self.search(controller, candidates)
 
     def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
-        """Return the paths of the candidate with the fewest ticks: the one with the fewest ticks so
-        far is extended until one is complete. Of equal candidates the one with the fewest changes
-        of hand is kept, then the first. Raises MethodError if the hand gets stuck in all of
-        them."""
+        """Return the paths, a movement for each goal, of the candidate (hand sequence) with the
+        fewest ticks: the candidate with the fewest ticks so far is extended by a leg until one is
+        complete. Of equal candidates the one with the fewest changes of hand is kept, then the
+        first. Raises MethodError if the hand gets stuck in all of them."""
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)

@@ -26,8 +26,8 @@ class GivenHands(Method):
     stochastic = False
 
     def solve(self, session: Session) -> Result:
-        """Make one trial in which **A** alone goes to each goal with the task's initial hands.
-        Raises MethodError if the trial misses a goal."""
+        """Make one trial in which the corrective process alone goes to each goal with the task's
+        initial hands; return its movements. Raises MethodError if the trial misses a goal."""
         hands = session.find_initial_hands()
         with session.solving():
             execution = session.trial(corrective_movements(hands))
@@ -46,7 +46,8 @@ class BestHands(Method):
     stochastic = False
 
     def why_not(self, task: Outline) -> str | None:
-        """Return why a task has too many hand sequences to try one by one; None if it has not."""
+        """Return a sentence that a task has too many hand sequences to try one by one; None if it
+        has not."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:

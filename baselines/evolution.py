@@ -32,7 +32,7 @@ _MOST_NOTED = 20_000
 
 
 def _added(weights: list[float]) -> float:
-    """Add weights from left to right."""
+    """Return the sum of weights, added from left to right; 0 for none."""
     return reduce(add, weights, 0.0)
 
 
@@ -110,7 +110,7 @@ class EvolutionStrategy:
         self._flat = 0
 
     def ask(self) -> Array:
-        """The points of the next generation, shape ``(λ, dim)``."""
+        """Draw and return the points of the next generation, shape ``(λ, dim)``."""
         if self._generation >= self._decomposed + self._gap:
             self._covariance = (self._covariance + self._covariance.T) / 2
             variances, axes = np.linalg.eigh(self._covariance)
@@ -122,8 +122,8 @@ class EvolutionStrategy:
         return self._mean + self._step_size * drawn
 
     def tell(self, points: Array, costs: Array) -> None:
-        """Learn from all points of the last :meth:`ask` and their costs, shape ``(λ,)``, finite;
-        the least cost is best."""
+        """Update mean, covariance and step size, in place, from the points ``(λ, dim)`` of the last
+        :meth:`ask` and their costs ``(λ,)``, finite; the least cost is best."""
         self._generation += 1
         least = int(np.argmin(costs))
         if costs[least] < self._best:
@@ -172,8 +172,8 @@ class EvolutionStrategy:
             self._still_at, self._still_since = self._mean, self._generation
 
     def has_ended(self) -> bool:
-        """Return whether to stop: points or costs change too little, or steps have become too
-        long."""
+        """Return whether to stop: points or costs change too little, steps have become too long,
+        the covariance is ill-conditioned, or there were too many generations."""
         if not self._generation:
             return False
         deviations = self._step_size * np.sqrt(np.diag(self._covariance))
@@ -198,7 +198,7 @@ class EvolutionStrategy:
         )
 
     def _stagnates(self) -> bool:
-        """Return whether neither the best nor the median cost has improved for long."""
+        """Return whether neither the best nor the median cost has improved for many generations."""
         noted = len(self._noted_bests)
         recent = int(max(self._patience / 10, noted / 10))
         evaluated = self._generation * self.size

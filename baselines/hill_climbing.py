@@ -34,7 +34,9 @@ class HillClimbing(Method):
     Parameters = UninformedParameters
 
     def solve(self, session: Session) -> Result:
-        """Draw hands around the best sequence known, make a trial around its centre, draw again."""
+        """Make trials until they are used up, or no hand sequence succeeds; return the movements of
+        the best trial. For each trial hands are drawn around the best sequence known, targets
+        around the centre of the drawn sequence. Raises MethodError if no trial hit every goal."""
         first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
         attempts = Attempts(session, self.parameters)
         most, ahead = len(letters) ** session.goals_count, 1
@@ -44,7 +46,7 @@ class HillClimbing(Method):
         hopeless: set[str] = set()  # A alone does not complete them, ever
 
         def draw() -> str:
-            """Hands around the best; uniformly random where none has succeeded."""
+            """Draw a hand sequence around the best one; uniformly if none has succeeded yet."""
             while True:
                 chosen = list(attempts.hands or letters[0] * session.goals_count)
                 for goal in range(len(chosen)):

@@ -37,13 +37,14 @@ class HandController(Controller):
     prefer other changes. The memory is a posture, shape ``(dof,)``."""
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return ``q``, where the leg begins."""
+        """Return ``q``, where the leg begins, itself, as the memory; it is not used."""
         return q
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
     ) -> tuple[Solution, Array, Array]:
-        """Move the hand to its goal, the joints as near to what they prefer as that allows."""
+        """Solve for a control step from ``q`` that moves the hand straight to its goal, and the
+        joints as near to what they prefer as that allows; results of :meth:`Controller.step`."""
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)
@@ -56,8 +57,8 @@ class HandController(Controller):
         return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the changes that the joints prefer in the next of ``steps`` control steps to the
-        goal, shape ``(joints,)``, in control steps: here none."""
+        """Return the changes that the joints that are not locked prefer in the next of ``steps``
+        control steps to the goal, shape ``(joints,)``, in lengths of a control step: here zeros."""
         return np.zeros(len(self.moving))
 
 
@@ -65,8 +66,8 @@ class NextGoalController(HandController):
     """Approach a posture of the next goal. The memory is that posture, shape ``(dof,)``."""
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return the posture in which the corrective process hits the next goal from ``q``; ``q``
-        where there is no next goal, or the process does not converge."""
+        """Return, as the memory of a leg, the posture in which the corrective process hits the next
+        goal from ``q``; ``q`` itself for no next goal, or if the process does not converge."""
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
             if correction.converged:
@@ -74,7 +75,8 @@ class NextGoalController(HandController):
         return q
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return an even step towards the posture of the next goal, at most a control step long."""
+        """Return the ``steps``-th part of the way from ``q`` to the posture ``memory`` of the next
+        goal, for the joints that are not locked, in lengths of a control step, at most 1 long."""
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))
 

@@ -60,7 +60,8 @@ class OptimumSearch(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
     def solve(self, session: Session) -> Result:
-        """Search; the solution has the fewest ticks found."""
+        """Search over all hand sequences for the shortest path, round it to whole ticks, and return
+        the movements with the fewest ticks found. Raises MethodError if no path is found."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)
@@ -92,8 +93,9 @@ class OptimumSearch(Method):
 
 @checked_arguments
 def with_locks(task: Task, base: str) -> Task:
-    """Return the task with base coordinates locked in addition, ``y`` or ``xy``; the task itself
-    for ``task``. Raises MethodError if the task with these locks is not valid."""
+    """Return a task with base coordinates locked in addition to its own: ``base`` is ``"y"``,
+    ``"xy"``, or ``"task"`` for none, which returns the task itself. Raises MethodError if the task
+    with these locks is not valid."""
     if base == "task":
         return task
     locked = sorted({*task.locked_base, *base})

@@ -65,7 +65,7 @@ class PostureBasedParameters(Parameters):
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
-    """Random postures in the store, beside the starting posture."""
+    """Random postures in the store, in addition to the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
     """Rounds of generation until the deadline."""
 
@@ -91,7 +91,8 @@ class PostureBased(Method):
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
     def solve(self, session: Session) -> Result:
-        """Plan goal by goal, each from where the movement before it will have ended."""
+        """Plan a movement for each goal, from where the movement before it is expected to end;
+        return the movements. Raises MethodError for a goal that no posture hits."""
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
         with session.solving():
@@ -154,8 +155,8 @@ class PosturePlanner:
 
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
         """Return the movement to each goal, and the ticks that each movement is expected to take.
-        Raises MethodError for a goal that no posture hits. To be called once: ``q`` and the store
-        change."""
+        To be called once: ``q`` and ``store`` of the planner change. Raises MethodError for a goal
+        that no posture hits."""
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
@@ -191,8 +192,8 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """Return, by goal (from 0) and hand, the stored postures of the arm that correction brings
-        to the goal, shape ``(n, dof)``; the other arm is as in ``q``."""
+        """Return, by goal (from 0) and hand, copies of those stored postures whose hand correction
+        brings to the goal, as corrected, shape ``(n, dof)``; the other arm is as in ``q``."""
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))
@@ -204,8 +205,9 @@ class PosturePlanner:
         return retrieved
 
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
-        """Return the postures of least cost of travel from ``q``, one out of each of ``layers``,
-        the retrieved postures for each goal in turn; shape ``(goals, dof)``."""
+        """Return the sequence of postures with the shortest joint-space path from ``q``, one out of
+        each of ``layers``, the retrieved postures ``(n, dof)`` for one goal or for two goals in
+        turn; shape ``(goals, dof)``."""
         first = layers[0]
         cost = np.linalg.norm(first - self.q, axis=1)
         if len(layers) == 1:
@@ -223,9 +225,10 @@ class PosturePlanner:
     def generate(
         self, promising: dict[HandSequence, Array], noises: Array, goals: range
     ) -> list[tuple[float, HandSequence, Array]]:
-        """Return for each hand sequence its cost of travel, its hands, and the cheapest postures
-        ``(goals, dof)`` found around its promising ones by the deadline. ``noises`` are standard
-        normal, shape ``(hand sequences, rounds, PER_ROUND, goals, dof)``."""
+        """Return for each hand sequence the cheapest postures ``(goals, dof)`` found around its
+        ``promising`` postures by the deadline, as a triple: their cost (joint-space length of the
+        path from ``q``), the hands, the postures. ``noises`` are standard normal, shape ``(hand
+        sequences, rounds, PER_ROUND, goals, dof)``; ``goals`` are from 0."""
         sequences = [*promising]
         centre = best = np.stack([*promising.values()])
         costs = _path_length(self.q, best)
@@ -257,8 +260,9 @@ class PosturePlanner:
         return list(zip(costs.tolist(), sequences, best, strict=True))
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
-        """Correct contiguous postures ``(..., dof)`` in place, in at most ``steps`` steps, towards
-        a goal (from 0) for a hand; return True where the hand is at the goal, shape ``(...)``."""
+        """Bring a hand of contiguous postures ``(..., dof)``, in place, to a goal (from 0), in at
+        most ``steps`` steps each; return True where the hand is then at the goal, shape ``(...)``.
+        The session counts the evaluations."""
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
         far = np.arange(len(flat))
@@ -296,10 +300,11 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Keep in ``far`` the postures with the hand away from (x, y), and return their number.
+    """Keep at the beginning of ``far`` (indices of postures), in place, those whose hand is farther
+    than ``tolerance`` from (x, y), and return their number.
 
-    For each of them, in their order, ``wanted`` has the step that the hand is to make, and
-    ``jacobian`` the columns of the arm's joints.
+    For each of these, in order, fill ``wanted`` with the step that the hand is to make, length
+    unit, and ``jacobian`` with the columns of the arm's joints.
     """
     tip = len(arm.links)
     left = 0
@@ -322,7 +327,8 @@ def _linearise_far(
 
 
 def _path_length(q: Array, postures: Array) -> Array:
-    """Joint-space distance from ``q`` (dof,) through postures ``(..., k, dof)``."""
+    """Return the joint-space length of the path from ``q`` ``(dof,)`` through k postures in turn,
+    shape ``(...)`` for postures ``(..., k, dof)``."""
     start = np.broadcast_to(q, (*postures.shape[:-2], 1, postures.shape[-1]))
     legs = np.diff(np.concatenate([start, postures], axis=-2), axis=-2)
     length: Array = np.linalg.norm(legs, axis=-1).sum(axis=-1)

@@ -42,12 +42,12 @@ _NEAR = 2.0  # length unit: from farther away the base carries the hand there fi
 def _sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
-    """Configurations with ``hand`` in the disc of goal ``goal`` (0-based), ``(n, dof)``.
+    """Sample n configurations ``(n, dof)`` with ``hand`` in the disc of goal ``goal`` (from 0).
 
-    Gaussian samples, one around each of ``starts`` of shape ``(count, dof)``, spread
-    log-uniformly between narrow and wide, each brought to a random point of the disc, from
-    far away by the base and then by Gauss-Newton steps of least norm; ``n`` may be less than
-    ``count`` where some do not get there. The other arm stays where it starts.
+    A Gaussian sample around each of ``starts``, shape ``(count, dof)``, with an SD drawn
+    log-uniformly, is brought to a random point of the disc, from far away by the base and then by
+    Gauss-Newton steps of least norm; samples that do not get there are left out. The other arm
+    stays as in its start. Evaluations are added to ``spent``, in place.
     """
     robot, count = task.robot, len(starts)
     moving = np.zeros(robot.dof, dtype=np.bool_)
@@ -90,13 +90,11 @@ class Beginning(NamedTuple):
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
-    """Sample the layers of a graph with at most ``count`` nodes per goal and hand; a layer can be
-    empty.
+    """Sample at most ``count`` nodes (postures, ``(n, dof)``), or none, for each goal and hand;
+    return them by goal (from 0) and hand, and the ``forward_kinematics`` and ``jacobians`` counted.
 
-    Half of a layer is sampled around the nodes of the goal before, by whichever hand: of 40
+    Half of the nodes are sampled around the nodes of the goal before, by whichever hand: of 40
     one-armed random tasks the best path known was then found more often on 23, less often on 11.
-
-    Returns the layers, and the counts of ``forward_kinematics`` and ``jacobians`` that they took.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}
@@ -113,9 +111,9 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
 
 
 def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain]:
-    """Return the cheapest chain of each hand sequence that has a chain, left before right. At most
-    ``most`` beginnings of sequences (None: all) are kept at each goal, the cheapest; with fewer
-    sequences than that none is lost."""
+    """Return the cheapest chain of nodes of each hand sequence that has a chain, in alphabetical
+    order: the hands, and a configuration for each goal. At each goal the ``most`` cheapest
+    beginnings of sequences are kept (None: all); with no more sequences than that none is lost."""
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
     kept = [Beginning((), start, np.zeros((1, 1)), ())]
     for _ in range(len(task.goals)):
@@ -142,7 +140,8 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
 
 
 def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]:
-    """Extend the cheapest chains by one goal, with each hand."""
+    """Yield the cheapest chains of a beginning extended by one goal, once for each hand that has a
+    node there, left before right."""
     hands, nodes, cost, back = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right
@@ -175,10 +174,11 @@ def cheapest_chains(
     most: int = BEAM_WIDTH,
     spread: bool = False,
 ) -> Iterator[Chain]:
-    """Yield the cheapest chains of ``graphs`` random graphs with ``nodes`` postures per goal and
-    hand, and of more graphs until ``chains`` are yielded; ``most`` as in :func:`chains_of`. The
-    session counts the effort. With ``spread`` and two hands each chain is followed by its
-    :func:`move_other_arm`, which does not count. Raises MethodError where a goal has no posture."""
+    """Yield the cheapest chains, hands and configurations ``(G, dof)``, of ``graphs`` random graphs
+    with ``nodes`` postures per goal and hand, then of more graphs until at least ``chains`` are
+    yielded; ``most`` as in :func:`chains_of`. With ``spread`` and two hands each chain is followed
+    by its :func:`move_other_arm`, which is not one of the ``chains``. The session counts the
+    evaluations. Raises MethodError if a goal has no posture in a graph."""
     yielded = 0
     for number in itertools.count(1):
         layers, spent = sample_layers(task, nodes, rng)
@@ -200,8 +200,9 @@ def cheapest_chains(
 
 
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
-    """Return a copy of a chain's configurations, shape ``(G, dof)``, with each arm moving steadily
-    between the goals that it hits."""
+    """Return a copy of a chain's configurations, shape ``(G, dof)``, in which each arm moves in
+    equal steps from goal to goal between those that its hand hits, at first from the start; after
+    the last of them it keeps still."""
     configurations = chain.copy()
     for hand in task.hands:
         joints = task.robot.joints(hand)
@@ -215,6 +216,7 @@ def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
 
 
 def _squared_distances(before: Array, after: Array, joints: slice) -> Array:
-    """Squared distances of every pair, over some joints, shape ``(before, after)``."""
+    """Return the squared distances, over some joints, of each configuration of ``before`` ``(n,
+    dof)`` from each of ``after`` ``(m, dof)``: shape ``(n, m)``."""
     difference = before[:, None, joints] - after[None, :, joints]
     return np.asarray((difference**2).sum(axis=-1))

@@ -81,15 +81,16 @@ class PostureController(Controller):
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return the postures by aim at the beginning of a leg; postures in ``memory``, that of the
-        leg before, are kept."""
+        """Return the posture for each aim (hand and goal) at the beginning of a leg from ``q``, by
+        aim; postures in ``memory``, from the leg before, are kept (:meth:`find_postures`)."""
         return dict(zip(aims, self.find_postures(q, aims, memory or {}), strict=True))
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array], first: bool
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
-        """Update the postures, unless the step is the ``first`` of a leg, and step towards the
-        posture of the current goal; returns as :meth:`Controller.step` does."""
+        """Update the postures, unless the step is the ``first`` of a leg, and solve for a control
+        step from ``q`` towards the posture of the current goal. Returns the solution, the preferred
+        changes and the postures by aim (:meth:`Controller.step`)."""
         postures = [memory[aim] for aim in aims]
         if not first:
             self.sweep(q, aims, postures)
@@ -104,10 +105,10 @@ class PostureController(Controller):
     def find_postures(
         self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]
     ) -> list[Array]:
-        """Return a posture ``(dof,)`` that hits its goal for each aim, in the order of the goals.
-        Postures in ``earlier`` are taken over; each other one is sought by descent from the posture
-        of the aim before, the first from ``q``. With several aims all are then moved to shorten the
-        path."""
+        """Return a posture ``(dof,)`` that hits its goal for each aim, in the order of the goals. A
+        posture in ``earlier`` is taken over; any other is sought by descent from the posture of the
+        aim before, the first from ``q``. With several aims all are then moved to shorten the path
+        from ``q`` through them. A search that does not converge ends after 400 steps."""
         postures: list[Array] = []
         for aim in aims:
             before = postures[-1] if postures else q
@@ -123,10 +124,10 @@ class PostureController(Controller):
         return postures
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Move each entry of ``postures``, in place, towards where the path from ``q`` through them
-        is shortest. The sum of two distances is least where their ends, each weighted by the
-        inverse of its distance, have their mean (Weiszfeld 1937). Returns the largest length that
-        :meth:`step_nearer` returns."""
+        """Replace each posture in the list ``postures`` by one a step nearer to where the path from
+        ``q`` through all is shortest; return the largest length that :meth:`step_nearer` returns.
+        The sum of two distances is least where their ends, each weighted by the inverse of its
+        distance, have their mean (Weiszfeld 1937)."""
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]
@@ -142,8 +143,8 @@ class PostureController(Controller):
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
         """Make a Gauss-Newton step from a posture towards the posture that hits the goal of an aim
-        nearest to a preferred posture. Returns the posture after the step, and the length that the
-        step had before it was limited, length unit and rad mixed."""
+        nearest to a preferred posture. Returns a copy, the posture after the step, and the length
+        of the step before it was limited to 0.1, length unit and rad mixed."""
         rows, outside = self.faces(posture, aim)
         wanted = _POSTURE_GAIN * (preferred - posture)[self.moving]
         change = self.solve(rows, outside, wanted).changes
@@ -158,9 +159,9 @@ class PostureController(Controller):
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """Return A, ``(FACES, joints)`` over the joints that are not locked, and b, ``(FACES,)``,
-        of the module's docstring for the disc of an aim's goal and a robot in ``q``, length
-        unit."""
+        """Return A, ``(16, joints)``, and b, ``(16,)``, length unit: to first order, a change x of
+        the joints that are not locked brings the hand of an aim from ``q`` into a polygon within
+        its goal's disc if A x >= b."""
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET
         return _FACE_NORMALS @ jacobian, _FACE_NORMALS @ self.error(q, aim) - radius

@@ -46,11 +46,11 @@ class RandomSearchParameters(RandomSearchHandsParameters):
 
 
 def draw_trials(session: Session, hands: str | None, sigma: float, trials: int) -> Objective:
-    """Make trials with noise around the corrective process's postures until none is left; return
-    the objective, which keeps the best trial. ``hands``: a hand sequence, or None for the one with
-    which the corrective process alone does best. ``sigma``: SD of the noise, length unit and rad.
-    ``trials``: most trials, those of the corrective process alone among them. Raises BudgetError if
-    no trial is left, and MethodError if the corrective process completes no hand sequence."""
+    """Make trials with noise around the postures of the corrective process until none is left;
+    return the objective, which keeps the best trial. ``hands``: a hand sequence, or None for the
+    one with which the corrective process alone does best. ``sigma``: SD of the noise, length unit
+    and rad. ``trials``: most trials, those of the corrective process alone among them. Raises
+    BudgetError for no trial at all, MethodError if the process completes no hand sequence."""
     problem = Objective(session, hands, trials=trials)
     with suppress(BudgetError):
         while True:
@@ -73,12 +73,12 @@ class RandomSearchHands(Method):
     Parameters = RandomSearchHandsParameters
 
     def most_together(self) -> int:
-        """Return how many runs one job performs at most (:func:`runs_at_once`)."""
+        """Return the largest number of runs that one job performs (:func:`runs_at_once`)."""
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
-        """Make trials with one hand sequence after the other; return the movements of the best
-        trial. Raises MethodError if the corrective process completes no hand sequence."""
+        """Make equal shares of the trials with one hand sequence after the other; return the
+        movements of the best trial. Raises MethodError if the corrective process completes none."""
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
@@ -106,9 +106,9 @@ class RandomSearch(RandomSearchHands):
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left; return the movements of the best trial. Raises
-        MethodError if there is no trial to make, or if the corrective process alone misses a
-        goal."""
+        """Make trials with one hand sequence until none is left; return the movements of the best
+        trial. Raises MethodError if there is no trial to make, or if the corrective process alone
+        misses a goal."""
         parameters: RandomSearchParameters = self.parameters
         with session.solving():
             try:

@@ -72,7 +72,9 @@ class RecedingHorizon(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
     def solve(self, session: Session) -> Result:
-        """Plan, make a movement, and plan again, until the last goal is in view."""
+        """Plan the movements to the goals in view, keep the first, and plan again from its end;
+        when the last goal is in view, keep all. Return the movements kept. Raises MethodError if no
+        path is found."""
         task, parameters = session.reveal(*self.information), self.parameters
         rng = np.random.default_rng(0)  # the same graphs for all seeds
         windows: list[ShortestPlans] = []

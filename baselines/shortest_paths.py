@@ -32,7 +32,7 @@ class ShortestPlans(NamedTuple):
 
     @property
     def ranked(self) -> list[PathPlan]:
-        """The plans, the shortest first."""
+        """The shortest plan of each hand sequence in a new list, in the order of their length."""
         return sorted(self.by_hands.values(), key=lambda plan: plan.cost)
 
 
@@ -53,9 +53,9 @@ def shortest_plans(
     *,
     still: bool,
 ) -> ShortestPlans:
-    """Solve from each start, and return the shortest plan of each hand sequence; ``still`` holds
-    the arm that is not chosen. The session counts the effort. Raises MethodError where no solve
-    finds a path."""
+    """Solve from each start, a hand sequence and configurations ``(G, dof)``; return the shortest
+    plan of each hand sequence. With ``still`` the arm that is not chosen for a goal does not move.
+    The session counts the effort. Raises MethodError if no solve finds a path."""
     best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
     for hands, start in starts:
@@ -76,10 +76,10 @@ def shortest_plans(
 def fewest_ticks(
     session: Session, task: Task, problem: TrajectoryProblem, plans: ShortestPlans
 ) -> PlanInTicks:
-    """Round all plans to whole ticks in every way, with and without goals that are hit without a
-    movement; return the result with the fewest ticks when executed. Plans are tried by length; of
-    equal results the first is kept, unless another that is executed has fewer corrections. Raises
-    MethodError where no rounding can be solved. The session counts the effort."""
+    """Round all plans to whole ticks in every way that may be best, with and without goals that are
+    hit without a movement; return the rounding with the fewest ticks when executed. Plans are tried
+    by length; of equal roundings the first with the fewest corrections among those executed is
+    kept. The session counts the effort. Raises MethodError if no rounding can be solved."""
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 

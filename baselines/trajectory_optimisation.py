@@ -80,9 +80,9 @@ def cheapest_plan(
     *,
     stops: bool = False,
 ) -> PathPlan:
-    """Return the cheapest plan that converges from one of ``starts``, each ``(G, dof)``; the last
-    plan, which has not converged, if none does. ``stops`` as in
-    :meth:`~.trajectory_problem.TrajectoryProblem.solve`."""
+    """Solve from each of ``starts``, configurations ``(G, dof)``; return the cheapest plan that
+    converged, or, if none did, the plan of the last start. ``stops`` as in
+    :meth:`~.trajectory_problem.TrajectoryProblem.solve`. The session counts the effort."""
     plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
@@ -99,8 +99,8 @@ class TrajectoryOptimisation(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
-        """Plan for each hand sequence, and return the movements of the plan of least cost. Raises
-        MethodError if no plan converges."""
+        """Plan for each hand sequence, and return the movements of the plan with the least cost by
+        the method's own cost. Raises MethodError if no plan converges."""
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
@@ -156,9 +156,9 @@ class TrajectoryOptimisation(Method):
         return Result(solution, details)
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
-        """Return starts, each ``(G, dof)``, for every hand sequence: the cheapest chain of each
-        graph, the same chain with the other arm in steady motion, and the first start with noise.
-        Raises MethodError if a goal has no posture."""
+        """Return a list of starts, each ``(G, dof)``, for each hand sequence planned: the cheapest
+        chain of each graph, the same chain with the other arm in even motion, and copies of the
+        first start with noise. Raises MethodError if a goal has no posture."""
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(
@@ -254,12 +254,11 @@ METHODS: tuple[type[Method], ...] = (PathLength, SquaredDisplacement, Accelerati
 def path_movements(
     session: Session, task: Task, instance: Instance, path: list[Array]
 ) -> tuple[Movement, ...]:
-    """Return the movements along a path of one piece ``(k, dof)`` per goal, each with all of its
-    piece.
+    """Return movements of kind path, one per goal, along ``path``, a piece ``(k, dof)`` per goal.
 
     A smooth path goes on towards a goal's inside after its rim is hit; the rest of the piece then
-    begins the next movement, so that the whole path is followed: but for joints held on the way to
-    the next goal, which stay where they are.
+    begins the next movement, so that the whole path is followed, except by joints held on the way
+    to the next goal, which stay where they are. The session counts the evaluations.
     """
     paths: list[Movement] = []
     here, rest = np.array(task.q0), np.empty((0, task.robot.dof))

@@ -102,16 +102,16 @@ class Instance:
 
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
-        """Return the instance of a task with a hand for each goal, radius in length units;
-        ``still`` as in :func:`held_joints`."""
+        """Return the instance of a task with a hand for each goal; each hand is to end within
+        ``radius``, length unit, of its goal's centre. ``still`` as in :func:`held_joints`."""
         held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
 
 
 def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np.bool_]:
-    """Return True for the joints that cannot move on the way to each goal, shape ``(G, dof)``:
-    locked base coordinates and arms that the task does not use. With ``still`` the arm whose hand
-    is not chosen for the goal cannot move either."""
+    """Return True for the entries of a configuration that cannot move on the way to each goal,
+    shape ``(G, dof)``: locked base coordinates and arms of hands that the task does not use; with
+    ``still`` also the arm whose hand is not chosen for the goal."""
     held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
     held[:, ["xy".index(axis) for axis in task.locked_base]] = True
     for goal, hand in enumerate(hands):
@@ -227,14 +227,14 @@ class TrajectoryProblem:
         deep: Sequence[int] = (),
     ) -> PathPlan:
         """Return a locally cheapest plan, sought from one configuration per goal, ``start``
-        ``(G, dof)``.
+        ``(G, dof)``. A plan has converged if IPOPT says so and every constraint holds; a plan that
+        has not converged is returned as well.
 
-        Only for path length: ``lengths`` ``(G,)`` are upper bounds of the joint-space lengths
-        of the segments, NaN where a length is free. With ``deep`` (goals, from 0) the path is
-        not made short; the least depth of the hands inside the discs of these goals is made as
-        large as ``lengths`` allow. Only for smoothness costs: ``stops`` holds all rates at the
-        goals at 0. A plan has converged if IPOPT says so and every constraint holds; one that
-        has not is returned as well.
+        Only for path length: ``lengths`` ``(G,)`` are upper bounds of the joint-space lengths of
+        the segments, NaN for a free length; None frees all. With ``deep`` (goals, from 0) the path
+        is not made short; the least depth of the hands inside the discs of these goals is made as
+        large as ``lengths`` allow. Only for costs with rates: ``stops`` holds all rates at the
+        goals at 0.
         """
         goals, at = self.goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -302,12 +302,12 @@ class TrajectoryProblem:
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
-    """Cost of the best segment between given end states, which is a polynomial of the joints.
+    """Return the least cost of a segment between given end states, as a CasADi expression.
 
-    ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals
-    are written out in the end states, so that nothing is discretised. ``step``: change of the
-    joints, ``(dof,)``; ``time`` above 0, which squared displacement ignores; ``rates``: velocities
-    of both ends, and accelerations for the jerk, ``(dof,)`` each.
+    ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals are
+    written out in the end states, so that nothing is discretised. ``step``: change of the joints,
+    ``(dof,)``; ``time``: duration above 0, which squared displacement ignores; ``rates``: pair of
+    the velocities at both ends, and for jerk pair of the accelerations, ``(dof,)`` each.
     """
     if cost == "squared-displacement":
         return casadi.sumsqr(step)
@@ -328,10 +328,8 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
-    """Integrals of the squared jerk of a hand over each segment, a column of as many.
-
-    The joints follow quintics between the end states, as for minimum jerk.
-    """
+    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
+    The joints follow quintics between the end states, as for minimum jerk."""
     powers = np.arange(6)
     q = [casadi.SX.sym(f"q{d}", robot.dof) for d in range(4)]  # and its derivatives
     t = casadi.SX.sym("t")
@@ -366,8 +364,8 @@ def _hand_jerks(
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
-    """Return the compiled problem of these arguments; the last 32 problems are kept in this
-    process."""
+    """Return the compiled problem for a robot, its hands, a number of goals and a cost; a process
+    keeps the last 32 problems."""
     with _ONE_AT_A_TIME:
         return _built(robot, hands, goals, cost)
 
@@ -376,15 +374,16 @@ _built = lru_cache(maxsize=32)(TrajectoryProblem)
 
 
 def segment_lengths(configurations: Array) -> Array:
-    """Joint-space distances from each configuration ``(k, dof)`` to the next, shape ``(k - 1,)``,
-    length unit and rad together."""
+    """Return the joint-space distance from each of k configurations ``(k, dof)`` to the next, shape
+    ``(k - 1,)``, length unit and rad together."""
     return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:
-    """Return configurations along a plan with rates, one piece ``(samples, dof)`` per goal, at
-    equal steps in time; the last of a piece is the configuration at the goal. Hermite cubics (one
-    rate) or quintics (two) between start and goals."""
+    """Return a list of configurations along a plan with rates, a piece ``(samples, dof)`` per goal,
+    at equal steps in time. The last row of a piece is the configuration at the goal; the start is
+    left out. Between goals: Hermite cubics (plans with velocities) or quintics (accelerations too).
+    """
     from scipy.interpolate import BPoly  # slow, and a command that names methods needs none
 
     corners = np.vstack([plan.instance.q0, plan.configurations])

@@ -49,14 +49,14 @@ class Attempts:
         self._targets: Array = np.empty(0)
 
     def by_correction(self, hands: str) -> Trials:
-        """Make one trial without targets: the corrective process reaches each goal with the given
-        hand."""
+        """Make one trial without targets, in which the corrective process alone goes to each goal,
+        with the hands of a sequence such as ``"RRLR"``; return its results (:meth:`by_targets`)."""
         shape = (1, self._session.goals_count, self._session.dof)
         return self.by_targets(hands, np.full(shape, np.nan))
 
     def around(self, hands: str, values: Array) -> Trials:
-        """Make N trials with one hand sequence; ``values`` ``(N, n)`` are targets of the n explored
-        joints of all goals. The other joints have no target and keep still."""
+        """Make N trials with one hand sequence, and return their results. ``values`` ``(N, n)`` are
+        targets of the n explored joints, goal by goal; other joints keep still."""
         targets = np.full((len(values), *self.explored.shape), np.nan)
         targets[:, self.explored] = values
         return self.by_targets(hands, targets)
@@ -65,9 +65,9 @@ class Attempts:
         self, hands: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
         """Make N trials with targets of shape ``(N, G, dof)`` and one hand sequence, or a hand
-        sequence for each trial; remember the best trial, and return the results of all.
+        sequence for each trial; remember the best trial, and return the results of all trials made.
 
-        ``until``, shape ``(N,)``: the last trial made is the first whose reward exceeds its entry.
+        ``until``, shape ``(N,)``: the first trial whose reward exceeds its entry is the last made.
         """
         trials = self._session.trials(hands, targets, until=until)
         rewards = trials.rewards
@@ -81,8 +81,8 @@ class Attempts:
         return trials
 
     def result(self, **details: Any) -> Result:
-        """Return the movements of the best trial, with its number (from 0) and ``details``. Raises
-        MethodError if no trial hit every goal."""
+        """Return the movements of the best trial, and as details its number (from 0) and
+        ``details``. Raises MethodError if no trial was made, or none hit every goal."""
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
         if not self.hands:

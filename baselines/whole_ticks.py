@@ -40,7 +40,7 @@ class TickPlan:
 
     @property
     def ticks(self) -> int:
-        """Number of ticks: k + 1 for a movement of k steps, 0 for none."""
+        """Number of ticks of all movements: k + 1 for a movement of k steps, 0 for no movement."""
         return sum(steps + 1 for steps in self.steps if steps)
 
 
@@ -55,16 +55,17 @@ class Rounding:
         self._step = session.model.step
 
     def nearest(self, plan: PathPlan) -> TickPlan | None:
-        """Return the plan with every segment but the last rounded to the nearest step, and the last
-        one up. At a shortest path the total does not change with the division to first order, so
-        this is nearly always the least number of ticks. None where a solve fails."""
+        """Return the plan with the length of each segment but the last rounded to the nearest whole
+        number of steps, the last rounded up; None if a solve fails. At a shortest path the total
+        does not change with the division to first order, so this has nearly always fewest ticks."""
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
     def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Yield the plan with all but the last segment rounded up or down, and the last one up, the
-        nearest roundings first. All roundings with up to seven goals, else the nearest
-        ``MOST_ROUNDINGS``; those whose solve fails are left out."""
+        """Yield roundings of a plan to whole steps, the nearest first: each segment but the last is
+        rounded up or down, the last up. Goals ``merged`` (from 0) are hit without a movement. Of
+        the nearest 64 roundings, all for up to seven goals, those that can be solved are yielded.
+        """
         exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
         ranked = sorted(
@@ -77,7 +78,8 @@ class Rounding:
                 yield rounded
 
     def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return a lower bound of the ticks of every rounding of this plan."""
+        """Return a number of ticks that no rounding of a plan falls below, if the goals ``merged``
+        (from 0) are hit without a movement."""
         length = float(plan.lengths().sum())
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
@@ -85,10 +87,10 @@ class Rounding:
     def plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """Yield pairs of goals (from 0) that are hit without a movement and the shortest plan in
-        which they are, first no goals with the plan itself. Such a plan pays if its path grows by
-        less than the ticks that it saves. ``worth`` says whether a number of ticks is of interest;
-        sets of goals that cannot come to such a number are left out."""
+        """Yield pairs: a set of goals (from 0) that are hit without a movement, and the shortest
+        plan in which they are; first the empty set with ``plan`` itself. Such a plan pays if its
+        path grows by less than the ticks that it saves. ``worth`` returns whether a number of ticks
+        is of interest; sets of goals that cannot come to such a number are left out."""
         goals = len(self._instance.hands)
         able = _mergeable(task, self._instance.hands)
         waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
@@ -105,8 +107,9 @@ class Rounding:
                     waiting.append((more, merger))
 
     def divide(self, plan: PathPlan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
-        """Return the plan with these numbers of steps to all goals but the last, and the fewest to
-        the last goal; None if a solve fails."""
+        """Return a plan rounded to ``steps``, a number of steps to each goal but the last, and the
+        fewest steps to the last goal; None if a solve fails. Goals ``merged`` (from 0) are hit
+        without a movement."""
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)
         if not shortest.converged:
@@ -151,10 +154,9 @@ class Rounding:
 
 
 def _mergeable(task: Task, hands: Sequence[Hand]) -> tuple[int, ...]:
-    """Goals (0-based) that can be hit without a movement.
-
-    A goal can where its hand may be there already: at the start, or because another hand
-    hits the goal before, or because the two discs overlap.
+    """Return the goals (from 0) that may be hit without a movement, as the hand of the goal can be
+    there before: at the start, or since another hand hits the goal before, or since the discs of
+    both goals overlap.
     """
     start = task.robot.forward_kinematics(task.q0, hands[0])
     able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
@@ -174,12 +176,12 @@ def movements(
     configurations: Array,
     steps: tuple[int, ...] | None = None,
 ) -> tuple[Movement, ...]:
-    """Return the movements of an instance to one configuration per goal, ``(G, dof)``.
+    """Return a movement for each goal of an instance, to ``configurations``, shape ``(G, dof)``.
 
-    Joints that are held on the way to a goal stay where they are, also where an earlier movement
-    hit before it was where the plan has it. With ``steps`` (a number per goal, 0 for no movement)
-    each movement aims through the rim to hit after so many; where no target beyond does, it aims at
-    the plan's own configuration. The session counts the effort.
+    Joints that are held on the way to a goal stay where they are, even if an earlier movement ended
+    by a hit short of its target. With ``steps`` (a number of steps per goal, 0 for no movement) the
+    target of a movement lies beyond the rim, on the same line, so that it hits after that many
+    steps; if no such target does, it is the configuration given. The session counts the effort.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model

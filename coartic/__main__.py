@@ -4,7 +4,8 @@ from coartic.internal.interruption import catch_signals, end_if_interrupted
 
 
 def main() -> None:
-    """Run a command, which may be interrupted from now on."""
+    """Run the command that the command line asks for; after Ctrl-C or SIGTERM, clean up and exit
+    with code 130 or 143."""
     catch_signals()
     try:
         from coartic.cli import main as run_command

@@ -59,7 +59,8 @@ class Recorded:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """Specification of the environment: a task, its name or its path, as plain data."""
+        """Specification of the environment, in which ``task`` and ``model`` are kept as plain data:
+        a name, a path or a dictionary; None if none was set."""
         return self._spec
 
     @spec.setter
@@ -180,8 +181,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self._rngs: list[Any] = [None] * num_envs
 
     def task_at(self, number: int) -> Task:
-        """Return a task by its number in ``tasks``, from 0; it is loaded on the first call. Raises
-        ValueError for another number."""
+        """Return task ``number``, from 0, of ``tasks``; the first call loads the task into the
+        state of the robots. Raises ValueError for another number."""
         check_limits("number", number, 0, len(self.tasks) - 1)
         task, state = as_task(self.tasks[number]), self.state
         if state.kinds[number] < 0:
@@ -207,13 +208,14 @@ class TaskVectorEnv(Recorded, VectorEnv):
         return task
 
     def _places_of(self, robot: Robot) -> NDArray[np.int64]:
-        """Return the indices of a robot's entries among the entries of the widest robot's
-        configurations."""
+        """Return the index, in a configuration of the robot with the most links, of each entry of a
+        configuration of ``robot``, shape ``(dof,)``."""
         left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
         return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self._widest.most_links + right])
 
     def _begin(self, rows: RowIndex, numbers: ArrayLike) -> None:
-        """Put the robots ``rows`` at the start of the tasks of these numbers, and observe."""
+        """Put each of the robots ``rows`` at the start of the task of its number (from 0) in
+        ``numbers``; fill in the observations of all robots."""
         state = self.state
         state.task[rows], state.goal[rows], state.going[rows] = numbers, 0, True
         for number in {*state.task[rows].tolist()}:
@@ -222,8 +224,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         observe(*self.state)
 
     def _move(self, actions: Array, rows: RowIndex = slice(None)) -> None:
-        """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
-        of these rows.
+        """Let all robots whose trial goes on reach for their next goal; the results go into the
+        state, in place. ``actions`` ``(N, A)`` are of robots ``rows``; others keep their actions.
 
         Raises ValueError for actions of another shape, or that are not finite.
         """
@@ -238,8 +240,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         count_trials(begun)
 
     def infos(self) -> dict[str, Any]:
-        """Return ``task``, the name of each robot's task, and ``is_success``, whether it has hit
-        all goals: arrays of shape ``(N,)``."""
+        """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
+        and ``is_success``, True where the robot has hit all goals of its trial."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
@@ -249,10 +251,10 @@ class TaskVectorEnv(Recorded, VectorEnv):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin all trials, and return observations and infos.
-
-        ``seed``: a seed for each robot, or one, from which robot i (from 0) has ``seed + i``; None
-        keeps the generators. Raises ValueError for any option, and for other seeds.
+        """Begin a trial of each of the N robots; return observations ``(N, O)`` and the dictionary
+        of infos. ``seed``: a list of a seed for each robot, or one number, with which robot i (from
+        0) has ``seed + i``; a robot with None keeps its random generator, which draws the tasks.
+        Raises ValueError for any option, and for seeds that are not whole numbers from 0.
         """
         _check_no_options(options)
         if isinstance(seed, Iterable):
@@ -274,10 +276,11 @@ class TaskVectorEnv(Recorded, VectorEnv):
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Let each robot reach for its next goal by its row of ``actions``, shape ``(N, A)``.
 
-        Returns observations, rewards, which trials have ended, False for each (none is truncated)
-        and infos. A trial that has ended starts again in this step: its observation is the first of
-        the next trial, and ``final_obs`` of the infos has its last. Raises ResetNeeded before the
-        first reset, and ValueError for actions of another shape or that are not finite.
+        Returns observations ``(N, O)``, rewards ``(N,)``, ticks below 0, True where the trial has
+        ended, ``(N,)``, False for each (none is truncated), ``(N,)``, and a dictionary of infos. A
+        trial that has ended starts again in this step: its observation is the first of the next
+        trial; ``final_obs`` of the infos has its last. Raises ResetNeeded before the first reset,
+        and ValueError for actions of another shape or that are not finite.
         """
         state = self.state
         if not state.going.all():
@@ -327,8 +330,9 @@ class TaskEnv(Recorded, gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin a trial of a task drawn with the seed; return observation and info. Raises
-        ValueError for any option."""
+        """Begin a trial, of the task or of a random instance of the family; return observation
+        ``(O,)`` and info. With ``seed`` None the generator goes on. Raises ValueError for any
+        option, and for a seed that is no whole number from 0."""
         super().reset(seed=_whole_seed(seed))
         _check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
@@ -337,8 +341,9 @@ class TaskEnv(Recorded, gymnasium.Env):
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Reach for the next goal; return observation, reward, whether the trial has ended, False
-        (no trial is truncated) and info. Raises ResetNeeded if the trial had ended before."""
+        """Reach for the next goal by an action ``(A,)``; return observation ``(O,)``, reward (ticks
+        below 0), whether the trial has ended, False (no trial is truncated) and info. Raises
+        ResetNeeded if the trial had ended before or no trial was begun."""
         state = self.robots.state
         if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
@@ -346,8 +351,8 @@ class TaskEnv(Recorded, gymnasium.Env):
         return state.seen[0].copy(), state.rewards.item(), not state.going[0], False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return the robot and its goals as a picture ``(400, 600, 3)``, in which goals that are
-        hit are filled; None without ``render_mode``."""
+        """Return a picture of the robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
+        so far are filled; None if the environment was made without ``render_mode``."""
         if self.render_mode is None:
             return None
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -373,13 +378,14 @@ class TaskEnv(Recorded, gymnasium.Env):
 
 
 def _check_no_options(options: Mapping[str, Any] | None) -> None:
-    """Refuse options of a reset, which has none. Raises ValueError for any."""
+    """Raise ValueError if a reset has options; None and an empty mapping pass."""
     if options is not None and not (isinstance(options, Mapping) and not options):
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 
 
 def _whole_seed(seed: Any) -> int | None:
-    """Return a seed: a whole number from 0, or None. Raises ValueError for anything else."""
+    """Return a seed, a whole number from 0, as an int, or None for None. Raises ValueError for
+    anything else."""
     if seed is None:
         return None
     check_limits("seed", seed, 0, MOST_RUN_SEED)
@@ -387,29 +393,13 @@ def _whole_seed(seed: Any) -> int | None:
 
 
 def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
-    """Return robots side by side as environments of Stable-Baselines3.
+    """Make ``num_envs`` robots side by side a ``VecEnv`` of Stable-Baselines3.
 
-    Parameters
-    ----------
-    env : str
-        Id of an environment, such as ``"coartic/TwoArmed1-v2"``.
-    num_envs : int
-        Number of robots.
-    **options
-        Those of :class:`TaskVectorEnv`.
-
-    Returns
-    -------
-    coartic.sb3.RobotEnvs
-        A ``VecEnv``: trials start again by themselves, actions are clipped, and rewards are shares
-        of what the corrective process takes.
-
-    Raises
-    ------
-    ValueError, TypeError
-        The id is not one of coartic's, or an option is wrong.
-    CoarticError
-        Stable-Baselines3 is not installed.
+    ``env`` is an id, such as ``"coartic/TwoArmed1-v2"``; ``options`` are options of
+    :class:`TaskVectorEnv`. Trials start again by themselves, actions are clipped, and rewards are
+    minus the ticks, as shares of what the corrective process takes for the whole trial. Raises
+    ValueError or TypeError for an id of another package and for a wrong option, and CoarticError
+    if Stable-Baselines3 is not installed.
     """
     try:
         from coartic.sb3 import RobotEnvs
@@ -493,14 +483,14 @@ def score(
 
 @checked_arguments
 def column(rewards: Iterable[float | None]) -> Array:
-    """Return rewards as a column, shape ``(K, 1)``; NaN for None."""
+    """Return K rewards as an array of shape ``(K, 1)``, with NaN for None."""
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
 
 
 def _acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a policy as a function of observations, which an agent that was trained in
-    ``VecNormalize`` sees as there. Raises TypeError for anything that is no policy, and for an
-    agent that was trained in another wrapper."""
+    """Return a function from observations to actions for a policy, a function or an agent with
+    ``predict``; an agent that was trained in ``VecNormalize`` gets observations normalised as
+    there. Raises TypeError for any other object and for an agent trained in another wrapper."""
     if hasattr(policy, "predict"):
         normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
         get_env = getattr(policy, "get_env", lambda: None)
@@ -532,9 +522,10 @@ def _rollout(
     tasks: int,
     trials: int = 1,
 ) -> Array:
-    """Let a policy make trials on each task of an environment with these options.
+    """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make ``trials``
+    trials on each of ``tasks`` tasks of a :class:`TaskVectorEnv` with these options.
 
-    Returns rewards, shape ``(tasks, trials)``; NaN where a trial failed.
+    Returns the total rewards, ticks, shape ``(tasks, trials)``; NaN where a trial failed.
     """
     rows = np.arange(trials * tasks)
     robots, totals = TaskVectorEnv(len(rows), **options), np.zeros(len(rows))
@@ -548,8 +539,9 @@ def _rollout(
 
 @checked_arguments
 def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
-    """Return the table of :func:`score` from the rewards of policies on K tasks, shapes
-    ``(K, trials)``, NaN where a trial failed, and the best known rewards, shape ``(K, 1)``, NaN
+    """Return a table with reward, gap and share of completed trials, a row for each policy and one
+    for the best known (:func:`score`). ``rewards``, by policy, have shapes ``(K, trials)`` for K
+    tasks, NaN where a trial failed; ``best`` has the best known rewards, shape ``(K, 1)``, NaN
     where none is known. Raises ValueError for other shapes."""
     best, rewards = np.asarray(best), {name: np.asarray(each) for name, each in rewards.items()}
     shapes = [earned.shape for earned in (best, *rewards.values())]
@@ -574,12 +566,10 @@ def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
 
 
 def _options_of(env: Any) -> dict[str, Any]:
-    """Return ``task``, ``ahead`` and ``model`` of an environment of this package, or the
-    options with which an id is registered. The dictionary is no copy: do not change it.
-
+    """Return the options ``task``, ``ahead`` and ``model`` of an environment of this package, or
+    the options with which an id is registered, as a dictionary, not a copy: do not change it.
     Raises ValueError for an unknown id, and TypeError for anything else and for an environment
-    in a wrapper that is not among :data:`ADDED`.
-    """
+    in a wrapper that is not among :data:`ADDED`."""
     if isinstance(env, str):
         if env not in IDS:
             raise ValueError(unknown("environment", env, IDS))
@@ -609,7 +599,8 @@ def _without_wrappers(env: Any, name: str, known: Any = None) -> Any:
 
 
 def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Return the reward of a method's solution of a task; None without one, or if it fails."""
+    """Return the reward, ticks, of a method's solution of a task when executed; None if the method
+    does not apply, finds no solution, or the solution misses a goal."""
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
         return execute(task, result.solution, model=model).reward

@@ -85,8 +85,9 @@ class VectorState(NamedTuple):
         ahead: int,
         reach: float,
     ) -> VectorState:
-        """Return a state in which no task is loaded. ``shape`` is ``(N, T, G)``, numbers of
-        environments, tasks and, at most, goals; ``entries`` is the length of an observation."""
+        """Return a state in which no task is loaded and no trial goes on. ``shape`` is ``(N, T,
+        G)``, the numbers of environments, of tasks and, at most, of goals; ``entries`` is the
+        length of an observation; the other arguments are fields (:class:`VectorState`)."""
         count, tasks, goals = shape
         batch = batch_for(robot)
         return cls(
@@ -117,8 +118,8 @@ class VectorState(NamedTuple):
 
 @inner
 def _squared_distance(run: Any) -> float:
-    """Return the squared joint distance of a run from its target, the solution of the corrective
-    process; infinite without a solution."""
+    """Return the squared joint-space distance from a run's configuration to its target, which the
+    corrective process found; infinite if the process did not converge."""
     square = 0.0 if run.converged else math.inf
     for j in range(len(run.q)):
         square += (run.target[j] - run.q[j]) ** 2
@@ -127,13 +128,12 @@ def _squared_distance(run: Any) -> float:
 
 @inlined
 def aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
-    """Phase 2, *aim*: choose the hand that the corrective process brings to the goal by the shorter
-    path, or, if the action says so, the other one, and the solution of the process, or the present
-    posture without a solution, plus the action.
+    """Set hand and target of ``run``, in place, from an action: phase 2, *aim*.
 
-    ``run`` is changed in place; ``other`` is the run of the other hand, with two hands.
-    ``action[0] > 0.5`` takes the other hand; the rest, clipped to ±1, is scaled by
-    ``state.reach``.
+    ``run`` and, with two hands, ``other`` have the solutions of the corrective process with one
+    hand each. The hand is the one whose solution is nearer in joint space; with ``action[0] > 0.5``
+    it is the other hand. The target is the solution of this hand, or, if the process failed, the
+    present posture, plus ``state.reach`` times the entries of the joints, clipped to ±1.
     """
     if len(state.sides) > 1:
         is_nearer = _squared_distance(other) < _squared_distance(run)
@@ -151,7 +151,8 @@ def aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -
 
 @inlined
 def _step_lot(count: int, robot: Any, state: Any) -> None:
-    """Make a step of the first ``count`` robots in ``state.indices``, at most :data:`SLOTS`."""
+    """Let the first ``count`` robots in ``state.indices``, at most :data:`SLOTS`, reach for their
+    next goal; change ``q``, ``goal``, ``rewards`` and ``going`` of ``state`` in place."""
     for h in range(len(state.sides)):
         for i in range(count):
             n, run = state.indices[i], state.runs[h, i]
@@ -182,8 +183,9 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
 
 @entry
 def observe(*fields: Any) -> None:
-    """Fill in ``seen`` of a :class:`VectorState`, whose entries are ``fields``: whether there is a
-    goal, places of goals from the base, joints, and, where there is room, which joints can move."""
+    """Fill in ``seen``, in place, of the :class:`VectorState` with entries ``fields``: for each
+    robot 1 where a next goal exists, x and y of these goals from the base, the joints, and, if
+    observations are long enough, 1 for each joint that can move."""
     state = VectorState(*fields)
     goals, joints = state.ahead + 1, len(state.joints)
     for n in range(len(state.task)):
@@ -206,8 +208,8 @@ def step_robots(*fields: Any) -> int:
     """Let all robots whose trial goes on reach for their next goal; change the arrays ``fields``,
     the entries of a :class:`VectorState`, in place.
 
-    Returns the number of trials that begin; -1 - n, without a movement, if the action of robot n is
-    not finite.
+    Returns the number of trials that make their first step; -1 - n, without a movement, if the
+    action of robot n (from 0) is not finite.
     """
     state = VectorState(*fields)
     last, begun = len(state.task) - 1, 0

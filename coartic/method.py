@@ -163,8 +163,8 @@ class Meter:
     that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add each count to the counter of that name, not to the times. Signs and sizes are
-        not checked."""
+        """Add each count to the counter of that name (not to the times), in place. Neither the sign
+        of a count nor the sum is checked, nor a budget."""
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 
@@ -175,7 +175,7 @@ MOST_COUNT = 2**63 - 1
 
 
 def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
-    """Pack rewards of trials as a session keeps them, in 8 bytes each."""
+    """Return rewards of trials as an array of integers of 8 bytes, :data:`NO_REWARD` for None."""
     return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
 
 
@@ -206,18 +206,19 @@ class Outline(NamedTuple):
 
     @property
     def initial_is_policy(self) -> bool:
-        """Return whether the initial hands are a policy."""
+        """True if ``initial_hands`` names a policy that finds the hands, not a hand sequence."""
         return self.initial_hands in INITIAL_POLICIES
 
     @property
     def too_many_sequences(self) -> str | None:
-        """Why the hand sequences cannot all be tried one by one; None where they can."""
+        """A sentence that the task has more than 4096 hand sequences, too many to try one by one;
+        None if it has not."""
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
 @checked_arguments
 def outline_of(task: Task) -> Outline:
-    """Return the outline of a task."""
+    """Return the properties of a task by which a method says whether it applies to the task."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
@@ -262,12 +263,12 @@ class Session:
 
     @property
     def task_name(self) -> str:
-        """Name of the task."""
+        """Name of the task, such as ``"ascending"``."""
         return self._task.name
 
     @property
     def goals_count(self) -> int:
-        """Number of goals."""
+        """Number of goals of the task, G."""
         return len(self._task.goals)
 
     @property
@@ -277,12 +278,12 @@ class Session:
 
     @property
     def initial_hands(self) -> str:
-        """Hand sequence, or policy, that the task names for a first solution."""
+        """Hand sequence of trial 0, such as ``"RRRR"``, or name of a policy that finds one."""
         return self._task.initial_hands
 
     @property
     def locked_base(self) -> tuple[str, ...]:
-        """Base coordinates that cannot move."""
+        """Base coordinates that cannot move: ``"x"``, ``"y"``, both or none."""
         return self._task.locked_base
 
     @property
@@ -292,7 +293,7 @@ class Session:
 
     @property
     def dof(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom, the length of a configuration."""
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
@@ -317,29 +318,29 @@ class Session:
     def robot(self) -> Robot:
         """The robot, with lengths of links and places of shoulders. Needs ``kinematic model``.
 
-        Evaluations of it, or of another library's model of it, are counted with :meth:`spend`.
+        The method counts evaluations of it, or of another library's model, with :meth:`spend`.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Return :meth:`Robot.symbolic_hand`, a CasADi expression. Needs ``kinematic model``.
-
-        What a solver evaluates of it is counted with :meth:`spend`.
-        """
+        """Return the position of a hand in ``q`` as a CasADi expression
+        (:meth:`Robot.symbolic_hand`). Needs ``kinematic model``. The method counts evaluations of
+        it with :meth:`spend`."""
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot.symbolic_hand(q, hand)
 
     @property
     def used(self) -> frozenset[Information]:
-        """The declared information that the method has used so far."""
+        """Set of the declared information that the method has used so far."""
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Note a use of the corrective process if a corrective movement has no target.
+        """Note a use of the corrective process if a corrective movement of a solution has no
+        target: the corrective process finds the target.
 
-        Raises UndeclaredError if the method does not declare the corrective process, and
-        SolutionError for what is no sequence.
+        Raises UndeclaredError if the method does not declare it, and SolutionError if the solution
+        is no sequence. Nothing else is checked.
         """
         if not isinstance(solution, (tuple, list, Sequence)):  # in the order of their speed
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
@@ -378,8 +379,9 @@ class Session:
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
-        """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1); count its
-        iterations, Jacobians and evaluations. Needs ``corrective process``."""
+        """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1), and return
+        the configuration that it finds; no movement is made. Count its iterations, Jacobians and
+        evaluations. Needs ``corrective process``."""
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
         correction = correct(
@@ -398,8 +400,8 @@ class Session:
         return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
-        """Make one physical trial; count it, its ticks and its corrections. Needs ``reward by
-        trial``.
+        """Make one physical trial of a solution; count it and what it takes; return the execution.
+        Needs ``reward by trial``.
 
         Goals that are missed are corrected, and the ticks count. Where the corrective process is
         not declared, the execution has the movements as given and no configurations. Raises
@@ -466,8 +468,8 @@ class Session:
         )
 
     def _affordable(self, count: int) -> int:
-        """Return how many of ``count`` trials the budget allows. Raises BudgetError if none is
-        left."""
+        """Return how many of ``count`` trials the budget allows: ``count``, or the number left if
+        that is less. Raises BudgetError if none is left and ``count`` is above 0."""
         left = self.trials_left
         if left is None:
             return count
@@ -482,15 +484,16 @@ class Session:
         return compiled_task(self._task, self.model)
 
     def hand_codes(self, hands: HandSequences, count: int) -> Hands:
-        """Return the hands of trials, 0 left or 1 right, shape ``(count, G)``. Raises ValueError
-        for hand sequences that do not fit the task or ``count``."""
+        """Return the hands of ``count`` trials, 0 left or 1 right, shape ``(count, G)``, from one
+        hand sequence for all or a sequence for each. Raises ValueError for hand sequences that do
+        not fit the task or ``count``."""
         return hand_codes(self._task, hands, count)
 
     def _make_trials(
         self, codes: Hands, targets: Configs, *, until: ArrayLike | None = None
     ) -> Accounts:
-        """Make trials that fit the task and the budget, as :meth:`trials` does, with hands of shape
-        ``(N, G)``."""
+        """Make and count N trials, with hands 0 or 1, ``(N, G)``, and targets ``(N, G, dof)``, and
+        return their accounts. ``until`` as in :meth:`trials`. Arguments are not checked."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]
@@ -501,12 +504,13 @@ class Session:
         return accounts
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
-        """Return the hand sequence of a first trial with these hands (by default all of the robot).
-        Needs ``corrective process`` and ``reward by trial``.
+        """Return the hand sequence of the first trial, such as ``"RRRR"``: the sequence that the
+        task names, or, if it names a policy, the one found by trials of the corrective process with
+        ``hands`` (by default all of the robot). Needs ``corrective process`` and ``reward by
+        trial``.
 
-        Where the task names a policy in place of a sequence, the trials of the search are counted
-        as ``initial_trials``: neither the trials of the method nor the budget include them.
-        Raises NotApplicableError where no sequence completes the task, or there are too many.
+        Trials of this search are counted as ``initial_trials``, not among the method's trials or in
+        its budget. Raises NotApplicableError if no sequence completes the task, or too many exist.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         chosen, spent = search_initial_hands(
@@ -524,7 +528,7 @@ class Session:
         corrections: int,
         failed: int,
     ) -> None:
-        """Count trials with these rewards, and what they took in all."""
+        """Add trials with these rewards (packed), and the sums of what they took, to the meter."""
         before, meter = len(self._rewards), self._meter
         self._rewards.frombytes(rewards.tobytes())
         meter.trials += len(self._rewards) - before
@@ -549,22 +553,22 @@ class Session:
 
     @property
     def meter(self) -> Meter:
-        """A copy of the counts so far."""
+        """The counts so far, a copy."""
         return replace(self._meter)
 
     @property
     def rewards(self) -> list[int | None]:
-        """Reward of each trial made, in order; None where it failed."""
+        """Total reward of each trial made, in order, a new list; None where a trial failed."""
         return [None if reward == NO_REWARD else reward for reward in self._rewards]
 
     # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
-        """Add to counters of :attr:`Meter.SOLVER`, by name: evaluations of a solver, and iterations
-        of a corrective process that the method runs itself, which are Jacobians, too.
+        """Add counts to the counters of these names: evaluations of a solver, and iterations of a
+        corrective process that the method runs itself, which are Jacobians, too. A method may name
+        counters of :attr:`Meter.SOLVER`, a trusted method all.
 
-        Raises ValueError for a negative count, for one beyond :data:`MOST_COUNT` in all, and for
-        one that the session keeps itself.
+        Raises ValueError for another counter, for a negative count, and for a sum beyond 2^63 - 1.
         """
         allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
@@ -575,11 +579,11 @@ class Session:
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block to ``build_s``, the set-up."""
+        """Return a context that adds the wall time of its block, s, to ``build_s``, the set-up."""
         return self._timing("build_s")
 
     def solving(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block to ``solve_s``."""
+        """Return a context that adds the wall time of its block, s, to ``solve_s``, the search."""
         return self._timing("solve_s")
 
     @contextmanager
@@ -594,10 +598,9 @@ class Session:
     # The back door of this project's compiled methods.
 
     def reveal(self, *information: Information) -> Task:
-        """Return the task itself, for compiled methods of this project that count by themselves.
-
-        Marks ``information`` as used. The method adds its counts with :meth:`spend`.
-        Raises UndeclaredError for any other method.
+        """Return the task itself, for compiled methods of this project that count by themselves,
+        with :meth:`spend`. Note ``information``, at least one item, as used. Raises UndeclaredError
+        for any other method, and for information that the method does not declare.
         """
         self._needs_trust("reveal")
         if not information:
@@ -606,9 +609,9 @@ class Session:
         return self._task
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
-        """Keep the rewards of the trials of a compiled method of this project (None for a failed
-        trial), and its time for them, s; in a batch, an equal share of the batch's time. Raises
-        UndeclaredError for any other method."""
+        """Add rewards of trials that a compiled method of this project made (None for a failed
+        trial) to :attr:`rewards`, and the time that it took, s, to ``solve_s``; no other count is
+        changed. Raises UndeclaredError for any other method."""
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))
         self._meter.solve_s += solve_s
@@ -645,19 +648,17 @@ class Method(ABC):
 
     @abstractmethod
     def solve(self, session: Session) -> Result:
-        """Find a solution. Raises MethodError if no solution is found."""
+        """Find a solution of the session's task; return the movements and details. Raises
+        MethodError if no solution is found."""
 
     def most_together(self) -> int:
-        """Return the largest number of sessions for a call of :meth:`solve_together`.
-
-        Methods that are not this project's own are given one.
-        """
+        """Return the largest number of sessions for one call of :meth:`solve_together`; methods
+        that are not this project's own are given one session, whatever they return."""
         return 1
 
     def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
-        """Solve in several sessions that differ in their seeds alone.
-
-        Returns for each the result of :meth:`solve`, or the error that it raises.
+        """Solve in several sessions that differ in their seeds alone; return for each, in order,
+        the result of :meth:`solve`, or the MethodError that it raises, as an object.
         """
         results: list[Result | MethodError] = []
         for session in sessions:
@@ -691,33 +692,13 @@ def run_method(
     """Let a method solve a task, as it does in a suite.
 
     Methods of this project are trusted to count by themselves; any other method gets the
-    information that it declares.
+    information that it declares. ``task`` is a task, its name or its file; ``seed`` is the seed of
+    the method's random numbers. There is no budget of trials, and the solution is not executed.
 
-    Parameters
-    ----------
-    method : Method
-        The method, with its parameters.
-    task : Task, str or pathlib.Path
-    seed : int
-        Seed of its random numbers.
-    model : MotionModel
-
-    Returns
-    -------
-    tuple of Result and Session
-        The solution with its details, and the session in which it was found, with its counts and
-        rewards.
-
-    Raises
-    ------
-    MethodError
-        The method finds no solution.
-    UndeclaredError
-        It uses information that it does not declare.
-    NotApplicableError
-        It does not apply to the task.
-    ValueError
-        The seed is no whole number from 0.
+    Returns the solution with its details, and the session in which it was found, with its counts
+    and rewards. Raises MethodError if the method finds no solution, UndeclaredError if it uses
+    information that it does not declare, NotApplicableError if it does not apply to the task, and
+    ValueError for a seed that is no whole number from 0.
     """
     built_in = [getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES]
     is_ours = type(method) in chain.from_iterable(built_in)

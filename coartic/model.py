@@ -40,14 +40,15 @@ class MotionModel(NamedTuple):
 
     @checked_arguments
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
-        """Return the model with tolerances that are numbers, for goals of a radius, length unit: a
-        tolerance of None becomes a tenth of it."""
+        """Return a copy of the model for goals of ``radius``, length unit: a tolerance of None (of
+        arrival or of correction) becomes a tenth of ``radius``."""
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
 
     @checked_arguments
     def tolerances(self, radius: float) -> tuple[float, float]:
-        """Return the tolerances of arrival and correction for goals of a radius, length unit."""
+        """Return the tolerances of arrival and of correction, length unit, for goals of ``radius``,
+        length unit: a tolerance of None is a tenth of ``radius``."""
         tenth, arrival, correction = radius / 10, self.arrival_tolerance, self.correction_tolerance
         return (
             tenth if arrival is None else arrival,
@@ -66,11 +67,11 @@ _BOUNDS = {
 
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """Return the model itself. Raises TypeError for what is no MotionModel, and ValueError for
-    constants with which no movement can be made.
+    """Return the model itself. Raises TypeError if it is no MotionModel, and ValueError if one of
+    its constants is out of bounds, so that no movement can be made.
 
-    ``radius`` is that of the goals, length unit; if it is given, ``correction_tolerance`` must be
-    below it.
+    ``radius`` is the radius of the goals, length unit; if it is given, ``correction_tolerance``
+    must be below it.
     """
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")

@@ -70,10 +70,10 @@ NO_COPIES = (
 
 
 def explored_joints(session: Session) -> NDArray[np.bool_]:
-    """Return which entries of a configuration methods explore at every goal, shape ``(dof,)``.
+    """Return True for the entries of a configuration that methods explore, bool, shape ``(dof,)``.
 
-    The joints are those that the learner explores under EC1 with one arm and under EC4 with two:
-    the coordinates of the base that are not locked, and both arms, whichever hand hits the goal.
+    They are the same at every goal: the coordinates of the base that are not locked, and the arms
+    of all hands of the robot, as the learner explores with one hand (EC1) or two (EC4).
     """
     mask = np.zeros(session.dof, dtype=np.bool_)
     mask[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
@@ -83,9 +83,10 @@ def explored_joints(session: Session) -> NDArray[np.bool_]:
 
 
 def sequences_of(session: Session) -> list[str]:
-    """List all hand sequences in alphabetical order, but first the one that the task names, if any.
+    """List all hand sequences of the session's task, such as ``"RRLR"``, in alphabetical order; if
+    the task names a sequence, that sequence comes first.
 
-    If there are more than 4096, the task's initial hand sequence alone.
+    If there are more than 4096 sequences, list the task's initial hand sequence alone.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -203,26 +204,25 @@ class Objective:
 
     @property
     def best_known(self) -> int | None:
-        """Lowest cost known of the task, ticks, with whatever hands and with goals of no movement.
+        """Lowest cost known of the task, ticks: of any hand sequence, also with goals that are hit
+        without a movement.
 
-        None where none is shipped: for a task of your own, for instances after the first 40 of a
-        family's test split, and for another model.
+        None where no cost is shipped: for a task of your own, for instances after the first 40 of a
+        family's test split, and for another model than the paper's.
         """
         known = self._known
         return None if known is None else -known.reward
 
     @property
     def proven(self) -> bool:
-        """True if it is proven that no solution costs less than ``best_known``."""
+        """True if it is proven that no solution costs less than ``best_known``; False without."""
         known = self._known
         return known is not None and known.proven
 
     @property
     def hand_sequences(self) -> list[str]:
-        """All hand sequences of the task, in alphabetical order, such as ``"LLLR"``.
-
-        Raises NotApplicableError where there are more than 4096.
-        """
+        """All hand sequences of the task, such as ``"LLLR"``, a list in alphabetical order. Raises
+        NotApplicableError if there are more than 4096."""
         session = self._session
         return sequences_with(session.hands, session.goals_count, session.task_name)
 
@@ -230,18 +230,18 @@ class Objective:
 
     @property
     def history(self) -> pd.DataFrame:
-        """The best cost so far, a row each time it became lower: ``evaluations``, from 0 for the
-        corrective process alone, and ``cost``, ticks."""
+        """Table of the best costs so far, a row each time the best cost fell. Columns:
+        ``evaluations``, the number made until then, 0 for the corrective process alone, and
+        ``cost``, ticks."""
         import pandas as pd  # which a worker does without
 
         return pd.DataFrame(self._better, columns=["evaluations", "cost"])
 
     def evaluations_to(self, targets: ArrayLike) -> Any:
-        """Return the number of evaluations after which the best cost was at or below targets,
-        ticks: a float, or an array of their shape; infinite for targets not reached so far.
-
-        Raises ValueError for a target that is no cost, from 0 to ``FAILED``.
-        """
+        """Return the number of evaluations after which the best cost was at or below each of
+        ``targets``, ticks: a float for one target, an array of the same shape for several; infinite
+        for a target not reached so far. Raises ValueError for a target that is not from 0 to
+        ``FAILED``."""
         wanted = real_array("targets", targets)
         if not ((wanted >= 0) & (wanted <= FAILED)).all():
             raise ValueError(
@@ -254,15 +254,16 @@ class Objective:
 
     @property
     def x0(self) -> Array:
-        """A point to begin with, shape ``(dim,)``: the postures in which the corrective process
-        alone hits the goals. Moving straight to them can cost more or less than it does."""
+        """A point to begin with, shape ``(dim,)``, a copy: the postures in which the corrective
+        process alone hits the goals. Straight movements to these postures can cost more or less
+        than the corrective process."""
         return self.configurations[self.joints].copy()
 
     @property
     def best_x(self) -> Array:
-        """The point of the best trial so far, shape ``(dim,)``, whose cost is ``best_cost``, with
-        ``best_hands`` where hands were given with points. Its targets are all NaN, the corrective
-        process alone, until a point is better."""
+        """The point of the best trial so far, shape ``(dim,)``, a copy: with the hands
+        ``best_hands`` it costs ``best_cost``. All entries are NaN until a point is better than the
+        corrective process alone."""
         return self._best_x.copy()
 
     @property
@@ -271,28 +272,13 @@ class Objective:
         return movements_of(self.best_hands, self._best_targets)
 
     def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:
-        """The movements of the trial of a point, for :func:`coartic.execute`, which then takes as
-        many ticks as the point costs. No trial is counted.
+        """Return the movements of the trial of a point, for :func:`coartic.execute`, which then
+        takes as many ticks as the point costs. No trial is counted.
 
-        Parameters
-        ----------
-        x : array_like, shape (dim,)
-            The point.
-        hands : str, optional
-            Its hand sequence, where that is not ``hands`` of this problem.
-
-        Returns
-        -------
-        tuple of Movement
-            A movement for each goal, whose target has all joints: those without an entry are where
-            they keep still.
-
-        Raises
-        ------
-        UndeclaredError
-            In a method, which has :attr:`solution`.
-        ValueError
-            The point or its hands do not fit.
+        ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
+        default ``hands`` of this problem. Each movement has a target of all joints: a joint that
+        has no entry in the point has the value at which it keeps still. Raises UndeclaredError in
+        a method, which has :attr:`solution`, and ValueError if the point or the hands do not fit.
         """
         task, point = self.task, real_array("x", x)
         if point.shape != (self.dim,):
@@ -307,10 +293,8 @@ class Objective:
         return movements_of(chosen, np.where(after, task.q0, targets))
 
     def fresh(self) -> Objective:
-        """Return the same problem with nothing evaluated and its whole budget, for another run.
-
-        Raises UndeclaredError in a method.
-        """
+        """Return a new objective of the same task and options, with no point evaluated and a budget
+        of its own, for another run. Raises UndeclaredError in a method."""
         session = Session(self.task, 0, OPTIMISER_INFORMATION, model=self._session.model)
         return Objective(session, task=self.task, **self._asked)
 
@@ -354,29 +338,17 @@ class Objective:
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
-        """Return the costs of points, which are evaluated side by side.
+        """Make a trial for each of ``points``, shape ``(N, dim)``, side by side; return the costs,
+        ticks, shape ``(N,)``.
 
-        Parameters
-        ----------
-        points : array_like, shape (N, dim)
-            Entries are finite, or NaN for all joints of a goal (the corrective process alone). An
-            entry beyond 100,000 makes the trial fail.
-        hands : str or sequence of str, optional
-            The hand sequence of all points (``"RRLR"``), or of each, whatever the hands of this
-            problem are. Joints that have no entries keep still.
+        Entries are finite, or NaN for all joints of a goal (the corrective process alone); an entry
+        beyond 100,000 makes the trial fail. Joints that have no entry in a point keep still.
+        ``hands`` is one hand sequence for all points (``"RRLR"``), or a sequence for each point; by
+        default ``hands`` of this problem.
 
-        Returns
-        -------
-        ndarray, shape (N,)
-            Their costs, ticks.
-
-        Raises
-        ------
-        BudgetError
-            Trials are not left for all of them; those that are left are made.
-        ValueError
-            The shape is another one, entries are infinite, a goal is NaN in part, or hands do not
-            fit the task.
+        Raises BudgetError if fewer trials are left than there are points: the trials that are left
+        are made, for the first points. Raises ValueError for another shape, for infinite entries,
+        for a goal that is NaN in part, and for hands that do not fit the task.
         """
         array = real_array("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
@@ -394,8 +366,8 @@ class Objective:
         return costs
 
     def _evaluate(self, points: Array, codes: Hands, costs: Array) -> None:
-        """Make a trial for each point, write its cost into ``costs``, count it, and note each new
-        best."""
+        """Make a trial for each point ``(N, dim)`` with hands ``codes`` ``(N, G)``; write costs,
+        ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and note each new best."""
         made = self._session._make_trials(codes, self._targets_of(points))
         np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self.best_cost:
@@ -408,24 +380,28 @@ class Objective:
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
-        """Note the best trial so far, whose cost is below that of each one before it."""
+        """Note a point as the best so far, evaluated as number ``evaluations`` (from 1): ``trial``
+        (from 0) is the row of its trial in ``codes`` and in ``made``."""
         self.best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
         self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
         self._better.append((evaluations, cost))
 
     def _targets_in(self, made: Accounts, trial: int) -> Configs:
-        """Targets of a trial as moved to, ``(G, dof)``."""
+        """Return a copy of the targets to which trial ``trial`` (from 0) of ``made`` moved, shape
+        ``(G, dof)``."""
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
-        """Return targets ``(N, G, dof)`` of points, NaN for joints without an entry."""
+        """Return the targets ``(N, G, dof)`` of points ``(N, dim)``; NaN for joints without an
+        entry."""
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
         return targets
 
     def _check(self, points: Array) -> None:
-        """Raises ValueError for goals that are NaN in part, and for infinite entries."""
+        """Raise ValueError if points ``(N, dim)`` have an infinite entry, or a goal that has NaN
+        for some of its joints but not for all."""
         if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
             return
         missing = (np.isnan(self._targets_of(points)) & self.joints).sum(axis=2)
@@ -445,8 +421,8 @@ class Objective:
         return self._end - self._session.trials_made
 
     def _trials_left(self, wanted: int) -> int:
-        """Return how many of the trials wanted are left. Raises BudgetError if none is, and
-        CoarticError in another process."""
+        """Return how many of ``wanted`` trials the budget allows: ``wanted``, or the number left if
+        that is less. Raises BudgetError if none is left, and CoarticError in another process."""
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
         left = self.trials_left
@@ -533,7 +509,7 @@ def problems(
     half_width : float
     model : MotionModel
     budget : int, optional
-        For each problem, as of :func:`objective`.
+        Most trials of each problem (:func:`objective`).
 
     Returns
     -------
@@ -575,8 +551,9 @@ class Optimiser(Method):
     Parameters = OptimiserParameters
 
     def solve(self, session: Session) -> Result:
-        """Optimise until the trials are used up; the solution is the best trial's. Raises
-        MethodError if there is no trial to make, none succeeds, or no point is evaluated."""
+        """Call :meth:`optimise` until it returns or the trials are used up; return the movements of
+        the best trial. Raises MethodError if there is no trial to make, if the corrective process
+        completes no hand sequence, or if no point is evaluated."""
         parameters: OptimiserParameters = self.parameters
         try:
             cost = Objective(
@@ -595,5 +572,6 @@ class Optimiser(Method):
 
     @abstractmethod
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise ``objective``, which keeps the best point; let its BudgetError pass, which ends
-        the run when no trial is left. ``rng`` is the generator of the session."""
+        """Minimise ``objective``, which keeps the best point, so that nothing is returned. Do not
+        catch its BudgetError: it ends the run when no trial is left. ``rng``: random numbers of the
+        session."""

@@ -64,11 +64,10 @@ class Arm(NamedTuple):
 
 
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
-    """Forward kinematics: fill ``xs, ys`` with shoulder, joints and hand.
+    """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand.
 
-    Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. Works on
-    anything that can be indexed and added: ``q`` is indexed by joint first.
-    Source: Craig (2004), planar serial chain.
+    Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is anything that can
+    be indexed by joint first and added; ``cos`` and ``sin`` fit its type. Source: Craig (2004).
     """
     x = q[0] + arm.shoulder_x
     y = q[1] + arm.shoulder_y
@@ -84,12 +83,11 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 
 
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
-    """Derivative of point ``tip`` of a chain by the angle of ``joint``.
+    """Return the derivatives of x and of y of point ``tip`` of an arm by the angle of ``joint``.
 
-    Index 0 is the shoulder; ``xs`` and ``ys`` are as :func:`chain` fills them.
-
-    A rotation about a joint moves the tip at right angles to the line between
-    them: a column of the geometric Jacobian, in length unit per rad.
+    In length unit per rad: a column of the geometric Jacobian. ``tip`` and ``joint`` are indices
+    in ``xs`` and ``ys``, as :func:`chain` fills them; 0 is the shoulder. A rotation about a joint
+    moves the tip at right angles to the line between them.
     """
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
@@ -133,7 +131,8 @@ class Robot:
 
     @property
     def drawn_base(self) -> tuple[float, float]:
-        """Width and height with which the base is drawn, length unit."""
+        """Width and height of the base in drawings, length unit: :attr:`base_size`, which is
+        multiplied by :attr:`scale` if it is the default."""
         width, height = self.base_size
         is_default = self.base_size == type(self).__dataclass_fields__["base_size"].default
         return (width * self.scale, height * self.scale) if is_default else (width, height)
@@ -145,12 +144,12 @@ class Robot:
 
     @cached_property
     def most_links(self) -> int:
-        """Number of links of the arm that has more of them."""
+        """Number of links of the arm that has more links."""
         return max(len(self.left_links), len(self.right_links))
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the entries of ``q``: base_x, base_y, left_1, ..., right_n."""
+        """Names of the entries of ``q``, in order: base_x, base_y, left_1, ..., right_n."""
         left = (f"left_{k + 1}" for k in range(len(self.left_links)))
         right = (f"right_{k + 1}" for k in range(len(self.right_links)))
         return ("base_x", "base_y", *left, *right)
@@ -169,14 +168,15 @@ class Robot:
         }
 
     def arm(self, hand: Hand) -> Arm:
-        """Return the arm that carries a hand. Raises ValueError for an unknown hand."""
+        """Return the :class:`Arm` of a hand: its first joint, its links and its shoulder. Raises
+        ValueError for an unknown hand."""
         try:
             return self._arms[hand]
         except (KeyError, TypeError):
             raise ValueError(f"unknown hand {hand!r}: a hand is 'left' or 'right'") from None
 
     def joints(self, hand: Hand) -> slice:
-        """Return the part of a configuration that has the joint angles of one arm:
+        """Return the slice of a configuration that holds the joint angles of a hand's arm:
         ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad."""
         arm = self.arm(hand)
         return slice(arm.first, arm.first + len(arm.links))
@@ -209,7 +209,7 @@ class Robot:
         return self._hand(*self._numpy_chain(array, hand), array)
 
     def joint_positions(self, q: ArrayLike, hand: Hand) -> Array:
-        """Compute the positions of shoulder, joints and hand of an arm.
+        """Compute the positions, x and y, of the shoulder, the joints and the hand of a hand's arm.
 
         Parameters
         ----------
@@ -251,8 +251,8 @@ class Robot:
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """Return :meth:`forward_kinematics` and :meth:`jacobian` of the same ``q``, in this order,
-        for less than both cost."""
+        """Return the positions of a hand, ``(..., 2)``, and their Jacobians, ``(..., 2, dof)``, for
+        configurations ``(..., dof)``: :meth:`forward_kinematics` and :meth:`jacobian` at once."""
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1
@@ -264,7 +264,7 @@ class Robot:
         return self._hand(xs, ys, array), result
 
     def base_outline(self, q: ArrayLike) -> Array:
-        """Return the corners of the base.
+        """Return the four corners of the base as it is drawn, x and y.
 
         Parameters
         ----------
@@ -286,9 +286,8 @@ class Robot:
         return array[..., None, :BASE_DOF] + corners
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Hand position as a CasADi expression, 2 x 1, length unit, for a CasADi ``q``, dof x 1.
-
-        Raises ValueError where ``q`` has another size, or there is no such hand.
+        """Return the position of a hand, x and y, as a CasADi expression, 2 x 1, length unit, for a
+        CasADi ``q``, dof x 1. Raises ValueError if ``q`` has another size, and for an unknown hand.
         """
         import casadi
 
@@ -317,14 +316,15 @@ class Robot:
 
     @staticmethod
     def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
-        """The end of a chain, shape ``(..., 2)``."""
+        """Return the last entries of ``xs`` and ``ys``, the hand, as an array ``(..., 2)``; ``q``,
+        ``(..., dof)``, gives the shape."""
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]
         return position
 
 
 def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
-    """Return x and y of shoulder, joints and hand (:func:`chain`)."""
+    """Return two lists, x and y of shoulder, joints and hand of an arm in ``q`` (:func:`chain`)."""
     xs: list[Any] = [None] * (len(arm.links) + 1)
     ys = [*xs]
     chain(q, arm, xs, ys, cos, sin)
@@ -332,6 +332,7 @@ def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[An
 
 
 def directions(angles: ArrayLike) -> Array:
-    """Return unit vectors, shape ``(..., 2)``, at angles from +x, rad, shape ``(...)``."""
+    """Return the unit vectors (cos, sin), shape ``(..., 2)``, of ``angles`` from +x, rad, shape
+    ``(...)``."""
     absolute = np.asarray(angles, dtype=np.float64)
     return np.stack([np.cos(absolute), np.sin(absolute)], axis=-1)

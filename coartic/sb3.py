@@ -37,7 +37,7 @@ class RobotEnvs(VecEnv):
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin all trials; return the first observations, shape ``(N, O)``."""
+        """Begin a trial in each of N environments; return the first observations, ``(N, O)``."""
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
         self._reset_seeds()
         self._lost[:], self._steps[:] = 0, 0
@@ -45,12 +45,17 @@ class RobotEnvs(VecEnv):
         return observations
 
     def step_async(self, actions: Array) -> None:
-        """Take the actions of the next subtask, shape ``(N, A)``, for :meth:`step_wait`."""
+        """Keep the actions, shape ``(N, A)``, with which :meth:`step_wait` makes the next step."""
         self._actions = actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
-        """Make the next subtask of all trials; return observations, rewards (:class:`RobotEnvs`),
-        which trials have ended, and a dictionary of infos for each trial."""
+        """Let all N robots reach for their next goal by the actions of :meth:`step_async`.
+
+        Returns observations ``(N, O)``; rewards ``(N,)``, minus the ticks as a share of what the
+        corrective process takes for the whole trial; True for trials that have ended, ``(N,)``;
+        and N dictionaries. A trial that has ended starts again at once: its observation is the
+        first of the next trial, and its dictionary has ``terminal_observation`` and ``episode``.
+        """
         costs = np.array([self._cost(task) for task in self._envs.state.task.tolist()])
         observations, rewards, ended, _, seen = self._envs.step(self._actions)
         self._lost += rewards
@@ -63,10 +68,11 @@ class RobotEnvs(VecEnv):
         return observations, np.maximum(rewards / costs, -2.0).astype(np.float32), ended, infos
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file or window is open."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of this vector environment, once for each of ``indices``."""
+        """Return a list with the value of an attribute of this vector environment, once for each of
+        ``indices`` (None: for each environment)."""
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -78,11 +84,11 @@ class RobotEnvs(VecEnv):
         raise NotImplementedError("the environments have no methods of their own")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Return False for each environment: none is wrapped."""
+        """Return a list with False for each environment, whatever ``indices``: none is wrapped."""
         return [False] * self.num_envs
 
     def _cost(self, number: int) -> float:
-        """Return the ticks of the corrective process alone on the task of this number, at least 1;
+        """Return the ticks of the corrective process alone on task ``number`` (from 0), at least 1;
         ``FAILED`` if the process fails."""
         if number not in self._costs:
             reward = initial_reward(self._envs.task_at(number), self._envs.model)

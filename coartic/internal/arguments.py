@@ -28,7 +28,8 @@ class ArgumentError(CoarticError, ValueError, TypeError):
 
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
-    """Return the function, which raises ArgumentError for an argument that its hint excludes."""
+    """Return a wrapper of the function that raises ArgumentError, before the call, for an argument
+    that its type hint excludes."""
     check = checker_of(function)
 
     @wraps(function)
@@ -40,8 +41,8 @@ def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Co
 
 
 def checker_of(function: Callable[..., Any]) -> Callable[..., None]:
-    """Return a function that raises ArgumentError for an argument that a hint of ``function``
-    excludes.
+    """Return a function that takes the arguments of ``function`` and raises ArgumentError for an
+    argument that its type hint excludes, else returns None.
 
     Arrays may be lists of numbers, but have no masked entries. ``Annotated[int, 1, 9]`` takes whole
     numbers from 1 to 9. Hints with names that only the type checker imports exclude nothing.
@@ -73,7 +74,7 @@ def checker_of(function: Callable[..., Any]) -> Callable[..., None]:
 
 
 def fits(name: str, value: Any, hint: Any) -> bool:
-    """Return whether a value is of the kind that a hint says; True for hints of other forms.
+    """Return whether a value fits a type hint; True for a hint of a form that is not known here.
 
     Raises ValueError, which calls the value ``name``, for a number out of the limits of
     ``Annotated``, an unknown text of a ``Literal``, and an array that is not of real numbers.

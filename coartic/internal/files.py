@@ -16,7 +16,8 @@ LISTING = ".coartic-files"
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file, also over another, so that it is there whole or not at all. Raises OSError."""
+    """Write a file, replacing a file of that name, so that it is there whole or not at all. Raises
+    OSError if it cannot be written."""
     part = path.with_name(f".coartic-{os.getpid()}-{path.name}")
     try:
         part.unlink(missing_ok=True)
@@ -28,10 +29,10 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files, by their paths below the folder. Files that an earlier call wrote there are
-    replaced, or removed if they are not among ``files``.
+    """Write ``files``, contents by path below the folder, which is made if it is missing. Files
+    that an earlier call wrote there are replaced, or removed if they are not among ``files``.
 
-    Raises CoarticError, before anything is written, if a file of another origin is in the way.
+    Raises CoarticError, before a file is written, if a file of another origin has such a path.
     """
     before = make_folder(folder, files)
 
@@ -51,8 +52,9 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
-    """Make a folder, and raise CoarticError now if :func:`publish` could not write files ``names``
-    there later. Returns the paths, below the folder, of files that earlier calls wrote there."""
+    """Make a folder, if it is missing; raise CoarticError now if :func:`publish` could not write
+    files ``names``, paths below the folder, there later. Returns the paths, below the folder, of
+    files that earlier calls of :func:`publish` wrote there."""
     ours, listing = set[str](), folder / LISTING
     with errors_in_words(folder):
         if os.path.lexists(folder) and not folder.is_dir():
@@ -76,38 +78,37 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
 
 
 def _check_rights(folder: Path) -> None:
-    """Raise PermissionError if no file may be made in a folder."""
+    """Raise PermissionError if this user may not make files in a folder."""
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def check_inside(folder: Path, path: Path) -> None:
-    """Raise CoarticError for a path of a folder that is a link or leads out of it by one."""
+    """Raise CoarticError if ``path``, below ``folder``, is a symbolic link, or leads out of the
+    folder by one; the path need not exist."""
     inside = Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
     if path.is_symlink() or not inside:
         raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write a single file, whole or not at all.
-
-    Raises CoarticError as :func:`check_output` does, and where the disk does not take it.
-    """
+    """Write one file, whole or not at all; over a file of that name only with ``replace``. Raises
+    CoarticError if the file may not be written (:func:`check_output`) or writing fails."""
     check_output(path, replace=replace)
     with errors_in_words(path):
         write_atomically(path, data)
 
 
 def check_ending(path: Path, endings: Collection[str]) -> None:
-    """Raise CoarticError unless a file's name has one of ``endings``, such as ``.svg`` (or its
-    capital letters)."""
+    """Raise CoarticError unless the name of a file ends in one of ``endings``, in small letters,
+    such as ``.svg``; ``.SVG`` passes, too."""
     if path.suffix.lower() not in endings:
         raise CoarticError(f"{path}: the name must end in {' or '.join(endings)}")
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raise CoarticError if a file may not be written: its folder is missing or may not be written,
-    its name is that of a folder or a link, or, without ``replace``, the file is there."""
+    """Raise CoarticError if a file may not be written: its folder is missing or not writable, its
+    path is a folder, a link or a device, or the file exists and ``replace`` is False."""
     with errors_in_words(path):
         if not path.parent.is_dir():
             raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
@@ -122,8 +123,8 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """Return the path of a file or folder, which need not exist. Raises CoarticError, which calls
-    it ``what``, for what is no text or path, for an empty name and for an impossible one."""
+    """Return the name of a file or folder, which need not exist, as a path. Raises CoarticError,
+    which calls the name ``what``, if it is neither text nor path, is empty, or is not possible."""
     if not isinstance(name, str | os.PathLike):
         raise CoarticError(f"{what} is {plain(repr(name), 80)}: needed is a text or a path")
     if isinstance(name, str) and not name.strip():
@@ -139,7 +140,8 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 @contextlib.contextmanager
 def errors_in_words(path: Path) -> Iterator[None]:
-    """Turn an OSError of this block into a CoarticError: ``path`` cannot be written."""
+    """Turn an OSError raised in the block of this context into a CoarticError that says that
+    ``path`` cannot be written, and why."""
     try:
         yield
     except OSError as error:

@@ -29,8 +29,8 @@ _words = ["Interrupted."]
 
 
 def catch_signals() -> None:
-    """From here on, what asks the process to end raises KeyboardInterrupt. What the caller of the
-    process ignores stays ignored, as ``nohup`` has it."""
+    """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
+    on. A signal that this process was started to ignore, as under ``nohup``, stays ignored."""
 
     def interrupt(number: int, _: object) -> None:
         if not _heard or time.monotonic() > _heard[-1][1] + _CLEANING_S:
@@ -46,7 +46,7 @@ def catch_signals() -> None:
 
 
 def _interrupt_again(lost: UnraisableHookArgs) -> None:
-    """Repeat an interruption that Python could not pass on.
+    """Repeat a KeyboardInterrupt that Python could not pass on; report any other lost exception.
 
     No exception leaves a destructor or the callback of a library, such as the callback by which
     LLVM loads a kernel. Python hands the exception to this hook and goes on. A signal that comes
@@ -74,7 +74,8 @@ def _interrupt_again(lost: UnraisableHookArgs) -> None:
 
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """Print a sentence if the block is interrupted; the sentence is made when that happens."""
+    """Have the process print a sentence when it ends (:func:`end_if_interrupted`) if the block of
+    this context is interrupted. ``sentence`` is called then, and returns the text."""
     try:
         yield
     except KeyboardInterrupt:
@@ -83,8 +84,8 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 
 
 def end_if_interrupted() -> None:
-    """End the process where a signal has been heard: 130 after Ctrl-C, else 143. From here on none
-    is heard: the command has ended."""
+    """Exit if a signal has interrupted this process: print the sentences on stderr, and exit with
+    code 130 after Ctrl-C, else 143. From now on signals are ignored: the command has ended."""
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     if _heard:
@@ -95,8 +96,8 @@ def end_if_interrupted() -> None:
 
 @contextmanager
 def blocked_signals() -> Iterator[None]:
-    """Block the signals :data:`ENDING` in this block, also for processes that begin in it: Ctrl-C
-    reaches all processes of a terminal."""
+    """Block the signals :data:`ENDING` in the block of this context, also for processes that start
+    in it, because Ctrl-C reaches all processes of a terminal."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -11,8 +11,8 @@ from typing import Any
 def import_lazily(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of a package whose names come from the modules
-    ``homes``: a name is imported on first use."""
+    """Return the functions ``__getattr__`` and ``__dir__`` for module ``package``, whose names are
+    imported on first use. ``homes`` has the module of each name, by name."""
     module = sys.modules[package]
 
     def find(name: str) -> Any:

@@ -30,8 +30,8 @@ WIDTHS = (1e-9, 100.0)
 
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
-    """Raise ValueError, which calls the value ``name``, for what is no number from ``least`` to
-    ``most``, both included, or, where ``least`` is an ``int``, no whole one."""
+    """Raise ValueError, which calls the value ``name``, unless it is a number from ``least`` to
+    ``most``, both included; if ``least`` is an ``int``, unless it is such a whole number."""
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
@@ -43,8 +43,8 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Return real numbers as an array of the shape that they have; NaN and infinity pass. An array
-    of float64 is returned itself, not as a copy. Raises ValueError, which names ``name``, for
+    """Return real numbers as an array of float64 of their shape; NaN and infinity pass. An array of
+    float64 is returned itself, not a copy. Raises ValueError, which calls the value ``name``, for
     anything else: text, complex numbers, True and False, rows of unequal length, masked entries."""
     import numpy as np  # which the command line's help does without
 
@@ -65,8 +65,8 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def refuse_entries(name: str, value: Any) -> None:
-    """Raise ValueError for an array with masked entries, or a list that contains one, and for True
-    or False in a list."""
+    """Raise ValueError, which calls the value ``name``, if it is an array with masked entries, or a
+    list or tuple that contains such an array, True or False at any depth."""
     import numpy as np
 
     if isinstance(value, list | tuple):
@@ -79,5 +79,5 @@ def refuse_entries(name: str, value: Any) -> None:
 
 
 def brief_value(value: object) -> str:
-    """Return a value as Python writes it, in one printable line of at most 80 characters."""
+    """Return the ``repr`` of a value as one printable line, cut to 80 characters."""
     return plain(repr(value), 80)

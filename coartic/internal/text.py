@@ -26,7 +26,8 @@ _MOST_FIGURES = 12  # of an array in a repr
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
-    """Return text as one printable line (:func:`one_line`), cut to ``most`` characters."""
+    """Return text as one printable line (:func:`one_line`), without blanks at its ends; a line of
+    more than ``most`` characters is cut to that length and ends in ``…``."""
     line = one_line(text[: 4 * most].strip())  # an escape takes longer than what it shows
     return line if len(line) <= most else line[: most - 1] + "…"
 
@@ -49,12 +50,12 @@ def one_line(text: str) -> str:
 
 
 def prints(c: str) -> bool:
-    """Return whether a character prints."""
+    """Return whether a character is printable; every kind of blank counts as printable."""
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
 def escape(c: str) -> str:
-    """Return a character, or its escape if it does not print."""
+    """Return a character, or its escape, such as ``\\x1b``, if it is not printable."""
     return c if prints(c) else c.encode("unicode_escape").decode()
 
 
@@ -64,10 +65,10 @@ def counted(count: int, thing: str) -> str:
 
 
 def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
-    """Return the ``repr`` of an object, ``Name(text, fact=value)``, cut to :data:`LONGEST_LINE`
-    characters.
+    """Return ``Class(text, fact=value)`` for an object, in one line, cut to :data:`LONGEST_LINE`
+    characters: ``texts`` unchanged, then the ``repr`` of each of ``facts`` by name.
 
-    ``texts`` stand as they are. Of arrays with more than a few figures the shape is shown.
+    An array that is not one row of at most 12 numbers is shown by its shape.
     """
     parts = list(texts)
     for name, value in facts.items():
@@ -96,10 +97,12 @@ RENAMED = {
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return ``; did you mean 'a'?`` with the nearest of ``names``; empty if none is near.
+    """Return ``; did you mean 'a'?`` with the one of ``names`` nearest to ``name``; an empty text
+    if none is near.
 
-    Near are names that differ in small letters and punctuation, begin so, are spelt alike or end in
-    the same word, in this order. A method that was renamed has its present id instead.
+    Near are names that begin with ``name``, capitals and punctuation aside, then names that are
+    spelt alike, then names that end in the same word. For the earlier id of a renamed method the
+    text is ``; its present id is 'a'``.
     """
     if RENAMED.get(name) in (names := list(names)):
         return f"; its present id is {RENAMED[name]!r}"
@@ -132,8 +135,8 @@ FOREIGN = (
 
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
-    """Return a sentence on a file of another program, empty for any other file; ``wanted`` says
-    what is read and where it is explained."""
+    """Return a sentence that coartic does not read a file of another program, known by its ending
+    (:data:`FOREIGN`); empty for any other path. ``wanted``: end of the sentence, what is read."""
     if not path.lower().endswith(FOREIGN):
         return ""
     ending = path.lower().rpartition(".")[2]
@@ -141,8 +144,9 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
-    """Return a sentence on a name of a ``kind`` that is not among ``names``, with the nearest of
-    them, or some or all; or on the file of another program."""
+    """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
+    ``names``, or, if none is near, with all names, or the first 12; for a file of another program
+    return the sentence of :func:`foreign_file`."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)
@@ -154,7 +158,8 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
 
 
 def _refuse_unprintable(text: str) -> str:
-    """Return the text itself. Raises a validation error if it is not one printable line."""
+    """Return the text itself. Raises a validation error if a character in it is not printable, such
+    as the end of a line."""
     if wrong := next((c for c in text if not prints(c)), ""):
         words = f"should be one line of printable text, without {escape(wrong)}"
         raise PydanticCustomError("not_plain", "{words}", {"words": words})

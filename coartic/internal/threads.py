@@ -32,9 +32,8 @@ ONE_THREAD = dict.fromkeys(
 
 
 def threads_for(jobs: int) -> int:
-    """Return ``jobs``, the number of threads or processes; for -1 the number of cores.
-
-    Raises ValueError for any other number below 1.
+    """Return the number of threads or processes that ``jobs`` means: ``jobs`` itself, or for -1 the
+    number of cores. Raises ValueError for anything else that is not from 1 to 10,000.
     """
     if not (isinstance(jobs, Integral) and jobs == -1):
         check_limits("jobs", jobs, 1, MOST_JOBS)
@@ -45,10 +44,11 @@ def threads_for(jobs: int) -> int:
 
 
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
-    """Call ``work`` with slices that together cover ``count`` rows, in threads with at least
-    ``least`` rows each; in this thread alone if there are fewer. Raises what ``work`` raises.
+    """Call ``work`` with consecutive slices that together cover ``count`` rows, each call in a
+    thread of its own and with at least ``least`` rows; once, in this thread, if rows are too few.
 
-    There are at most as many threads as cores, or as ``OMP_NUM_THREADS`` says, one in workers.
+    There are at most as many threads as cores, or, if it is set, as ``OMP_NUM_THREADS`` says (one
+    in worker processes). Returns when all calls have ended; raises what ``work`` raises.
     """
     allowed = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
     threads = min(count // least, int(allowed) if allowed.isdigit() else threads_for(-1))
@@ -63,7 +63,8 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables in this block, for processes that begin in it; then reset them."""
+    """Set environment variables in the block of this context, for processes that start in it; reset
+    them to what they were before, or remove them, at its end."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -77,9 +78,9 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
-    """Make this process a worker: lead a group of processes, and connect the first ``streams`` of
-    input, output and errors to the null device. When the parent process has ended, ``folder`` is
-    removed and the group is ended."""
+    """Make this process a worker: the leader of a new group of processes, with the first
+    ``streams`` of input, output and errors connected to the null device. When the parent process
+    has ended, a thread removes ``folder``, if one is given, and kills the group."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:
@@ -98,7 +99,8 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
 
 
 def end_group(pid: int) -> None:
-    """Kill the group of processes that worker ``pid`` leads, if it leads one, and the worker."""
+    """Kill the group of processes that process ``pid`` leads, if it leads one, and process ``pid``;
+    do nothing if neither exists."""
     for end in (getattr(os, "killpg", None), os.kill):
         if end is not None:
             with contextlib.suppress(OSError):

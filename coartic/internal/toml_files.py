@@ -15,8 +15,8 @@ from coartic.internal.text import LONGEST_LINE, plain
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
-    """Return the content of a TOML file. Raises ``error``, which names the file, if it cannot be
-    read, is too large (:func:`check_file`), or is not TOML in UTF-8."""
+    """Return the content of a TOML file as a dictionary. Raises ``error``, which names the file, if
+    it cannot be read, is too large (:func:`check_file`), or is not TOML in UTF-8."""
     check_file(path, error=error)
     shown = plain(str(path), LONGEST_LINE)
     try:
@@ -30,8 +30,8 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
 
 
 def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) -> None:
-    """Raise ``error`` for what cannot be read or is no file, such as a pipe or a device, and for
-    a file of more than :data:`MOST_BYTES`."""
+    """Raise ``error``, which names the file, if it is missing, may not be read, is a folder, a pipe
+    or a device, or has more than :data:`MOST_BYTES` bytes (10 million)."""
     shown = plain(str(path), LONGEST_LINE)
     try:
         found = Path(path).stat()

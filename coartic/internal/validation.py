@@ -49,8 +49,8 @@ _LISTS = {
 
 
 def in_sentences(kind: type[T]) -> type[T]:
-    """Decorate a pydantic class, in place: wrong arguments raise ValueError with a sentence, and a
-    model's arguments without names TypeError."""
+    """Change a pydantic class, in place, and return it: wrong arguments raise ValueError with a
+    sentence for each problem; a model's arguments without names raise TypeError."""
     init: Any = kind.__init__
 
     @wraps(init)
@@ -69,7 +69,8 @@ def in_sentences(kind: type[T]) -> type[T]:
 
 
 def changed_values(thing: Any) -> dict[str, Any]:
-    """Return the values of an object of a pydantic class that have no default or differ from it."""
+    """Return, by name, the values of a pydantic object's fields that differ from the default of the
+    field or whose field has no default."""
     return {
         name: getattr(thing, name)
         for name, field in type(thing).__pydantic_fields__.items()
@@ -85,7 +86,7 @@ class FileData(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     def __repr__(self) -> str:
-        """Return the values that differ from the defaults, in a few lines."""
+        """Return the class with the values that differ from the defaults, in one line."""
         return short_repr(self, **changed_values(self))
 
     def __str__(self) -> str:
@@ -93,9 +94,10 @@ class FileData(BaseModel):
 
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
-    """Return a line for each problem of a file, for the first :data:`_SHOWN` problems.
+    """Return lines ``source: sentence``, one for each of the first 20 problems of file ``source``,
+    and a last line with the number of further problems.
 
-    ``keys`` are the keys that the file may have, wherever they belong.
+    ``keys`` are the keys that the file may have in any of its tables.
     """
     sentences, more = _explain_first(error, list(keys))
     lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
@@ -105,13 +107,14 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
-    """Return the first :data:`_SHOWN` problems, joined by semicolons; ``keys`` as in
-    :func:`explain_file`, in the order of arguments."""
+    """Return a sentence for each of the first 20 problems of an object's arguments, joined by
+    semicolons. ``keys`` are the names of the arguments that it takes, in their order."""
     return "; ".join(_explain_first(error, keys)[0])
 
 
 def _explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[str], int]:
-    """Return a sentence for each of the first :data:`_SHOWN` problems, and how many are left."""
+    """Return a list of sentences on the first 20 problems, each sentence once, and the number of
+    further problems. ``keys``: known keys (:func:`_explain_problem`)."""
     details = error.errors(include_url=False)
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
@@ -125,8 +128,8 @@ def sentence_error(text: str) -> PydanticCustomError:
 
 
 def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
-    """Return one sentence about a problem; ``keys`` are the keys that an unknown key may have
-    meant."""
+    """Return one sentence about a problem, with its key. ``keys``: the known keys, among them the
+    one meant by an unknown key; argument k (from 0) without a name has the name ``keys[k]``."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and part < len(keys):

@@ -50,8 +50,8 @@ Drift = Annotated[float, Field(ge=0, le=10)]
 
 
 def _one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
-    """Return drifts that are valid. Raises a validation error of one sentence for others, in place
-    of a sentence for each form that a drift may have."""
+    """Return a valid drift, a number, or drifts, a tuple of numbers. Raises a validation error of
+    one sentence for any other value, in place of a sentence for each of these forms."""
     try:
         return validate(value)
     except ValidationError:
@@ -137,12 +137,13 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """``drift`` as a tuple, also where it is one number."""
+        """Drifts κ as a tuple, which has one number if ``drift`` is a number."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property
     def is_informed(self) -> bool:
-        """True if a preferred posture informs exploration or correction."""
+        """True if a preferred posture informs exploration (a drift is not 0) or correction
+        (``pull`` is not 0)."""
         return any(self.drifts) or self.pull > 0
 
     def __repr__(self) -> str:
@@ -203,8 +204,8 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """Return a condition of :data:`EVERY_CONDITION` by its id, with or without
-    :data:`METHOD_PREFIX`; a condition is returned itself.
+    """Return the exploration condition with an id such as ``"EC4"`` or ``"dual-process/EC4"``; a
+    condition is returned itself.
 
     Raises CoarticError for an unknown id, and TypeError for what is neither id nor condition.
     """

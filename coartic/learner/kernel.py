@@ -140,8 +140,8 @@ class _Workspace(NamedTuple):
 def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
 ) -> LearnerParameters:
-    """Return the learner parameters of a task and a condition; ``first`` has a movement for each
-    goal of trial 0."""
+    """Return a task and a condition as the learner's kernel reads them; ``first`` has a movement
+    for each goal, the movements of trial 0."""
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(first), width), np.nan)
     for target, movement in zip(first_targets, first, strict=True):
@@ -189,7 +189,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
 
 
 def workspace_for(runs: int, task: Task) -> _Workspace:
-    """Return work space for ``runs`` runs, at most :data:`coartic.motion.batch.SLOTS`."""
+    """Return the arrays in which the kernel works on ``runs`` runs, at most 72, of a task."""
     return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
@@ -202,8 +202,8 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
 
 @inlined
 def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
-    """Return the distance of a hand (0 left, 1 right) from the centre of the run's goal, length
-    unit; it counts as an evaluation."""
+    """Return the distance of a hand (0 left, 1 right) of a run from the centre of its goal, length
+    unit; add 1 to the run's ``evaluations``."""
     arm = arm_of(robot, hand)
     joint_chain(run.q, arm, workspace.xs, workspace.ys)
     run.evaluations += 1
@@ -215,9 +215,9 @@ def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
 
 @inner
 def _nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
-    """Find the hand of run ``n`` whose corrective posture for the goal is nearest in joint space.
-
-    A hand with which **A** fails is farthest; of equal ones the first.
+    """Return the hand, 0 left or 1 right, with which the corrective process **A** finds the posture
+    nearest in joint space for the goal of run ``n``; of equal hands the first. A hand with which
+    **A** fails is farthest. Iterations and evaluations are counted; the run does not move.
     """
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
@@ -238,7 +238,8 @@ def _nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
 
 @inlined
 def _best_hand(entries: Any, hands: Any) -> int:
-    """Return the hand of highest value, of equal ones the first."""
+    """Return the hand, 0 left or 1 right, among ``hands`` whose record in ``entries`` (by hand) has
+    the highest value Q; of equal hands the first."""
     best = hands[0]
     for hand in hands[1:]:
         if entries[hand].value > entries[best].value:
@@ -250,10 +251,9 @@ def _best_hand(entries: Any, hands: Any) -> int:
 def choose_hand(
     n: int, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
 ) -> int:
-    """Return the hand (0 left, 1 right) of highest value in ``entries``, the records of the state
-    by hand; with ``explore``, with probability ε, the hand that the condition explores.
-
-    Of hands that are equally close to the goal a random one is explored.
+    """Return the hand (0 left, 1 right) of run ``n`` for its goal: the hand of highest value in
+    ``entries``, the records of Q and q* by hand; with ``explore``, with probability ε, the hand
+    that the condition explores, a random one of hands that are equally close to the goal.
     """
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
@@ -273,15 +273,15 @@ def choose_hand(
 
 @inlined
 def _find_mean(run: Any, stored: Any, learner: Any) -> None:
-    """Set the target of a run to the mean of exploration: the stored target q*(s, a); joints that
-    are not to be modified keep their current values."""
+    """Set the target of a run, in place, to the mean of exploration: the stored target q*(s, a);
+    the other arm's joints, if the condition does not modify them, keep their current values."""
     for j in range(len(run.q)):
         run.target[j] = run.q[j] if learner.follows[run.hand, j] else stored.target[j]
 
 
 @inlined
 def _draw_drift(run: Any, learner: Any, rng: Any) -> None:
-    """Set the drift κ of a run for a trial."""
+    """Set drift κ and pull β of a run for its next trial; κ is drawn if there are several."""
     number = len(learner.drifts)
     run.drift = learner.drifts[int(rng.random() * number) if number > 1 else 0]
     run.pull = learner.pull
@@ -289,11 +289,10 @@ def _draw_drift(run: Any, learner: Any, rng: Any) -> None:
 
 @inner
 def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
-    """Set the preferred posture p of a run that has chosen its hand for goal ``number``, from 0.
-
-    *next goal*: (q + t') / 2 with the stored target t' of the next goal for the hand that is best
-    there, given this one; q for joints that the movement to it would not explore, and where nothing
-    is stored.
+    """Set the preferred posture p of a run, in place, once its hand for goal ``number`` (from 0) is
+    chosen: the present posture q (*stay*), the start of the trial (*start*), or (*next goal*)
+    (q + t') / 2, with the target t' stored for the next goal and the hand of highest value there
+    after this hand; q for joints that the movement to it would not explore, and if none is stored.
     """
     if run.drift == 0.0 and run.pull == 0.0:
         return
@@ -312,7 +311,8 @@ def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
 
 @inner
 def drift(run: Any, robot: Any, learner: Any, workspace: Any) -> None:
-    """Move the mean t of exploration by κ N(t) (p − t), and an explored idle arm by κ (p − t)."""
+    """Move the mean t of exploration, the run's ``target``, in place, by κ N(t) (p − t), and an
+    idle arm that is explored by κ (p − t); p is the preferred posture."""
     if run.drift == 0.0:
         return
     x, y, v = workspace.jacobian
@@ -350,9 +350,9 @@ def aim(
     rng: Any,
     workspace: Any,
 ) -> None:
-    """Phase 2, *aim*: choose the hand of run ``n`` for goal ``number`` (from 0) after hand
-    ``before`` and, where there is a target q*(s, a), set q^t = mean + η; q^t = q* without
-    ``explore``."""
+    """Choose the hand of run ``n`` for goal ``number`` (from 0) after hand ``before`` (2: none);
+    if a target q*(s, a) is stored, set the run's target to the mean of exploration plus noise η,
+    without ``explore`` to q* alone: phase 2, *aim*."""
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
@@ -378,9 +378,9 @@ def make_trial(
     rngs: Any,
     workspace: Any,
 ) -> None:
-    """Make a trial of every run, up to the first goal missed, and fill in ``trial``, the accounts
-    of its goals, shape ``(N, G)``. ``first`` makes trial 0, with given hands and targets; without
-    ``explore`` a trial is greedy and has no noise."""
+    """Make one trial in each of N runs, up to the first goal missed; fill in ``trial``, the
+    accounts of the goals, shape ``(N, G)``, and the counts in ``workspace``. ``first`` makes trial
+    0, with given hands and targets; without ``explore`` a trial is greedy and has no noise."""
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
@@ -417,7 +417,8 @@ def make_trial(
 
 @inlined
 def _find_returns(trial: Any, learner: Any, returns: Any) -> None:
-    """Set the return of each goal of a completed trial."""
+    """Fill ``returns``, in place, with the return of each goal of a completed trial, ticks below 0:
+    the discounted sum of the goals' rewards (:class:`ExplorationCondition`)."""
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
         returns[number] = earlier
@@ -430,15 +431,16 @@ def _find_returns(trial: Any, learner: Any, returns: Any) -> None:
 
 @inlined
 def _copy_accounts(source: Any, destination: Any) -> None:
-    """Copy the accounts of a trial."""
+    """Copy the accounts of the goals of a trial over those in ``destination``, in place."""
     for goal in range(len(source)):
         destination[goal] = source[goal]
 
 
 @inner
 def _learn_from(number: int, learner: Any, tables: Any, results: Any, workspace: Any) -> None:
-    """Keep the rewards of a trial; where it was completed, update Q and q*: credit visited states
-    and hands with the reward of the trial, or each with its return."""
+    """Add trial ``number`` (from 0) of each run to ``results``; in runs that completed it, update Q
+    and q* in ``tables``: each visited state and hand is credited with the reward of the trial, or
+    the return of its goal; a credit above Q replaces Q, and where the goal was hit replaces q*."""
     others = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
     for n in range(len(tables)):
@@ -476,8 +478,8 @@ def _learn_from(number: int, learner: Any, tables: Any, results: Any, workspace:
 def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
-    """Make all trials of N runs, each with its own generator, and then a greedy trial without noise
-    of each, the replay. ``tables`` and ``results`` are filled in."""
+    """Make all trials of N runs, each with its own generator, and then in each a greedy trial
+    without noise, the replay; fill in ``tables`` (:func:`empty_tables`) and ``results``."""
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         first, explore, made = number == 0, number < trials, results.last

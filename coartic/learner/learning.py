@@ -62,8 +62,8 @@ _MOST_TOGETHER = 4_000_000  # trials of runs whose rewards fit into one answer o
 
 
 def runs_at_once(trials: int) -> int:
-    """Return how many runs with this number of trials are performed in one job: as many as there
-    are slots, if their rewards fit into one answer."""
+    """Return how many runs of ``trials`` trials one job performs at most: 72, fewer if they have
+    more than 4,000,000 trials together, whose rewards one answer of a worker holds; at least 1."""
     return max(1, min(SLOTS, _MOST_TOGETHER // trials))
 
 
@@ -232,10 +232,10 @@ def _learn_together(
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
-    """Make all trials of runs side by side, a run for each seed; return the runs in this order.
+    """Run the learner side by side, once for each seed; return the runs in the order of seeds.
 
-    Nothing is checked. ``first`` has a movement for each goal of trial 0; there are at most
-    :data:`SLOTS` seeds.
+    Nothing is checked. ``first`` has the movement of trial 0 for each goal; a movement without a
+    target stands for the corrective process. At most 72 seeds; 0 trials only compile the kernels.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
@@ -294,11 +294,10 @@ Kernels = Literal["learner", "motion", "trials"]
 
 
 def warm_up(task: Task, *parts: Kernels) -> None:
-    """Compile or load the kernels for the number of links of the task's robot, so that no run's
-    time contains it.
-
-    ``parts`` names the kernels, by default all: ``"learner"``, ``"motion"`` (single movements and
-    corrections), ``"trials"`` (trials and executions).
+    """Compile the kernels for the number of links of the task's robot, or load their machine code,
+    so that the time of no run contains it. ``parts`` names the kernels, by default all:
+    ``"learner"``, ``"motion"`` (single movements and corrections), ``"trials"`` (trials and
+    executions).
     """
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))

@@ -77,23 +77,22 @@ class LearningRun:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """Return where trials hit every goal, bool, shape ``(trials,)``.
-
-        The others failed: they changed neither ``values`` nor ``targets``.
+        """True for the trials that hit every goal, bool, shape ``(trials,)``. The others failed:
+        they changed neither ``values`` nor ``targets``.
         """
         return ~np.ma.getmaskarray(self.rewards)
 
     @property
     def learned(self) -> tuple[Movement, ...]:
-        """Movements of the learned solution: of the best trial, or of the replay where the
-        condition has ``learned="replay"``; empty if there is no such trial."""
+        """Movements of the learned solution: of the best trial, or, if the condition has
+        ``learned="replay"``, of the replay; empty if this trial did not hit every goal."""
         if self.condition.learned == "best":
             return self.solution
         return self.replay
 
     @property
     def reason(self) -> str:
-        """Why the run has no solution; empty where it has one."""
+        """Sentence on why the run has no learned solution; empty if it has one."""
         if self.learned:
             return ""
         if self.best_trial is not None:
@@ -105,8 +104,8 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Total reward of the learned solution; None without one. It is the highest reward of any
-        trial, or, where the condition has ``learned="replay"``, that of the replay."""
+        """Total reward of the learned solution: the highest reward of any trial, or, if the
+        condition has ``learned="replay"``, the reward of the replay; None without a solution."""
         if self.condition.learned == "replay":
             return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])
@@ -122,8 +121,8 @@ class LearningRun:
         return int(self.rewards[0]) if self.completed[0] else None
 
     def execute(self) -> Execution:
-        """Execute the learned solution again, apart from the learner: the reward is that of the
-        run. Raises CoarticError if nothing was learned."""
+        """Execute the learned solution again, without the learner; return the execution, whose
+        reward is :attr:`reward`. Raises CoarticError if there is no learned solution."""
         if not self.learned:
             raise CoarticError(f"nothing to execute: {self.reason}")
         return execute(self.task, self.learned, model=self.model)

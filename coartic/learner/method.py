@@ -51,13 +51,15 @@ class CustomParameters(DualProcessParameters):
 
     @model_validator(mode="after")
     def check_condition(self) -> Self:
-        """Raise ValueError for fields that contradict each other."""
+        """Return the parameters themselves. Raise ValueError if the condition that they describe
+        contradicts itself, such as a discount without credit for subtasks."""
         _condition_of(CONDITIONS[self.base], self)
         return self
 
 
 def _condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
-    """Return condition ``base`` with the fields that parameters set, where they are not None."""
+    """Return a copy of condition ``base`` with the values of those fields of a condition that
+    ``parameters`` have and that are not None."""
     return replace(base, **parameters.model_dump(include={*_FIELDS}, exclude_none=True))
 
 
@@ -71,29 +73,29 @@ class DualProcess(Method):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return the exploration condition with the parameters."""
+        """Return the method's exploration condition with the values of the parameters."""
         return _condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
-        """Return why the condition does not apply to a task, None where it does."""
+        """Return a sentence on why the condition does not apply to a task; None if it applies."""
         return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
-        """Learn; the solution is that of the best trial or, where the condition has
-        ``learned="replay"``, that of the replay, the noiseless trial after learning. Raises
-        MethodError if there is none."""
+        """Run the learner; return the movements of its best trial, or, if the condition has
+        ``learned="replay"``, of the replay, the noiseless trial after learning. Raises MethodError
+        if that trial missed a goal, or no trial hit every goal."""
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
             raise result
         return result
 
     def most_together(self) -> int:
-        """Return the number of runs that fit into one job (:func:`runs_at_once`)."""
+        """Return the largest number of runs that one job performs (:func:`runs_at_once`)."""
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
-        """Learn in sessions that differ in their seeds alone; return for each the result of
-        :meth:`solve`, or the MethodError that it would raise."""
+        """Run the learner in sessions that differ in their seeds alone; return for each, in order,
+        the result of :meth:`solve`, or the MethodError that it would raise, as an object."""
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
         task, model = tasks[0], sessions[0].model
@@ -122,7 +124,8 @@ class DualProcess(Method):
 
 
 def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
-    """The learner under a condition as a method, with fields of the condition as parameters."""
+    """Return a new subclass of :class:`DualProcess`: the learner under a condition, with noise, ε
+    and what else the condition uses as parameters."""
     names, citation = ["epsilon", "noise_sd"], DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.is_informed:  # to move in the null space of a hand, where paths are short
@@ -177,7 +180,7 @@ class CustomDualProcess(DualProcess):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return the base condition with the fields that the parameters change."""
+        """Return the paper's condition ``base`` with the fields that the parameters set."""
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)
 

@@ -34,14 +34,14 @@ GOING = 0.0
 
 
 def _links_for(robot: Robot) -> int:
-    """Return the number of links of an arm for which kernels are compiled: four, eight, or those of
-    an arm that has more, so that all robots of a family share their machine code."""
+    """Return the number of links per arm for which the kernels of a robot are compiled: 4 or 8 if
+    no arm has more, else those of the longer arm. So robots of a family share machine code."""
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
 def width_of(robot: Robot) -> int:
-    """Return the number of entries of a configuration in records: those of the robot, then zeros up
-    to two arms of :func:`_links_for`, so that kernels are compiled once for a number of links."""
+    """Return the number of entries of a robot's configuration in records of kernels: the ``dof``
+    entries of the robot, then zeros up to a base and two arms of :func:`_links_for` links each."""
     return BASE_DOF + 2 * _links_for(robot)
 
 
@@ -50,7 +50,7 @@ def width_of(robot: Robot) -> int:
 
 @cache
 def _parameters_type(links: int) -> np.dtype[np.void]:
-    """Type of the record for robots with so many links (:func:`_links_for`)."""
+    """Return the NumPy type of the record of :func:`robot_parameters` for ``links`` per arm."""
     arm = {"first": np.int64, "count": np.int64, "links": (np.float64, links)}
     shoulder = dict.fromkeys(("shoulder_x", "shoulder_y"), np.float64)
     model = dict.fromkeys(MotionModel._fields, np.float64) | {"max_iterations": np.int64}
@@ -74,11 +74,11 @@ def robot_parameters(
     model: MotionModel = PAPER,
     checks: bool = True,
 ) -> NDArray[np.void]:
-    """Return robot, constants and options for kernels: a record in an array of shape ``(1,)``,
-    which is cached: copy it before you change it.
+    """Return robot, constants and options for kernels as one record, in an array of shape ``(1,)``.
+    The array is cached: copy it before you change it.
 
-    ``checks`` says whether an arm without a target may be in its goal already. Raises ValueError
-    for a lock other than ``"x"`` and ``"y"``.
+    ``radius`` is the radius of the goals, length unit. ``checks`` says whether an arm without a
+    target may be in its goal already. Raises ValueError for a lock other than "x" and "y".
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
@@ -96,7 +96,8 @@ def robot_parameters(
 
 @inlined
 def arm_of(robot: Any, hand: int) -> Any:
-    """Return the arm of a hand (0 left, 1 right) of a record of :func:`robot_parameters`."""
+    """Return the :class:`Arm` of a hand (0 left, 1 right) from a record of
+    :func:`robot_parameters`; its links share memory with the record."""
     arm = robot.arms[hand]
     return Arm(arm.first, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
 
@@ -119,7 +120,7 @@ class Batch(NamedTuple):
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
-    """Return a batch of ``count`` runs, which is at most :data:`SLOTS`."""
+    """Return a batch of ``count`` runs, at most :data:`SLOTS`, whose records are all 0."""
     width = width_of(robot)
     fields = {
         "q": (np.float64, width),  # where the robot is, length unit and rad
@@ -147,10 +148,9 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
 
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
-    """Return the type of the record of all rows, for arms with this number of links, and the slices
-    of rows that a correction and a movement need.
-
-    Shorter arms end in links of length 0.
+    """Return the NumPy type of the record of all rows of slots, for arms with ``links`` links, and
+    the slices of rows that a correction and that a movement need. Shorter arms end in links of
+    length 0.
     """
     joints = (BASE_DOF + links,)
     corrected = {"q": joints}  # base x and y, then the joints of the arm
@@ -184,13 +184,15 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
 
 
 def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
-    """Return the number of rows of quantities with these shapes, by name, without slots."""
+    """Return the number of rows that quantities take together: the sum of the products of their
+    ``shapes``, which are given by name and without the axis of slots."""
     return sum(math.prod(shape) for shape in shapes.values())
 
 
 @inlined
 def _copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
-    """Copy the base and the joints of ``arm`` from configuration ``q`` into column ``slot``."""
+    """Copy the base and the joints of ``arm`` from configuration ``q`` into column ``slot`` of
+    ``row``, in place; entries beyond the joints become 0."""
     row[0, slot] = q[0]
     row[1, slot] = q[1]
     for k in range(len(row) - BASE_DOF):
@@ -199,7 +201,8 @@ def _copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
 
 @inlined
 def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
-    """Copy goal, links and joints of run ``number`` into slot ``slot``."""
+    """Copy goal, base and joints of ``run``, which is run ``number`` (from 0) of its batch, and
+    shoulder and links of its ``arm`` into slot ``slot``, a column of the arrays ``at``."""
     at.run[slot], at.first[slot], at.links[slot] = number, arm.first, len(arm.links)
     at.shoulder[0, slot] = arm.shoulder_x
     at.shoulder[1, slot] = arm.shoulder_y
@@ -211,7 +214,8 @@ def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
 
 @inlined
 def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
-    """Load the arm of a run into a slot to start its movement to the run's target."""
+    """Copy a run into slot ``slot`` (:func:`load`), with start, target and squared joint-space
+    length of its movement to its target, which :func:`move_slots` can then make."""
     load(at, slot, number, run, arm)
     _copy_arm(at.start, slot, run.q, arm)
     _copy_arm(at.target, slot, run.target, arm)
@@ -224,7 +228,8 @@ def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
 
 @inlined
 def store(at: Any, slot: int, q: Any) -> None:
-    """Copy the base and the joints of the arm in a slot into configuration ``q``."""
+    """Copy the base and the joints of the arm in slot ``slot`` into configuration ``q``, in place;
+    entries of the other arm stay."""
     q[0] = at.q[0, slot]
     q[1] = at.q[1, slot]
     for k in range(at.links[slot]):
@@ -233,8 +238,8 @@ def store(at: Any, slot: int, q: Any) -> None:
 
 @inlined
 def compact(rows: Any, slot: int, last: int) -> None:
-    """Copy column ``last`` of ``rows`` (quantities, slots) over column ``slot``, whose run has
-    ended."""
+    """Copy column ``last`` of ``rows`` (quantities, slots) over column ``slot``, in place: the run
+    of this slot has ended."""
     if slot != last:
         for row in range(len(rows)):
             rows[row, slot] = rows[row, last]
@@ -242,8 +247,8 @@ def compact(rows: Any, slot: int, last: int) -> None:
 
 @inner
 def padded_count(count: int) -> int:
-    """Return the number of slots in the vectors that hold ``count`` slots: the last slots, of no
-    run, are worked on as well.
+    """Return the number of slots to work on for ``count`` slots: 0 and 1 as they are, else rounded
+    up to whole vectors of 8 slots; the last slots may belong to no run.
 
     A loop over whole vectors leaves no slots over that would be worked on one by one.
     """
@@ -255,7 +260,8 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Bound on the angle of every link of an arm, rad: the sum of all its joints' angles."""
+    """Return a bound on the absolute angle of every link of the arm in a slot, rad: the sum of the
+    absolute angles of its joints."""
     total = 0.0
     for k in range(len(q) - BASE_DOF):
         total += abs(q[BASE_DOF + k, slot])
@@ -264,7 +270,8 @@ def winding(q: Any, slot: int) -> float:
 
 @inner
 def are_near(at: Any, count: int) -> bool:
-    """Return whether bounds show that all angles are in the range of the fast cosine."""
+    """Return whether all link angles of the first ``count`` slots are certain to be below 1e5 rad,
+    the range of the fast cosine (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1
@@ -272,8 +279,8 @@ def are_near(at: Any, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a function that sets x and y of the first slots by forward kinematics, with this
-    cosine and sine."""
+    """Return a kernel ``chains(at, count)`` that fills the rows ``x`` and ``y`` of the first
+    ``count`` slots by forward kinematics, with the functions ``cos`` and ``sin``."""
 
     @inner
     def chains(at: Any, count: int) -> None:
@@ -290,7 +297,8 @@ _far_chains = _chains_by(cosine, sine)
 
 @inner
 def place(at: Any, count: int, near: bool) -> None:
-    """Forward kinematics of every slot: fill ``x`` and ``y``. ``near``: see :func:`are_near`."""
+    """Fill the rows ``x`` and ``y`` of the first ``count`` slots, places of shoulder, joints and
+    hand, by forward kinematics; ``near``: the result of :func:`are_near`."""
     if near:
         _near_chains(at, padded_count(count))
     else:

@@ -37,7 +37,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _hash_of_sources() -> str:
-    """Hash of the files of this package that results come from: the version of the model's code."""
+    """Return the version of the model's code: the first 16 hex digits of a hash (SHA-256) of the
+    source files of this package that compute results."""
     single = (PACKAGE / name for name in ("robot.py", "model.py", "method.py", "tasks/task.py"))
     folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner"))
     files = sorted([*single, *(path for folder in folders for path in folder)])
@@ -58,7 +59,7 @@ class _Kernel:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """The compiled function, as Numba calls it."""
+        """Numba's dispatcher of the function, which is compiled on first use."""
         return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -74,7 +75,7 @@ class _Kernel:
 
 
 def _decorator(kind: str) -> Callable[[F], F]:
-    """The decorator that makes a kernel of this kind."""
+    """Return the decorator that makes a function a kernel of ``kind``, such as ``"entry"``."""
     return cast(Callable[[F], F], partial(_Kernel, kind))
 
 
@@ -97,7 +98,8 @@ intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
-    """Return the NumPy type of a record for kernels, with these types by name, aligned."""
+    """Return the NumPy type of an aligned record for kernels, from the types of its fields by name,
+    in this order."""
     return np.dtype(list(fields.items()), align=True)
 
 
@@ -114,8 +116,8 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 
 
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
-    """Return the addresses by which kernels draw from NumPy generators, shape ``(N, 3)``
-    (:func:`generator_at`). The generators must outlive the call of the kernel."""
+    """Return the addresses with which kernels draw from N NumPy generators (:func:`generator_at`),
+    shape ``(N, 3)``. The generators must outlive the call of the kernel."""
 
     def draws_of(generator: np.random.Generator) -> list[int | None]:
         c = generator.bit_generator.ctypes
@@ -126,7 +128,7 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """The generator that draws by the functions at these addresses."""
+    """Build the generator, in a kernel, whose state and two drawing functions are at addresses."""
     from numba.core import cgutils, types
 
     kind = types.NumPyRandomGeneratorType("generator")
@@ -144,7 +146,7 @@ def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any
 
 @inner
 def generator_at(addresses: Any, run: int) -> Any:
-    """Return the generator in row ``run`` of :func:`addresses`."""
+    """Return the NumPy generator of row ``run`` (from 0) of the result of :func:`addresses`."""
     return _generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
 
 
@@ -159,7 +161,7 @@ def import_numba() -> Any:
 
 @cache
 def _set_up_numba() -> Any:
-    """Import Numba, and set it up.
+    """Import Numba, set it up, once a process, and return the module.
 
     LLVM gets its options before Numba first asks it for machine code. Only how fast the kernels are
     depends on them. A program that has compiled something else with Numba before it calls a kernel
@@ -204,7 +206,7 @@ def _set_up_numba() -> Any:
 
 
 def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
-    """Return a function compiled as the decorator of the name ``kind`` says.
+    """Return what Numba makes of a function, with the options of the decorator called ``kind``.
 
     Raises CoarticError where Numba is set to compile nothing.
     """
@@ -238,7 +240,8 @@ def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
 
 
 def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
-    """The compiled function itself, whose machine code is kept where there is a folder for it."""
+    """Return the compiled function itself, changed so that its machine code is read from disk and
+    kept there, if a folder can be written."""
     folder, config = _cache_folder(), import_numba().config
     if folder is not None:
         before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
@@ -250,8 +253,8 @@ def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
 
 
 def _cache_folder() -> Path | None:
-    """Create the folder for compiled code of these sources, remove folders of other sources, and
-    return it; None if no folder is writable."""
+    """Create the folder for machine code of these sources and return it; None if no folder is
+    writable. Remove unused folders of other sources next to it (:func:`_remove_old`)."""
     roots, chosen = [PACKAGE / "__pycache__"], import_numba().config.CACHE_DIR
     if Path(chosen).is_absolute():  # or it would change with where one stands
         roots.insert(0, Path(chosen) / "coartic")
@@ -272,7 +275,8 @@ def _cache_folder() -> Path | None:
 
 
 def _remove_old(root: Path, current: Path) -> None:
-    """Remove machine code of older sources that no process has loaded for a month."""
+    """Remove the folders of machine code below ``root`` that no process has used for 30 days;
+    ``current`` counts as used now."""
     with contextlib.suppress(OSError):
         os.utime(current)
     for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
@@ -283,7 +287,7 @@ def _remove_old(root: Path, current: Path) -> None:
 
 @cache
 def _log_compilation() -> None:
-    """Log, once a process, that it compiles; a program that logs what coartic says shows this."""
+    """Log a message, once a process, that compiling takes up to a minute (logger ``coartic``)."""
     logging.getLogger("coartic").info("Compiling (once): this takes up to a minute.")
 
 
@@ -304,7 +308,8 @@ class _MachineCode:
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
     def load_overload(self, *wanted: Any) -> Any:
-        """Return the code of a signature; None if this process is to compile the code."""
+        """Return the machine code of a signature from disk, waiting for a process that compiles it;
+        None, after a log message, if this process is to compile it."""
         self.unlock()
         code = self.load(*wanted)
         if code is None and self.wait_for_lock():
@@ -316,7 +321,8 @@ class _MachineCode:
         return code
 
     def load(self, *wanted: Any) -> Any:
-        """Return the code of a signature from disk; None if it is not there or cannot be read."""
+        """Return the machine code of a signature from disk; None if it is not there, or cannot be
+        read: all code of the function on disk is then dropped."""
         try:
             # Not load_overload, which first lists all that Numba could compile.
             return self.files._load_overload(*wanted)
@@ -326,13 +332,14 @@ class _MachineCode:
             return None
 
     def save_overload(self, *compiled: Any) -> None:
-        """Keep compiled code on disk where possible."""
+        """Keep compiled code on disk if possible, and release the lock."""
         with contextlib.suppress(Exception):
             self.files.save_overload(*compiled)
         self.unlock()
 
     def wait_for_lock(self) -> bool:
-        """Lock this function's code; False if the system has no locks, or the lock stays taken."""
+        """Lock this function's code for this process, and return True; return False if the system
+        has no locks, or another process holds the lock for more than 120 s."""
         with contextlib.suppress(ImportError, OSError):
             import fcntl
 
@@ -347,7 +354,7 @@ class _MachineCode:
         return False
 
     def unlock(self) -> None:
-        """Let other processes compile this function."""
+        """Release this process's lock on the function's code, if it holds the lock."""
         if self.lock is not None:
             self.lock.close()
             self.lock = None

@@ -95,7 +95,7 @@ class Correction(NamedTuple):
 
 @inner
 def largest_square(length: float) -> float:
-    """The largest number whose square root, as it is rounded, does not exceed a length."""
+    """Return the largest number whose square root, as it is rounded, does not exceed ``length``."""
     square = length * length
     while math.sqrt(square) > length:
         square = np.nextafter(square, 0.0)
@@ -106,7 +106,7 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a number of steps, not rounded, during which the hand stays out of a disc for certain.
+    """Return a number of steps, not a whole one, for which the hand certainly stays out of a disc.
 
     Along the line of a movement every absolute link angle turns at a constant rate. So per step the
     hand moves by at most ``s = |Δbase| + Σ length |Δangle|``, and its velocity changes by at most
@@ -135,10 +135,10 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 @inner
 def set_off(at: Any, count: int, step: float) -> bool:
-    """Set rates, bounds and number of steps of the movements in the first ``count`` slots, with
-    steps of length ``step`` in joint space.
+    """Set rates, bounds and number of steps, in place, of the movements loaded into the first
+    ``count`` slots, with steps of length ``step`` in joint space.
 
-    Returns True if all angles stay in the range of the fast cosine.
+    Returns True if all angles stay below 1e5 rad, the range of the fast cosine.
     """
     far = 0
     for i in range(padded_count(count)):
@@ -171,7 +171,8 @@ def set_off(at: Any, count: int, step: float) -> bool:
 
 @inner
 def _place_between(at: Any, count: int, step: float) -> None:
-    """Set the configuration of each slot at its present step."""
+    """Set ``q`` of each of the first ``count`` slots to the point of its movement at its present
+    step; ``step`` is the length of a step."""
     for i in range(padded_count(count)):
         fraction = at.step[i] * step / at.distance[i]
         for j in range(len(at.q)):
@@ -182,11 +183,12 @@ def _place_between(at: Any, count: int, step: float) -> None:
 
 @inner
 def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
-    """Evaluate the stopping rule in the first ``count`` slots; return how many have ended.
+    """Evaluate the stopping rule in the first ``count`` slots; return how many of them have ended.
 
-    Each slot gets a status; one that goes on gets the next step that can end it. A movement stops
-    at most ``rims[0]`` from the goal's centre or, with ``stop_on_arrival``, ``rims[1]`` from where
-    its target puts the hand, length unit; ``squares`` are the squares (:func:`largest_square`).
+    Each slot gets a status; a slot that goes on gets the next step that can end it. A movement ends
+    at its last step, with the hand at most ``rims[0]`` from the goal's centre, or, with
+    ``stop_on_arrival``, at most ``rims[1]`` from where the target puts the hand, length unit.
+    ``squares`` are the squares of ``rims`` (:func:`largest_square`).
     """
     ended = 0
     tip = len(at.length)
@@ -221,12 +223,12 @@ def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -
 
 @shared
 def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> None:
-    """Move the arms in the first ``count`` slots, loaded by :func:`start`, until each movement
-    has ended; afterwards the slots are free.
+    """Move the arms in the first ``count`` slots, loaded by :func:`start`, until each movement has
+    ended: with a hit, at its target, or, with ``stop_on_arrival``, as soon as the hand is near the
+    place to which the target brings it. Afterwards the slots are free.
 
-    In the record of each run ``q`` becomes the configuration in which the run stopped, ``hit``
-    and ``ticks`` are set, and ``evaluations`` grows by the evaluations made. ``robot`` is a
-    record of :func:`robot_parameters`.
+    In the record of each run ``q`` becomes the configuration in which the movement ended, ``hit``
+    and ``ticks`` are set, and ``evaluations`` grows by the forward-kinematics evaluations made.
     """
     at, evaluations, step = batch.at[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
@@ -268,7 +270,7 @@ def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> Non
 
 @entry
 def _move_kernel(stop_on_arrival: bool, robot: Any, batch: Any) -> None:
-    """Move the only run."""
+    """Move run 0 of a batch to its target, in place (:func:`move_slots`)."""
     run = batch.runs[0]
     start(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
     move_slots(batch, 1, stop_on_arrival, robot[0])
@@ -285,16 +287,16 @@ def move(
     stop_on_arrival: bool = True,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Move straight in joint space until the hand hits the goal or arrives.
+    """Move straight in joint space until the hand hits the goal or arrives at the target.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     q : ndarray, shape (dof,)
-        Where it stands, length unit (base) and rad (joints).
+        Configuration in which the robot stands, length unit (base) and rad (joints).
     target : ndarray, shape (dof,)
-        Target configuration, likewise.
+        Target configuration, in the same units.
     hand : {"left", "right"}
         The hand that is to hit the goal.
     goal : tuple of float
@@ -340,7 +342,8 @@ def move(
 
 @inner
 def _find_statuses(at: Any, count: int, square: float) -> None:
-    """Set the status of slots whose hand is near enough to the goal, or at no finite place."""
+    """Set the status of each of the first ``count`` slots: at the goal if the squared distance of
+    the hand from its centre is at most ``square``, failed if it is not finite, else going on."""
     tip = len(at.length)
     for i in range(padded_count(count)):
         error_x = at.goal[0, i] - at.x[tip, i]
@@ -352,9 +355,9 @@ def _find_statuses(at: Any, count: int, square: float) -> None:
 
 @inlined
 def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int, bool]:
-    """Make an iteration of **A**, q += α Jᵀ e, in every slot that goes on, plus its rows ``pull``
-    unless kernel ``pull`` is None (:func:`descend_to_goals`). Return how many of the first
-    ``count`` slots have ended, and whether all angles are near (:func:`are_near`)."""
+    """Make an iteration of the corrective process **A**, q += α Jᵀ e, in every slot that goes on;
+    with a kernel ``pull`` its rows are added (:func:`descend_to_goals`). Return how many of the
+    first ``count`` slots have ended, and the result of :func:`are_near` afterwards."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -390,12 +393,13 @@ def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int,
 
 @inlined
 def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
-    """Let **A** descend in the first ``count`` slots until each has ended.
+    """Iterate the corrective process **A** in the first ``count`` slots until each has converged or
+    failed. In the record of each run ``target`` becomes the last iterate, ``converged`` and
+    ``iterations`` are set, and ``evaluations`` grows.
 
-    The ``target`` of each run becomes what its slot ends with; ``converged`` and ``iterations`` of
-    its record are set. ``pull`` may be a kernel; it is called with rows, ``count``, robot and
-    runs and fills in the rows ``pull``: what an iteration adds to the base and to the joints of the
-    arm at its iterate ``q``, zero for what is locked.
+    ``pull`` can be a kernel, else None. Called with the rows of slots, ``count``, robot and runs,
+    the kernel fills in the rows ``pull``: what an iteration adds to the base and to the joints of
+    the arm, 0 for locked coordinates of the base.
     """
     at, iteration = batch.at[0], 0
     square = largest_square(robot.model.correction_tolerance)
@@ -425,7 +429,7 @@ def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
 
 @inner
 def project(v: Any, x: Any, y: Any) -> None:
-    """Project joint changes ``v``, in place, onto the null space of a Jacobian with rows ``x, y``.
+    """Project joint changes ``v``, in place, onto the null space of the Jacobian with rows x, y.
 
     v −= J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺. A singular value below a millionth of the larger counts as 0.
     """
@@ -451,7 +455,8 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 @inner
 def _pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
-    """Set what pulls each slot to the preferred posture p of its run: β N(q) (p − q)."""
+    """Set the rows ``pull`` of the first ``count`` slots to β N(q) (p − q): the share β of the way
+    to the preferred posture p of the run, in the null space of the hand."""
     tip = len(at.length)
     for i in range(count):
         run, v = runs[at.run[i]], at.pull[:, i]
@@ -473,20 +478,21 @@ def _pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
 
 @shared
 def pull_slots(batch: Any, count: int, robot: Any) -> None:
-    """Let **A** with the pull to the preferred posture descend in the first ``count`` slots
-    (:func:`descend_to_goals`)."""
+    """Run the corrective process **A**, pulled to each run's preferred posture, in the first
+    ``count`` slots (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, _pull_to_preferred)
 
 
 @shared
 def correct_slots(batch: Any, count: int, robot: Any) -> None:
-    """Let the paper's **A** descend in the first ``count`` slots (:func:`descend_to_goals`)."""
+    """Run the paper's corrective process in the first ``count`` slots, until all have ended; the
+    results go into ``target`` and ``converged`` of their runs (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, None)
 
 
 @entry
 def _correct_kernel(robot: Any, batch: Any) -> None:
-    """Correct the target of the only run."""
+    """Run the corrective process for run 0 of a batch; its ``target`` becomes the last iterate."""
     run = batch.runs[0]
     load(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
     correct_slots(batch, 1, robot[0])
@@ -555,13 +561,13 @@ def explain_failure(
     locked_base: Collection[str],
     model: MotionModel,
 ) -> str:
-    """Explain why the corrective process may have failed from ``q``, as the end of a sentence;
-    empty without a cause that users can mend.
+    """Return why the corrective process may have failed from ``q``, as the end of a sentence that
+    begins with a colon; empty if there is no cause that users can mend.
 
-    One is a hand whose joints all lie on the line to the goal: none of them moves it nearer. The
-    others are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``, with the
-    singular values σ of the Jacobian J; so the descent is stable while gain × |J|² is below 2, for
-    the largest σ, which is that of the stretched arm, and slow where that is small.
+    One cause is a hand whose joints all lie on the line to the goal: none of them moves the hand
+    nearer. The others are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``,
+    with the singular values σ of the Jacobian J; so the descent is stable while gain × |J|² is
+    below 2, for the largest σ, which is that of the stretched arm, and slow where that is small.
     """
     free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
     arm = robot.joints(hand)
@@ -596,12 +602,11 @@ def follow(
     *,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Follow a joint-space path through ``waypoints`` (k, dof) until the goal is hit.
+    """Move from ``q`` in steps along straight joint-space lines from waypoint to waypoint.
 
-    The k-th point lies at arc length ``k m`` of the polyline from ``q`` through the
-    waypoints, the last point at its end. The movement stops at the first point with
-    the hand within ``radius`` of the goal, or at the end; k steps take k + 1 ticks, as
-    for :func:`move`. Raises ValueError for a wrong shape.
+    ``waypoints`` has shape ``(W, dof)``; the points of the path are those of :func:`path_points`.
+    The movement stops at the first point with the hand within ``radius`` of the goal's centre, or
+    at the last waypoint; k steps take k + 1 ticks. Raises ValueError for a wrong shape.
     """
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
@@ -613,8 +618,8 @@ def follow(
 
 
 def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
-    """Return the points of a straight movement from ``q`` to ``target``, both included, shape
-    ``(n + 1, dof)``, as the kernels round them."""
+    """Return the configurations at the n steps of a straight movement from ``q`` to ``target``,
+    both included, shape ``(n + 1, dof)``, with the rounding of the kernels."""
     difference, square = target - q, 0.0
     for value in difference.tolist():
         square += value * value
@@ -624,10 +629,11 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """Return the points of a path, ``(n + 1, dof)``: its steps of length m and its end.
+    """Return the configurations at the n steps of a path from ``q`` through ``waypoints``, shape
+    ``(W, dof)``: shape ``(n + 1, dof)``.
 
-    Point k lies at arc length ``k m`` of the polyline from ``q`` through ``waypoints``
-    (k, dof). Raises ValueError for a wrong shape.
+    Point k, from 0 (``q``), lies at length k times ``model.step`` of the polyline in joint space;
+    the last point is the last waypoint. Raises ValueError for a wrong shape.
     """
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
@@ -639,14 +645,14 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
 
 
 def configuration(robot: Robot, q: Any) -> Array:
-    """Return a contiguous copy of one configuration, shape ``(dof,)``. Raises ValueError for a
-    wrong shape, and for an entry that is not finite or beyond ``LARGEST_ENTRY``."""
+    """Return one configuration as a new contiguous array, shape ``(dof,)``. Raises ValueError for a
+    wrong shape, and for an entry that is not finite or beyond ±100,000."""
     return finite_array("configuration", q, (robot.dof,))
 
 
 def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
-    """Return a contiguous copy of an array of numbers, for the kernels. Raises ValueError where the
-    shape is another or a number is not finite or beyond ``LARGEST_ENTRY``."""
+    """Return numbers as a new contiguous array of float64. Raises ValueError, which calls the value
+    ``name``, for another shape and for a number that is not finite or beyond ±100,000."""
     array = np.array(real_array(name, value), order="C")
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}; needed is {shape}")
@@ -668,8 +674,8 @@ def _check_arm(robot: Any, hand: Any) -> None:
 
 
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
-    """Return the centre of a goal, x and y, as floats. Raises ValueError if it is not two numbers,
-    not finite or beyond ``LARGEST_ENTRY``, or for a radius that is not from 0 to it."""
+    """Return the centre of a goal, x and y, as two floats. Raises ValueError if it is not two
+    finite numbers within ±100,000, or if ``radius`` is not from 0 to 100,000, length unit."""
     place = real_array("goal", centre)
     if place.shape != (2,):
         raise ValueError(f"goal is {brief_value(centre)}; it must be two numbers, x and y")

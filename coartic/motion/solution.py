@@ -121,16 +121,16 @@ class Execution:
 
     @property
     def reward(self) -> int | None:
-        """Total reward, -1 a tick; None where the task was not completed."""
+        """Total reward, minus the number of ticks; None if the task was not completed."""
         return -self.ticks if self.completed else None
 
     @property
     def hands(self) -> str:
-        """Hand used for each goal, such as ``"LRLR"``."""
+        """Hand used for each goal that was attempted, in the order of goals, such as ``"LRLR"``."""
         return hands_in(self.movements)
 
     def ticks_by_goal(self) -> tuple[int, ...]:
-        """Control ticks spent on each goal that was attempted, in the order of the goals."""
+        """Return the control ticks spent on each goal that was attempted, in the order of goals."""
         spent: dict[int, int] = {}
         for movement in self.movements:
             spent[movement.goal] = spent.get(movement.goal, 0) + (movement.ticks or 0)
@@ -197,8 +197,8 @@ def execute(
 
 
 def hint_of(movements: Iterable[Movement]) -> str:
-    """Return a hint if a target of some movements turns a joint as far as degrees would; else an
-    empty text."""
+    """Return a question on the first movement, unless corrective, whose target has a joint angle
+    beyond 20 rad, as if it were meant in degrees; an empty text without such a movement."""
     for movement in movements:
         if movement.kind != "corrective" and movement.target is not None:
             angle = max(movement.target[BASE_DOF:].tolist(), key=abs)
@@ -211,7 +211,7 @@ def hint_of(movements: Iterable[Movement]) -> str:
 
 
 def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
-    """Return the numbers, from 1, of the goals for which corrective movements alone were made."""
+    """Return the numbers, from 1 and in order, of the goals that have corrective movements only."""
     kinds = defaultdict[int, set[str]](set)
     for movement in movements:
         kinds[movement.goal].add(movement.kind)
@@ -221,10 +221,11 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 def execute_many(
     compiled: CompiledTask, solutions: Iterable[Iterable[Movement]], *, outside: bool = True
 ) -> list[Execution | Refused]:
-    """:func:`execute` solutions of one task side by side, which takes a fraction of the time.
+    """Execute and score solutions of one task side by side, in a fraction of the time.
 
     Returns for each solution, in order, its execution, or the error that :func:`execute` would
-    raise; no such error is raised. ``outside``: see :func:`coartic.motion.trial.count_trials`.
+    raise, as an object; no such error is raised. ``outside`` as in
+    :func:`coartic.motion.trial.count_trials`.
     """
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
@@ -245,16 +246,15 @@ Plan = list[list[Movement]]
 
 
 def _has_path(plan: Plan) -> bool:
-    """Return whether a movement of a plan follows a path."""
+    """Return whether a plan, the movements of a solution by goal, has a movement of kind path."""
     return "path" in [movement.kind for movements in plan for movement in movements]
 
 
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return the movements to a goal up to the first one without a target, as the kernel takes
-    them.
+    """Return the movements to a goal before the first movement without a target, for the kernel.
 
-    **A** finds the target of that one; movements after it are not made. None comes first where the
-    first movement is corrective: the kernel then checks whether the hand is in the goal already.
+    The corrective process makes that movement; movements after it are not made. None comes first
+    if the first movement is corrective: the kernel then checks whether the hand is in the goal.
     """
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -265,7 +265,8 @@ def _with_targets(movements: list[Movement]) -> list[Movement | None]:
 
 
 def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool) -> list[Execution]:
-    """Return the executions of plans without paths, made side by side."""
+    """Execute plans (movements by goal) without paths side by side; return the executions in the
+    order of plans. ``outside`` as in :func:`coartic.motion.trial.count_trials`."""
     if not plans:
         return []
     given = [[_with_targets(movements) for movements in plan] for plan in plans]
@@ -288,11 +289,11 @@ def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool)
 def movements_in(
     accounts: NDArray[np.void], dof: int, given: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
-    """Return the movements of N trials from the accounts of their goals, shape ``(N, G, M)``, up to
-    the first goal missed.
+    """Return a list of the movements made in each of N trials, up to the first goal missed, from
+    the accounts of goals, shape ``(N, G, M)``.
 
-    ``given`` has the movements to given targets, by trial and goal, as :func:`_with_targets`
-    returns them; the movements returned have their kinds.
+    ``given`` has the movements that were to be made, by trial and goal, as :func:`_with_targets`
+    returns them; they give the kinds. A goal hit without one has a corrective movement of 0 ticks.
     """
     names = ("hand", "hit", "ticks", "corrections")
     first = accounts[..., 0]
@@ -322,7 +323,8 @@ def movements_in(
 
 
 def _make_one_by_one(compiled: CompiledTask, plan: Plan, outside: bool) -> Execution:
-    """Return the execution of a plan with paths, made one movement after the other."""
+    """Execute a plan (movements by goal) with paths, one movement after the other, and return the
+    execution. ``outside`` as in :func:`coartic.motion.trial.count_trials`."""
     if outside:
         count_trials(1)
     task, q = compiled.task, compiled.starts[0]
@@ -363,9 +365,10 @@ def _make_one_by_one(compiled: CompiledTask, plan: Plan, outside: bool) -> Execu
 def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
-    """Return the execution of a plan, up to the goal that failed, with totals and the reason.
+    """Return the execution, with its totals and the reason of a failure, of a plan that was made.
 
-    ``movements`` are as made; ``goals`` are the accounts of the goals.
+    ``plan`` has the movements as given, by goal; ``movements`` has the movements as made, in order,
+    up to the goal that failed; ``goals`` are the accounts of the goals, shape ``(G,)``.
     """
     hits = sum(goals["hit"].tolist())
     # The place of the hand is known before the first movement, and where that leads.
@@ -382,11 +385,11 @@ def _execution_of(
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
-    """Return the joint travel of the arm that does not hit, rad: the distance in the space of its
-    joints from hit to hit, the first from the start, summed over the goals.
+    """Return the joint travel of the idle arm, rad, summed over the goals: for each goal the
+    Euclidean distance of the joint angles of the arm that does not hit it from their values at the
+    hit before (for goal 1, at the start). It is 0 if that arm keeps still, as in EC1 and EC3.
 
-    ``hands`` has the hand for each goal, ``reached`` the configuration at each hit, shape
-    ``(G, dof)``. 0 where that arm keeps still, as in EC1 and EC3.
+    ``hands`` has the hand for each goal, ``reached`` the configuration at each hit, ``(G, dof)``.
     """
     travel, before = 0.0, task.q0
     for hand, q in zip(hands, reached, strict=True):
@@ -401,8 +404,9 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
-    """Return the movements of a solution in a list for each goal. Raises SolutionError for a
-    solution that breaks the task's rules."""
+    """Check a solution, and return a list of the movements for each goal, in the order of goals
+    (movements as :func:`_check_movement` returns them). Raises SolutionError for a solution that
+    breaks the task's rules."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
             f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
@@ -434,8 +438,9 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_movement(task: Task, movement: Movement) -> Movement:
-    """Return the movement, a path with its target. Raises SolutionError or ValueError if the
-    movement lacks what its kind needs or leads to a configuration that the task does not allow."""
+    """Return the movement itself, or a copy with a path's last waypoint as its target or with
+    locked base coordinates as at the start. Raises SolutionError or ValueError if the movement
+    lacks what its kind needs or leads to a configuration that the task does not allow."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
@@ -461,8 +466,9 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 
 
 def _check_point(task: Task, point: Any) -> Array:
-    """Return the configuration, with locked base coordinates put back (:func:`_hold_base`). Raises
-    ValueError for what is no configuration of the robot, or moves a locked base coordinate."""
+    """Return a configuration as an array: the array given, or a copy in which locked base
+    coordinates are those of the start (:func:`_hold_base`). Raises ValueError if it is no
+    configuration of the robot, or moves a locked base coordinate."""
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
@@ -491,9 +497,9 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Return a copy of targets, shape ``(N, G, dof)``, with locked base coordinates put back
-    (:func:`_hold_base`); NaN passes. Raises ValueError for another shape, for infinite entries and
-    for targets that move a locked base."""
+    """Return a copy of targets, shape ``(N, G, dof)``, in which locked base coordinates are those
+    of the start (:func:`_hold_base`); NaN passes. Raises ValueError for another shape, for infinite
+    entries and for targets that move a locked base."""
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
@@ -579,7 +585,8 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
 
 
 def corrective_movements(hands: str) -> list[Movement]:
-    """Return a corrective movement for each goal, with the given hands."""
+    """Return a list of one corrective movement, without a target, for each goal, with the hands of
+    a sequence such as ``"RRLR"``."""
     return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]
 
 
@@ -657,8 +664,8 @@ def initial_hands(
 
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
-    """Return the reward of the corrective process alone with a task's initial hands; None if the
-    process fails with these hands, or completes the task with no hands."""
+    """Return the reward, minus the ticks, of a trial by the corrective process alone with a task's
+    initial hands; None if the trial fails, or a policy finds no hands that complete the task."""
     try:
         hands = initial_hands(task, model=model)
     except NotApplicableError:

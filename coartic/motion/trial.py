@@ -73,10 +73,11 @@ TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 
 @cache
 def account_type(width: int) -> np.dtype[np.void]:
-    """Return the type of the account of a goal, with configurations of ``width`` entries.
+    """Return the NumPy type of the account of a goal: what happened in a trial until the goal was
+    hit or missed; configurations have ``width`` entries.
 
-    Where several movements to targets are given, each has a record: its ``target`` and ``moved``;
-    the first record has all else.
+    If several movements to targets are given for a goal, each has a record with its ``target`` and
+    ``moved``; the first record has all else.
     """
     fields = {
         "q": (np.float64, width),  # where the robot is in the end, length unit and rad
@@ -99,15 +100,17 @@ def account_type(width: int) -> np.dtype[np.void]:
 
 @inlined
 def set_off(run: Any, q: Any) -> None:
-    """Put a run at configuration ``q``, where its trial starts."""
+    """Put a run (record of a robot in its trial), in place, at configuration ``q``, where the trial
+    starts: the trial goes on, and no evaluations are counted yet."""
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
 
 
 @inlined
 def begin(run: Any, goal: Any) -> None:
-    """Phase 1, *begin*: set the next goal of a run, whose trial may have ended. Without a target
-    the run only checks whether its hand is in the goal."""
+    """Set the next goal, x and y, of a run (record of a robot in its trial), in place: phase 1,
+    *begin*. Unless *aim* sets a target, the run only checks whether its hand is in the goal; a run
+    whose trial has ended does nothing."""
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
     run.action = CHECK if run.going else IDLE
@@ -116,7 +119,8 @@ def begin(run: Any, goal: Any) -> None:
 
 @inlined
 def aim(run: Any, target: Any) -> None:
-    """Phase 2, *aim*: set the target of a run; a joint whose entry is NaN stays where it is."""
+    """Set the target of a run (record of a robot in its trial), in place: phase 2, *aim*. A joint
+    whose entry of ``target`` is NaN stays where it is; if all are NaN, no movement is made."""
     for j in range(len(target)):
         if not math.isnan(target[j]):
             run.target[j] = target[j]
@@ -125,7 +129,9 @@ def aim(run: Any, target: Any) -> None:
 
 @inlined
 def move(count: int, robot: Any, batch: Any) -> None:
-    """Phase 3, *move*: let each run act; a run that does not move takes no ticks."""
+    """Move each of the first ``count`` runs of a batch (records of robots) to its target, or check
+    whether its hand is in the goal, as its ``action`` says: phase 3, *move*. ``q``, ``hit`` and
+    ``ticks`` change in place; a run without a movement takes 0 ticks."""
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action
@@ -139,16 +145,18 @@ def move(count: int, robot: Any, batch: Any) -> None:
 
 @inlined
 def correct(count: int, robot: Any, batch: Any) -> None:
-    """Phase 4, *correct*: have the corrective process **A** find configurations that hit missed
-    goals, and move the runs there: their ``target`` and ``ticks`` become those of these movements.
-    A preferred posture has its place in :func:`coartic.motion.movement.descend_to_goals`."""
+    """Correct missed goals of the first ``count`` runs, in place: phase 4, *correct*. The
+    corrective process **A** finds configurations that hit, and the runs move there; ``target`` and
+    ``ticks`` become those of these movements. A preferred posture would have its place in
+    :func:`coartic.motion.movement.descend_to_goals`."""
     find_corrections(count, robot, batch)
     make_corrections(count, robot, batch)
 
 
 @inlined
 def make_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Move the runs for which **A** converged to the configurations that it found."""
+    """Move those of the first ``count`` runs for which **A** converged, in place, to the
+    configurations that **A** found, their ``target``."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -156,8 +164,8 @@ def make_corrections(count: int, robot: Any, batch: Any) -> None:
 
 @inlined
 def account(run: Any, moved: int, goal: Any) -> None:
-    """Phase 5, *account*: write the result of a run, whose movements to targets took ``moved``
-    ticks, into the account ``goal`` of its goal."""
+    """Write the result of a run for its goal into the record ``goal``, in place: phase 5,
+    *account*. ``moved``: ticks of its movements to targets. A run that missed ends its trial."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = moved + run.ticks
@@ -171,7 +179,8 @@ def account(run: Any, moved: int, goal: Any) -> None:
 
 @inlined
 def count_goal(goal: Any, counts: Any) -> None:
-    """Add the account of a goal to the counts of a trial, shape ``(5,)``, in place."""
+    """Add ticks, evaluations, iterations, corrections and failure in the account of a goal to the
+    counts of a trial, shape ``(5,)``, in place."""
     counts[TICKS] += goal.ticks
     counts[EVALUATIONS] += goal.evaluations
     counts[ITERATIONS] += goal.iterations
@@ -181,8 +190,8 @@ def count_goal(goal: Any, counts: Any) -> None:
 
 @shared
 def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
-    """Move those of the first ``count`` runs that are acting to their targets, in place; with
-    ``stops`` a movement ends on arrival, too."""
+    """Move those of the first ``count`` runs whose ``acting`` is True to their targets, in place;
+    a movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near it."""
     at, slot = batch.at[0], 0
     for i in range(count):
         if batch.runs[i].acting:
@@ -194,8 +203,9 @@ def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
 
 @inlined
 def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
-    """Have **A** find a ``target`` that hits the goal for each run that missed it, with kernel
-    ``descend``; ``converged`` of a run becomes True if **A** found a target."""
+    """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
+    for each of the first ``count`` runs that missed it; no run moves. ``converged`` of a run
+    becomes True if **A** found a target."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -210,14 +220,15 @@ def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
 
 @shared
 def find_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Have the paper's **A** find targets that hit missed goals (:func:`_find_by`)."""
+    """Have the paper's corrective process **A** find targets that hit the goals which the first
+    ``count`` runs missed; no run moves (:func:`_find_by`)."""
     _find_by(count, robot, batch, correct_slots)
 
 
 @shared
 def find_pulled_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Have **A** find targets that hit missed goals, pulled to each run's preferred posture
-    (:func:`_find_by`)."""
+    """Have **A**, pulled to each run's preferred posture, find targets that hit the goals which the
+    first ``count`` runs missed; no run moves (:func:`_find_by`)."""
     _find_by(count, robot, batch, pull_slots)
 
 
@@ -261,7 +272,7 @@ class Accounts(NamedTuple):
 
 @inlined
 def row_of(rows: Any, n: int) -> Any:
-    """Row ``n``, or row 0 if all arms share it."""
+    """Return row ``n`` of ``rows``, or row 0 if there is one row, which all arms share."""
     return rows[n if len(rows) > 1 else 0]
 
 
@@ -345,8 +356,8 @@ _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 
 
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
-    """Return accounts of ``count`` trials with so many goals, and so many movements to targets for
-    each goal. The counts of the trials are 0; all else is to be filled in."""
+    """Return accounts of ``count`` trials with ``goals`` goals and ``moves`` movements to targets
+    for each goal. The counts of the trials are 0; the caller fills in all else."""
     return Accounts(
         np.empty((count, goals, moves), account_type(width_of(robot))),
         np.zeros((count, len(COUNTED)), dtype=np.int64),
@@ -355,8 +366,8 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
-    """Let N arms reach for G goals each, in turn, until they miss one. ``parameters`` come from
-    :func:`robot_parameters`.
+    """Let N arms reach for G goals each, in turn; an arm that misses a goal makes no further
+    movement. Return their accounts. ``parameters`` come from :func:`robot_parameters`.
 
     A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
     checked. Many arms are shared among threads.
@@ -422,16 +433,16 @@ def reach_goals(
     robot : Robot
         The robot of all arms.
     q : ndarray, shape (N, dof)
-        Where they are, length unit (base) and rad (joints).
+        Configurations in which the arms start, length unit (base) and rad (joints).
     hands : ndarray of int, shape (N,)
-        Their hands: 0 left, 1 right.
+        Hand of each arm: 0 left, 1 right.
     goals : ndarray, shape (N, 2)
-        Centres of their goals, x and y, length unit.
+        Centre of the goal of each arm, x and y, length unit.
     radius : float
         Radius of all goals, length unit.
     targets : ndarray, shape (N, dof), optional
-        Where to move first. A joint whose target is NaN keeps its value, and an arm whose row is
-        NaN has no target, as all arms by default: the corrective process acts alone.
+        Targets of the first movements. A joint whose target is NaN keeps its value, and an arm
+        whose row is NaN has no target, as all arms by default: the corrective process acts alone.
     checks : bool
         Whether the hand of an arm without a target may be in its goal already; else the corrective
         process begins at once.
@@ -500,9 +511,9 @@ _last_compiled: CompiledTask | None = None
 
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
-    """Return a task for the kernels; the last one is kept: do not change its arrays. Raises
-    ValueError for a task or a model with which no trial can be made, such as an unchecked copy
-    of a task (``model_copy``)."""
+    """Return a task with a model as the kernels read it. The last result is kept: do not change its
+    arrays. Raises ValueError for a task or a model with which no trial can be made; an unchecked
+    copy of a task (``model_copy``) can be such."""
     global _last_compiled
     last = _last_compiled  # another thread may replace it
     if last is not None and last.task is task and last.model is model:
@@ -527,11 +538,11 @@ _outside = 0
 
 
 def count_trials(count: int) -> None:
-    """Add to the number of trials outside sessions (:func:`trials_outside`).
+    """Add ``count`` to the number of trials made outside the sessions of runs
+    (:func:`trials_outside`).
 
-    Called where trials are made, in the callers of the three loops and of single movements, unless
-    ``outside`` is False: then the session of a run makes the trials. No function that has trials
-    made needs to count.
+    Functions that make trials call it, unless their argument ``outside`` is False: then the session
+    of a run makes the trials. Their callers need not count.
     """
     global _outside
     _outside += count
@@ -550,9 +561,9 @@ def make_trials(
     *,
     outside: bool = True,
 ) -> Accounts:
-    """Make N trials of a task and return their accounts: ``hands`` has shape ``(N, G)``;
-    ``targets`` and ``stops`` are as in :class:`Requests`, ``outside`` as in
-    :func:`count_trials`."""
+    """Make N trials of a task and return their accounts. ``hands``, 0 or 1, has shape ``(N, G)``,
+    ``targets`` shape ``(N, G, M, dof)``, with NaN for joints that stay; ``stops`` is as in
+    :class:`Requests`, ``outside`` as in :func:`count_trials`."""
     if outside:
         count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
@@ -560,8 +571,8 @@ def make_trials(
 
 
 def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
-    """Return the reason why a trial with these accounts of its goals, shape ``(G,)``, was not
-    completed; empty if the trial was completed."""
+    """Return a sentence on the first goal that a trial missed, and why, from the accounts of its
+    goals, shape ``(G,)``; empty if the trial hit every goal."""
     if goals["hit"][-1]:
         return ""
     number = int(goals["hit"].argmin())
@@ -595,13 +606,13 @@ class Trials(NamedTuple):
 
     @property
     def rewards(self) -> Array:
-        """Total rewards, shape ``(N,)``; -inf where a trial failed."""
+        """Total reward of each trial, minus its ticks, shape ``(N,)``; -inf where it failed."""
         return np.where(self.completed, -self.ticks, -np.inf)
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Return the results of trials from their accounts. They share memory with ``accounts``, in
-    which ``q`` becomes NaN for goals that are not hit."""
+    """Return the results of trials from their accounts. The results share memory with ``accounts``,
+    which are changed: ``q`` becomes NaN for goals that are not hit."""
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
@@ -622,9 +633,9 @@ HandSequences = str | Sequence[str]
 
 
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
-    """Return the hand of every trial and goal, 0 left or 1 right, shape ``(count, G)``.
+    """Return the hand for each goal of ``count`` trials, 0 left or 1 right, shape ``(count, G)``.
 
-    Raises ValueError if the sequences do not fit the task or the number of trials.
+    Raises ValueError if the sequences do not fit the task, or their number is not ``count``.
     """
     several = isinstance(hands, Iterable) and not isinstance(hands, str)
     each: list[Any] = list(hands) if several else [hands]
@@ -650,13 +661,11 @@ MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 def ranked_sequences(
     task: Task, sequences: Collection[str], *, model: MotionModel = PAPER, outside: bool = True
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
-    """Make a trial by the corrective process alone with each hand sequence; best first, failed ones
-    last.
-
-    Returns for each sequence its letters, the reward (None if the trial fails), the reason of the
-    failure (or empty), and the counts of the trial by :data:`COUNTED`. Of equal rewards the
-    sequence with the fewest changes of hand comes first, then the one that was given first.
-    """
+    """Make a trial by the corrective process alone with each hand sequence; return a list, ordered
+    by reward, the best first and failed trials last. An entry has the sequence, the reward (None if
+    the trial failed), the reason of the failure (or empty), and the counts of the trial by
+    :data:`COUNTED`. Of equal rewards the sequence with the fewest changes of hand comes first, then
+    the sequence given first."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets, outside=outside)
@@ -679,15 +688,14 @@ def ranked_sequences(
 
 
 def changes_of_hand(sequence: str) -> int:
-    """Count the pairs of successive goals that different hands hit, of a sequence as ``"LRLR"``."""
+    """Return the number of goals for which a hand sequence has another hand than for the goal
+    before: 3 for ``"LRLR"``."""
     return sum(a != b for a, b in itertools.pairwise(sequence))
 
 
 def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
-    """List all sequences of some hands for a number of goals, such as ``"LRLR"``, in alphabetical
-    order.
-
-    Raises NotApplicableError, which calls the task ``task``, if there are more than 4096.
+    """List all sequences of ``hands`` for a number of goals, such as ``"LRLR"``, in alphabetical
+    order. Raises NotApplicableError, which calls the task ``task``, if there are more than 4096.
     """
     ordered = [hand for hand in HANDS if hand in hands]
     if reason := too_many_sequences(task, goals, len(ordered)):
@@ -696,8 +704,8 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
-    """Return a sentence on why not all hand sequences of a task can be tried; None if all can be.
-    ``hands`` is the number of hands."""
+    """Return a sentence that a task, called ``task``, has more than 4096 hand sequences, too many
+    to try; None if it has not. ``goals`` and ``hands`` are numbers of goals and of hands."""
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
@@ -725,12 +733,13 @@ def search_initial_hands(
     model: MotionModel = PAPER,
     outside: bool = True,
 ) -> tuple[str, Mapping[str, int]]:
-    """Find the hand sequence of trial 0; return it with the counts of the search, by names of
-    :class:`~coartic.method.Meter`: empty for a sequence that the task names.
+    """Return the hand sequence of trial 0, such as ``"RRRR"``, and the counts of the search for it,
+    by counters of :class:`~coartic.method.Meter`.
 
-    By a policy it is the sequence with which the corrective process alone gets the highest reward:
-    among sequences of one hand, or among all, of ``hands`` (by default the task's). Raises
-    NotApplicableError if the process completes the task with none, or there are too many.
+    A sequence that the task names is returned, with no counts, whatever ``hands``. If the task
+    names a policy, it is the sequence of ``hands`` (by default the task's) with which the
+    corrective process alone gets the highest reward, among all sequences or those of one hand.
+    Raises NotApplicableError if no sequence completes the task, or there are more than 4096.
     """
     allowed = hands_among(task, hands)
     if not task.initial_is_policy:
@@ -743,11 +752,8 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel, outside: bool
 ) -> tuple[str, Mapping[str, int]]:
-    """Return the best hand sequence that the task's ``initial_hands`` allows, each tried by the
-    corrective process alone, and the counts of the search; the last 64 searches are kept.
-
-    ``task_json`` is the task; ``hands`` are the hands that a sequence may have. Raises
-    NotApplicableError if no sequence completes the task, or there are too many.
+    """Search for the hand sequence of trial 0 by the policy of a task, given as JSON; arguments and
+    results are those of :func:`search_initial_hands`. The last 64 results are kept.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)

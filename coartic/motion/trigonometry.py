@@ -34,7 +34,7 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Sine and cosine of the angle less k quarter turns, and k modulo 4."""
+    """Return sine and cosine of angle less k quarter turns (k: the nearest), and k modulo 4."""
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
     # Estrin's order: short chains of dependent operations.
@@ -68,17 +68,18 @@ def near_sine(angle: float) -> float:
 
 @scalar
 def cosine(angle: float) -> float:
-    """cos(angle), angle in rad."""
+    """Return cos(angle), angle in rad; the same bits on every system below 1e5 rad."""
     return near_cosine(angle) if abs(angle) < LARGEST else math.cos(angle)
 
 
 @scalar
 def sine(angle: float) -> float:
-    """sin(angle), angle in rad."""
+    """Return sin(angle), angle in rad; the same bits on every system below 1e5 rad."""
     return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)
 
 
 @inner
 def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
-    """:func:`coartic.robot.chain` with this cosine and sine."""
+    """Fill ``xs`` and ``ys`` in place (:func:`coartic.robot.chain`), with the cosine and sine of
+    this module."""
     chain_by(q, arm, xs, ys, cosine, sine)

@@ -74,10 +74,8 @@ def load_task(name_or_path: str | Path) -> Task:
 
 
 def as_task(task: TaskLike) -> Task:
-    """Return the task itself, or load it by its name or from its file (:func:`load_task`).
-
-    Raises TaskError if there is no such task, and TypeError for anything else.
-    """
+    """Return the task itself, or load it by its name or from its file (:func:`load_task`). Raises
+    TaskError if there is no such task, and TypeError for anything else."""
     if isinstance(task, Task):
         return task
     if not isinstance(task, str | Path):

@@ -68,8 +68,8 @@ _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
 def _in_thousandths(value: float) -> int:
-    """Convert a number to thousandths. Raises a validation error unless it is finite, with at most
-    three decimals."""
+    """Return a number in thousandths, 300 for 0.3. Raises a validation error unless it is finite,
+    with at most three decimals."""
     if not math.isfinite(value):
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
@@ -185,11 +185,9 @@ class Family(FileData):
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
-    """Return the task drawn for an instance at the given attempt, from 0, before any rule is
-    checked; equal arguments give equal tasks.
-
-    Its goals may be out of reach. Its ``initial_hands`` is the name of the family's policy, not yet
-    a hand sequence.
+    """Return the task drawn for the instance at ``address`` in attempt ``attempt`` (from 0); equal
+    arguments give equal tasks. No rule of the family is checked (:func:`broken_rule`): goals may be
+    out of reach. ``initial_hands`` is the name of the family's policy, not yet a hand sequence.
     """
     key = hash_key(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)
@@ -219,9 +217,9 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 
 
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
-    """Draw ``count`` goals, x and y in thousandths of a length unit: in a box within the region,
-    or, if the family has a line, on a line (``vertical`` or horizontal) but for one goal that is
-    neither first nor last. Goals on a line may be outside the region."""
+    """Draw ``count`` goals and return their x and y, thousandths of a length unit: in a box within
+    the region, or, if the family has a line, on a line (``vertical`` or horizontal) except one
+    goal, neither first nor last, that is off it. Goals on a line may be outside the region."""
     region, line = family.region, family.line
     share, sides = draws.integer(*region.scale), []
     for low, high in (region.x, region.y):
@@ -246,7 +244,8 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
 
 @checked_arguments
 def broken_rule(family: Family, task: Task) -> str | None:
-    """Return the first rule of the family that a draft breaks; None if it breaks none.
+    """Return the name of the first rule of the family that a draft, a task drawn for it, breaks;
+    None if it breaks no rule.
 
     ``outside``: a goal is outside the region. ``overlap``: two goals are too near to each other.
     ``reach``: a hand cannot come near enough to a goal, with the base of the draft or of a
@@ -290,10 +289,9 @@ def broken_rule(family: Family, task: Task) -> str | None:
 def first_good(
     family: Family, address: Address, most: int = MOST_ATTEMPTS
 ) -> tuple[Task, tuple[str, ...]]:
-    """Return the first draft that breaks no rule, and the rules that earlier drafts broke, in
-    order.
-
-    Raises TaskError if each of the first ``most`` drafts breaks a rule.
+    """Return the first draft (task drawn for the instance at ``address``) that breaks no rule, and
+    the name of the rule (:func:`broken_rule`) that each earlier draft broke, in order. Raises
+    TaskError if each of the first ``most`` drafts breaks a rule.
     """
     rejected: list[str] = []
     while len(rejected) < most:
@@ -310,9 +308,8 @@ def first_good(
 
 
 def instance_of(family: Family, address: Address) -> Task:
-    """Return the instance of a family at an address, with its initial hand sequence.
-
-    Raises TaskError if each of the first :data:`MOST_ATTEMPTS` drafts breaks a rule.
+    """Draw the instance of a family at an address, and return it as a task with a title, initial
+    hands and provenance. Raises TaskError if each of the first 10,000 drafts breaks a rule.
     """
     task, _ = first_good(family, address)
     name = str(address)
@@ -336,8 +333,8 @@ def instance_of(family: Family, address: Address) -> Task:
 @checked_arguments
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """Return an instance of a shipped family by its name, ``two-armed/v1/i017``. Raises TaskError
-    for any other name."""
+    """Return an instance of a shipped family, a task, by its name, such as ``two-armed/v1/i017``;
+    the last 4096 are kept. Raises TaskError for any other name."""
     address = address_of(name)
     if address is None:
         raise TaskError(
@@ -349,11 +346,10 @@ def instance(name: str) -> Task:
 
 @checked_arguments
 def named_by(text: str) -> list[str]:
-    """List the names of the instances of a range, ``two-armed/v1/i000..i039``, both ends included;
-    a text that is no range comes back alone, unchecked.
-
-    Raises TaskError for a range that is malformed, goes backwards or is longer than
-    :data:`MOST_CELLS`.
+    """List the names of the instances of a range such as ``two-armed/v1/i000..i039``, both ends
+    included; for a text that is no range, such as a task's name or a path, list this text alone,
+    unchecked. Raises TaskError for a range that is malformed, goes backwards or has more than
+    10,000 instances.
     """
     if "/" not in text or ".." not in text or text.endswith(".toml"):
         return [text]
@@ -374,17 +370,15 @@ def named_by(text: str) -> list[str]:
 
 
 def shipped_families() -> dict[str, Family]:
-    """Return the shipped families by name with version, such as ``two-armed/v1``."""
+    """Return a new dictionary of the shipped families by name with version, ``two-armed/v1``."""
     families = map(read_family, sorted(FAMILY_FOLDER.glob("*.v*.toml")))
     return {family.name: family for family in families}
 
 
 @checked_arguments
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
-    """Return the families of files by name.
-
-    Raises TaskError for a file that cannot be used, and for a name that another of the files or a
-    shipped family has.
+    """Return the families read from files, by name. Raises TaskError for a file that cannot be
+    used, and for a name that another of the files or a shipped family has.
     """
     families: dict[str, Family] = {}
     for path in paths:
@@ -397,8 +391,8 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 @checked_arguments
 def load_family(name: str) -> Family:
-    """Return a shipped family by name with version, as ``two-armed/v1``. Raises TaskError for an
-    unknown name."""
+    """Return a shipped family by its name with version, such as ``two-armed/v1``. Raises TaskError
+    for an unknown name."""
     shipped = shipped_families()
     if name not in shipped:
         raise TaskError(unknown("family", name, shipped))
@@ -407,8 +401,8 @@ def load_family(name: str) -> Family:
 
 @cache
 def read_family(path: Path) -> Family:
-    """Return a family from its file, ``two-armed/v1`` from ``two-armed.v1.toml``. A process reads
-    each path once.
+    """Read a family from its TOML file, which names it: ``two-armed.v1.toml`` has family
+    ``two-armed/v1``. A process reads each path once.
 
     Raises TaskError, with one line per problem, for a file that is no family.
     """
@@ -429,11 +423,11 @@ def read_family(path: Path) -> Family:
 def instance_names(
     family: str, split: Split, count: int | None = None, year: int | None = None
 ) -> list[str]:
-    """List the names of instances 0 to ``count`` - 1 of a split of a family; by default ``count``
-    is that of :data:`COUNTS`.
+    """List the names of instances 0 to ``count`` - 1 of a split (``"development"``, ``"test"``,
+    ``"fresh"``) of a shipped family; by default ``count`` is 1000 for development, else 10.
 
-    Raises ValueError for another split, for a count that is not from 1 to 10,000, and where fresh
-    instances have no year or others have one; TaskError where there is no such family.
+    Raises ValueError for another split, for a count that is not from 1 to 10,000, for fresh
+    instances without a year and for others with one; TaskError for an unknown family.
     """
     load_family(str(family))
     if split not in COUNTS:

@@ -42,7 +42,7 @@ class KnownOptimum:
 
     @property
     def proven(self) -> bool:
-        """True if no solution can be better."""
+        """True if it is proven that no solution can have a better reward."""
         return self.bound == self.reward
 
 
@@ -57,9 +57,9 @@ def essence(task: Task) -> str:
 
 @checked_arguments
 def best_shipped(task: Task) -> KnownOptimum | None:
-    """Return the best known reward of a task as it is shipped, whatever the task's name.
+    """Return the best reward known of a task, from the shipped files, whatever the task's name.
 
-    None for a task that is not shipped, and for instances beyond the first 40 of a family.
+    Returns None for a task that is not shipped, and for instances after the first 40 of a family.
     """
     return _by_essence().get(essence(task))
 
@@ -81,13 +81,14 @@ def _by_essence() -> dict[str, KnownOptimum]:
 
 
 def entries() -> list[dict[str, Any]]:
-    """Read the shipped data again, an entry per task and restriction, as ``optima.json`` has it.
+    """Read ``optima.json``; return a new list with a dictionary for each task of the paper and each
+    restriction (base and other arm).
 
-    ``task``, its :func:`essence`, ``base`` (directions in which it is locked; ``task``: as the task
-    locks it), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``; then ``reward``,
-    ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (reward that each found)
-    and ``solution`` (goal, hand, kind, target and waypoints of each movement); or ``infeasible``,
-    why no search has a solution.
+    Keys: ``task``, ``essence`` (:func:`essence`), ``base`` (coordinates that are locked; ``task``:
+    as the task locks them), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``;
+    then ``reward``, ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (reward
+    that each search found) and ``solution`` (goal, hand, kind, target and waypoints of each
+    movement); or ``infeasible``, the reason why no search has a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
     return content["optima"]

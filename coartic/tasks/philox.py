@@ -20,7 +20,8 @@ _WEYL = 0x9E3779B9, 0xBB67AE85  # golden ratio, sqrt(3) - 1
 
 
 def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
-    """Return four random words of 32 bits for a counter of four words and a key of two."""
+    """Return four random words, integers of 32 bits, for a counter of four words and a key of two;
+    equal arguments give equal words."""
     a, b, c, d = counter
     left, right = key
     for _ in range(_ROUNDS):
@@ -36,7 +37,7 @@ def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
 
 
 def hash_key(name: str) -> tuple[int, int]:
-    """The key that a name stands for: the first 64 bits of its SHA-256."""
+    """Return the key of a name: two words of 32 bits, the first 64 bits of its SHA-256."""
     digest = hashlib.sha256(name.encode()).digest()
     return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
 
@@ -53,10 +54,10 @@ class Draws:
         self._pairs = (pair for a, b, c, d in blocks for pair in (a << 32 | b, c << 32 | d))
 
     def integer(self, least: int, most: int) -> int:
-        """Draw a number from ``least`` to ``most``, each equally likely to within (most - least) /
-        2^64."""
+        """Draw an integer from ``least`` to ``most``, both included, each equally likely to within
+        (most - least) / 2^64."""
         return least + (next(self._pairs) * (most - least + 1) >> 64)
 
     def one_of(self, choices: Sequence[Choice]) -> Choice:
-        """Draw one of the choices, each equally likely."""
+        """Draw and return one of ``choices``, each equally likely."""
         return choices[self.integer(0, len(choices) - 1)]

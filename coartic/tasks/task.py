@@ -82,7 +82,8 @@ class Address(NamedTuple):
 
     @property
     def split(self) -> Split:
-        """Purpose of the instance: to tune on, to report on, or drawn after both were done."""
+        """Split of the instance: ``"development"`` (to tune on), ``"test"`` (to report on), or
+        ``"fresh"`` (drawn after both were done)."""
         return SPLITS.get(self.stream, "fresh")
 
     def __str__(self) -> str:
@@ -90,8 +91,9 @@ class Address(NamedTuple):
 
 
 def address_of(name: str) -> Address | None:
-    """Parse a task's name, FAMILY/STREAM and NUMBER: ``two-armed/v1/i017`` is family
-    ``two-armed/v1``, stream ``i``, number 17. None for any other spelling."""
+    """Return the address that a task's name spells: ``two-armed/v1/i017`` is family
+    ``two-armed/v1``, stream ``i``, number 17. None for a name of another form, such as ``i0017``;
+    whether the family exists is not checked."""
     parts = _ADDRESS.fullmatch(name)
     if parts is None:
         return None
@@ -158,21 +160,21 @@ class Task(FileData):
 
     @cached_property
     def q0(self) -> Array:
-        """Starting configuration, shape ``(dof,)``, read-only."""
+        """Starting configuration, shape ``(dof,)``, length unit and rad, read-only."""
         q = np.array([*self.start.base, *self.start.left, *self.start.right], dtype=np.float64)
         q.setflags(write=False)
         return q
 
     @cached_property
     def goal_array(self) -> Array:
-        """Goal centres, shape ``(G, 2)``, read-only."""
+        """Goal centres, x and y, shape ``(G, 2)``, length unit, read-only."""
         goals = np.array(self.goals, dtype=np.float64)
         goals.setflags(write=False)
         return goals
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
-        """Return an unchecked copy with some fields changed, and its arrays made of these
-        fields."""
+        """Return a copy with the fields in ``update`` changed, which are not checked; its arrays
+        ``q0`` and ``goal_array`` are those of the changed fields."""
         copied = super().model_copy(update=update, deep=deep)
         for name in ("q0", "goal_array"):
             copied.__dict__.pop(name, None)
@@ -180,29 +182,31 @@ class Task(FileData):
 
     @property
     def initial_is_policy(self) -> bool:
-        """True if the initial hands are found by a policy instead of being named."""
+        """True if ``initial_hands`` names a policy that finds the hands, not a hand sequence."""
         return self.initial_hands in INITIAL_POLICIES
 
     @property
     def label(self) -> str:
-        """Title of the task, or its name without a title."""
+        """Title of the task; its name if the title is empty."""
         return self.title or self.name
 
     @property
     def family(self) -> str | None:
-        """Family that has the task as an instance, with its version; None for other tasks."""
+        """Name of the family, with its version, if the task's name is that of an instance; else
+        None."""
         address = address_of(self.name)
         return address and address.family
 
     @property
     def split(self) -> Split | None:
-        """Purpose of an instance of a family; None for other tasks."""
+        """Split of an instance of a family, by the task's name: ``"development"``, ``"test"`` or
+        ``"fresh"``; None for other tasks."""
         address = address_of(self.name)
         return address and address.split
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
-        """Keys whose figures were inferred, not published."""
+        """Keys in ``provenance`` whose figures were inferred from the paper, not published."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="before")
@@ -299,7 +303,7 @@ class Task(FileData):
         )
 
     def _repr_html_(self) -> str:
-        """Return the picture that a notebook shows: base, arms and numbered goals at the start."""
+        """Return the HTML that a notebook shows: base, arms and numbered goals at the start."""
         arms = [self.robot.joint_positions(self.q0, hand) for hand in HANDS]
         lines = [(arms[0], "grey"), (arms[1], "currentColor")]
         corners = self.robot.base_outline(self.q0)
@@ -331,7 +335,8 @@ class Task(FileData):
 
 
 def check_hands(task: Task, hands: str) -> str:
-    """Return the hand sequence. Raises ValueError if the sequence does not fit the task."""
+    """Return the hand sequence itself, such as ``"RRLR"``. Raises ValueError unless it is a text
+    with the letter of one of the task's hands for each goal."""
     allowed = letters_of(sorted(task.hands))
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
     if not fits or not set(hands) <= set(allowed):
@@ -343,10 +348,9 @@ def check_hands(task: Task, hands: str) -> str:
 
 
 def _out_of_reach(task: Task, tolerance: float) -> str | None:
-    """Return a sentence on the first goal that no hand, or not its initial hand, can hit, or None.
-
-    ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
-    length unit.
+    """Return a sentence on the first goal that no hand of the task, or not the hand that
+    ``initial_hands`` gives it, can reach; None if all can be reached. ``tolerance`` is the distance
+    from a goal's centre at which the corrective process ends, length unit.
     """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
@@ -380,8 +384,8 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
 
 
 def check_task(task: Task) -> Task:
-    """Return the task itself. Raises TaskError for goals that the paper's corrective process cannot
-    reach."""
+    """Return the task itself. Raises TaskError if a goal is out of reach: no hand, or not its
+    initial hand, can come as near as the paper's corrective process has to."""
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
@@ -389,8 +393,8 @@ def check_task(task: Task) -> Task:
 
 
 def read_task(path: Path) -> Task:
-    """Read the task of a file, which has the file's name unless it states another. Raises
-    TaskError, which names the file and the key, for a file that is no task."""
+    """Read a task from its TOML file; a task without the key ``name`` has the file's name, without
+    the ending. Raises TaskError, which names the file and the key, for a file that is no task."""
     return parse_task({"name": path.stem, **read_toml(path, error=TaskError)}, str(path))
 
 
@@ -431,7 +435,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 
 
 def _all_keys() -> list[str]:
-    """Return all keys of a task file, whatever table they belong to."""
+    """Return all keys that a task file may have, in any of its tables."""
     robot = [field.name for field in fields(Robot)]
     others = (*Start.model_fields, *robot, *Provenance.model_fields)
     return [*Task.model_fields, *others]
@@ -456,7 +460,8 @@ def task_text(task: Task) -> str:
 
 
 def _toml_value(value: Any) -> str:
-    """A value as TOML writes it; strings as JSON does, of printable characters."""
+    """Return a value as TOML text: a string (of printable characters) as JSON writes it, a
+    dictionary as an inline table."""
     if isinstance(value, dict):
         return (
             "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
