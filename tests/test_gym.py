@@ -194,12 +194,6 @@ def test_where_the_corrective_process_fails_the_posture_takes_its_place():
     assert due is not None
 
 
-def test_actions_beyond_the_box_are_clipped():
-    env, vector = TaskEnv("two-armed-1"), TaskVectorEnv(2, "two-armed-1")
-    env.reset(), vector.reset()
-    assert env.step(np.full(10, 1e6))[1] == vector.step(np.ones((2, 10)))[1][0]
-
-
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [
