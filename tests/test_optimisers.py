@@ -131,9 +131,9 @@ def test_copies_are_refused_with_another_way():
 def test_another_process_that_inherits_it_is_refused():
     cost = coartic.objective("ascending", budget=50)
     SHARED[:] = [cost]
-    with multiprocessing.get_context("fork").Pool(1) as pool:
-        with pytest.raises(coartic.CoarticError, match="sent to another process"):
-            pool.map(evaluate_shared, [cost.x0])
+    refused = pytest.raises(coartic.CoarticError, match="sent to another process")
+    with multiprocessing.get_context("fork").Pool(1) as pool, refused:
+        pool.map(evaluate_shared, [cost.x0])
     assert cost.evaluations == 0
 
 
