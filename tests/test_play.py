@@ -186,7 +186,7 @@ RUNS = [
 
 
 def test_the_same_seed_learns_the_same_trial_by_trial():
-    trials = 1500
+    trials = 500
     tasks = [OWN.get(name) or load_task(name) for name, *_ in RUNS]
     cases = [
         (content(task), of, drift, str(seed), trials)

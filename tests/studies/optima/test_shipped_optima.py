@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
@@ -183,25 +184,29 @@ def test_a_solution_with_another_reward_is_refused():
         SHIPPED.solution_in_short(load_task("ascending"), movements, -291)
 
 
-def prove(folder, *asked):
-    """What ``prove.py`` prints, in a process of its own, and its log."""
-    command = [sys.executable, FOLDER / "prove.py", *asked, "--out", folder]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return done.stdout.splitlines(), SHIPPED.read_log(folder)
+def prove(monkeypatch, capsys, folder, *asked):
+    """What ``prove.py`` prints, in this process, and its log."""
+    monkeypatch.setattr(PROVE, "ProcessPoolExecutor", ThreadPoolExecutor)
+    monkeypatch.setattr("sys.argv", ["prove.py", *map(str, asked), "--out", str(folder)])
+    PROVE.main()
+    return capsys.readouterr().out.splitlines(), SHIPPED.read_log(folder)
 
 
-def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(files, tmp_path):
+def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(
+    files, tmp_path, monkeypatch, capsys
+):
     """A log whose last line was cut off, as where a process was killed."""
     family = (each for each in ENTRIES.values() if each["task"].startswith("two-armed/v1"))
     task, reward = next((e["task"], e["reward"]) for e in family if e["reward"] != e["bound"])
     folder, names = tmp_path / "optima", (task, "two-armed/v1/i002..i003")
-    shown, log = prove(folder, *names, "--seconds", "0.1")
+    asked = monkeypatch, capsys, folder, *names, "--seconds"
+    shown, log = prove(*asked, "0.1")
     assert [row["task"] for row in log] == [names[0]]  # the others are proven
     assert shown[0].startswith(f"{task} (base task, other arm free): {reward}, no solution ")
     with (folder / SHIPPED.LOG).open("a") as file:
         file.write('{"task": "two-armed/v1/i0')
-    assert prove(folder, *names, "--seconds", "0.1") == ([], log)
-    _, longer = prove(folder, *names, "--seconds", "0.2")
+    assert prove(*asked, "0.1") == ([], log)
+    _, longer = prove(*asked, "0.2")
     assert [row["asked"] for row in longer] == [0.1, 0.2]
     known = SHIPPED.read()
     key = SHIPPED.key_of(log[0])
@@ -228,7 +233,7 @@ def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refuse
 def test_a_better_solution_is_found_on_the_way():
     """From the open subproblems of least bound, if the reward that is known is poor."""
     entry = ENTRIES["two-armed/v1/i001", *SHIPPED.FREE] | {"reward": -400}
-    row = PROVE.prove(entry, 4.0)
+    row = PROVE.prove(entry, 0.5)
     assert -400 < row["reward"] <= row["bound"]
     execution = execute(load_task(row["task"]), SHIPPED.movements_of(row["solution"]))
     assert (execution.reward, execution.hands) == (row["reward"], row["hands"])
@@ -238,7 +243,8 @@ def test_a_task_of_ones_own_is_searched_and_proven(tmp_path):
     task = load_task("ascending").model_copy(update={"name": "mine", "goals": ((6.0, 0.5),)})
     task = task.model_copy(update={"initial_hands": "R", "provenance": {}})
     task.save(tmp_path / "mine.toml")
-    (sentence,), _ = prove(tmp_path / "out", tmp_path / "mine.toml")
+    command = [sys.executable, FOLDER / "prove.py", tmp_path / "mine.toml", "--out", tmp_path]
+    sentence = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "mine.toml (base task, other arm free): -1" in sentence
     assert ", proven optimal, " in sentence
 
