@@ -59,7 +59,7 @@ def test_no_text_leaves_a_figure_of_any_width_or_lies_on_another(name, shipped):
     if drawn is None:
         pytest.skip("the shipped results have no such figure")
     assert misplaced(drawn.figure) == ([], [])
-    for width in (3.4, 7.2):
+    for width in (3.4, 5.5):
         plot = FIGURES[name](shipped, width=width)
         assert misplaced(plot.figure) == ([], []), width
         assert plot.figure.get_figwidth() == width
@@ -120,7 +120,7 @@ def test_names_and_looks_tell_methods_apart():
 
 
 def test_a_date_of_the_environment_changes_no_picture(traced, monkeypatch):
-    plot = FIGURES["learning-curves"](traced)
+    plot = FIGURES["postures"](traced)
     before = [picture(plot.figure, ending) for ending in FORMATS], for_page(plot)
     for epoch in ("x", "1700000000"):
         monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)

@@ -64,12 +64,15 @@ def test_cells_are_means_over_runs(tmp_path):
     (tmp_path / "runs.sqlite").write_bytes(lzma.decompress(stored.read_bytes()))
     study = load(tmp_path)
     cells = GAIN.measure_cells(study)
-    signature = study.signature("arm")
+    runs = [
+        (named, run.task, run.trials, float(run.reward) - run.corrective_best, arm)
+        for (_, run), arm in zip(study.runs.iterrows(), study.signature("arm"), strict=True)
+        for named in [next(name for key, name in GAIN.NAMES.items() if run.method.startswith(key))]
+    ]
     for row in cells.to_dict("records"):
-        mine = []
-        for at, run in study.runs.iterrows():
-            named = next(name for key, name in GAIN.NAMES.items() if run.method.startswith(key))
-            if (run.task, named) == (row["task"], row["name"]) and row["trials"] in (0, run.trials):
-                mine.append((float(run.reward) - run.corrective_best, signature[at]))
+        mine = [
+            measured for named, task, trials, *measured in runs
+            if (task, named) == (row["task"], row["name"]) and row["trials"] in (0, trials)
+        ]  # fmt: skip
         assert len(mine) in (1, 3)
         assert np.allclose(np.nanmean(mine, axis=0), (row["gain"], row["arm"]))
