@@ -241,7 +241,7 @@ def test_signs_are_one_number_a_run():
 
 
 def test_choice_in_isolation():
-    start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
+    start = {"left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
     task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
     some = tuple(corrective_trial(task, hands) for hands in ("RL", "LR", "RR"))
     agrees = as_in_isolation(Solutions(task, "", some))
@@ -258,7 +258,7 @@ def test_preshaping_by_the_arm_alone():
     robot = load_task("two-armed-1").robot
     goals = [robot.forward_kinematics(q, hand).tolist()
              for q, hand in ((swung, "right"), (posture(left_1=0.2), "left"))]  # fmt: skip
-    content = {"base": [0.0, 0.0], "left": start[2:6].tolist(), "right": start[6:].tolist()}
+    content = {"left": start[2:6].tolist(), "right": start[6:].tolist()}
     task = tiny_task(goals=goals, initial_hands="RL", start=content, locked_base=["x", "y"])
     end = posture(left_1=0.2, right_1=0.4)
     initial = execute(task, movements_of("RL", [swung, end]))

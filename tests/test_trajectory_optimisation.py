@@ -32,7 +32,7 @@ def small_task(**change):
     content = {
         "name": "small",
         "robot": SMALL,
-        "start": {"base": (0.0, 0.0), "left": (1.5,), "right": (0.4, 0.3)},
+        "start": {"left": (1.5,), "right": (0.4, 0.3)},
         "goals": ((2.6, 1.0), (3.2, -0.4)),
     }
     content.update(change)
