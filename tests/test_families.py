@@ -221,7 +221,7 @@ def test_command_draws_and_writes_instances(coartic, tmp_path):
     assert (tmp_path / "tasks.svg").read_text().startswith("<?xml")
 
 
-def test_a_family_of_ones_own_is_run_by_its_file(tmp_path):
+def test_a_family_of_ones_own_is_run_by_its_file(tmp_path, in_this_process):
     shipped = FAMILY_FOLDER / "one-armed.v1.toml"
     path = tmp_path / "mine.v1.toml"
     path.write_text(shipped.read_text(encoding="utf-8"), encoding="utf-8")

@@ -176,7 +176,7 @@ def test_a_task_that_a_method_lacks_is_not_reached():
 
 
 def test_verdicts_of_planted_means(monkeypatch):
-    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
     rng = np.random.default_rng(2)
     above, below = 5 + rng.normal(size=30), -5 + rng.normal(size=30)
     claims = {

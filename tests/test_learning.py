@@ -412,7 +412,7 @@ def own_suite(folder, line):
     return suite
 
 
-def test_any_condition_is_a_setting_of_a_method(tmp_path):
+def test_any_condition_is_a_setting_of_a_method(tmp_path, in_this_process):
     fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
     suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
     run_suite(str(suite), tmp_path / "results")

@@ -43,7 +43,7 @@ def planted(gains, quarters=None):
 
 @pytest.fixture(autouse=True)
 def _fewer_resamples(monkeypatch):
-    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
 
 
 def verdicts(*arguments):

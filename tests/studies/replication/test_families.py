@@ -19,7 +19,7 @@ claims, reader = map(importlib.import_module, ("claims", "reader"))
 
 @pytest.fixture(autouse=True)
 def _fewer_resamples(monkeypatch):
-    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
 
 
 def made_up_signatures(study, hand=1.0, idle=0.3, of_random_search=0.5):
