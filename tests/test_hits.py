@@ -20,15 +20,9 @@ JOINTS = [*TASK.robot.joint_names]
 @pytest.fixture(scope="module")
 def people():
     """Ten trials of the plain learner of the tests, each of two subjects."""
-    rows = []
-    for subject in ("a", "b"):
-        run = reference.learn(TASK, CONDITIONS["EC4"], seed=ord(subject), trials=10)
-        for trial, (visited, spent) in enumerate(
-            zip(run.visits, run.ticks_by_goal, strict=True), 1
-        ):
-            for goal, ((_, hand, q), ticks) in enumerate(zip(visited, spent, strict=True), 1):
-                rows.append([subject, trial, goal, hand, ticks, *q])
-    return pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks", *JOINTS])
+    options = {"condition": CONDITIONS["EC4"], "trials": 10}
+    both = (reference.hits_of(TASK, seed=ord(who), subject=who, **options) for who in "ab")
+    return pd.concat(both, ignore_index=True)
 
 
 WRONG = {
@@ -121,15 +115,13 @@ def test_files_of_other_programs_are_named(name):
         read_hits(name, TASK)
 
 
-@pytest.mark.parametrize("turn", ["0..2π", "-π..π", "a turn more", "turns of degrees"])
+@pytest.mark.parametrize("turn", ["0..2π", "-π..π", "a turn more"])
 def test_wrapped_angles_are_unwrapped_with_a_warning(people, tmp_path, turn):
     path, wrapped, angles = tmp_path / "people.csv", people.copy(), JOINTS[2:]
     if turn == "0..2π":
         wrapped[angles] %= 2 * np.pi
     elif turn == "a turn more":
         wrapped.loc[wrapped.trial == 3, "right_1"] += 2 * np.pi
-    elif turn == "turns of degrees":
-        wrapped[angles] = np.radians(np.degrees(wrapped[angles]) % 360)
     else:
         wrapped[angles] = (wrapped[angles] + np.pi) % (2 * np.pi) - np.pi
     wrapped.to_csv(path, index=False)

@@ -27,17 +27,6 @@ def people():
     return PROTOCOLS.simulate(TASK, "informed", 0.04, 0.3, [0.4, 0.0], seeds=[1, 2], trials=60)
 
 
-def by_reference(task, condition, trials, seed):
-    """Hits of the plain learner of the tests, in the format of the study."""
-    run = reference.learn(task, condition, seed=seed, trials=trials)
-    made = enumerate(zip(run.visits, run.ticks_by_goal, strict=True), 1)
-    rows = [[seed, trial, goal, hand, ticks, *q] for trial, (visited, spent) in made
-            for goal, ((_, hand, q), ticks) in enumerate(zip(visited, spent, strict=True), 1)
-            ]  # fmt: skip
-    names = ["subject", "trial", "goal", "hand", "ticks", *task.robot.joint_names]
-    return pd.DataFrame(rows, columns=names)
-
-
 @pytest.mark.parametrize(("name", "condition"), [("ascending", "EC1"), ("two-armed-1", "EC2")])
 def test_the_simulated_learner_is_the_packages(name, condition):
     people = PROTOCOLS.simulate(load_task(name), "best", 0.05, 0.2, seeds=[7, 8], trials=30,
@@ -51,7 +40,8 @@ def test_parameters_of_the_plain_learner_are_found():
     """Its movements, tables and null spaces share no code with the package's kernels."""
     truth = {"sigma": 0.03, "epsilon": 0.25, "kappa": 0.5}
     fields = {"noise_sd": 0.03, "epsilon": 0.25, "drift": 0.5}
-    people = by_reference(TASK, replace(CONDITIONS["EC4"], **fields), 60, seed=5)
+    condition = replace(CONDITIONS["EC4"], **fields)
+    people = reference.hits_of(TASK, condition, trials=60, seed=5, subject="a")
     fitted = FIT.fit(people, TASK).iloc[0]
     assert (fitted.model, fitted.others) == ("informed", "")
     for name, value in truth.items():
