@@ -246,8 +246,7 @@ def test_what_else_is_refused():
 
 
 def test_seeds_of_numpy_are_seeds():
-    single, vector = TaskEnv("two-armed/v1"), TaskVectorEnv(3, "two-armed/v1")
-    assert single.reset(seed=np.int64(5))[1] == single.reset(seed=5)[1]
+    vector = TaskVectorEnv(3, "two-armed/v1")
     due = vector.reset(seed=[5, 6, 7])[1]["task"].tolist()
     for seeds in (5, np.uint8(5), np.arange(5, 8), [np.int32(5), 6, 7]):
         assert vector.reset(seed=seeds)[1]["task"].tolist() == due

@@ -27,10 +27,12 @@ def people():
 
 WRONG = {
     "no column left_2": lambda t: t.drop(columns="left_2"),
-    "line 4: hand is 'both'": lambda t: t.assign(hand=t.hand.where(t.index != 2, "both")),
+    "line 4: hand is 'both'; needed is left or right": lambda t: t.assign(
+        hand=t.hand.where(t.index != 2, "both")
+    ),
     "line 3: goal is 9": lambda t: t.assign(goal=t.goal.where(t.index != 1, 9)),
     "line 2: trial is 0.5;": lambda t: t.assign(trial=t.trial.where(t.index != 0, 0.5)),
-    "line 3: ticks is 0": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, 0)),
+    "line 3: ticks is -5": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, -5)),
     "line 2: ticks is 7.5": lambda t: t.assign(ticks=t.ticks.where(t.index != 0, 7.5)),
     "has no hit": lambda t: t[:0],
     "line 2: ticks is empty": lambda t: t.assign(ticks=t.ticks.where(t.index != 0)),
@@ -38,8 +40,6 @@ WRONG = {
     "a line above already; number trials": lambda t: pd.concat([t, t]),
     "line 2: ticks is .*column duration": lambda t: t.assign(ticks=t.ticks / 100),
     "less than a tick": lambda t: t.assign(duration=t.ticks / 1000).drop(columns="ticks"),
-    "line 3: ticks is -5": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, -5)),
-    "hand is 'RIGHT'; needed is left or right": lambda t: t.assign(hand=t.hand.str.upper()),
     "base_x is 1e\\+300": lambda t: t.assign(base_x=1e300),
     "line 2: left_2 is 'inf'": lambda t: t.assign(left_2=np.inf),
     "line 2: right_1 is 'NA'": lambda t: t.assign(right_1="NA"),

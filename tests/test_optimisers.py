@@ -110,31 +110,23 @@ def test_what_is_no_point_no_target_and_no_width_is_refused(call, wrong, words):
     assert COST.evaluations == 0
 
 
-SHARED = []
-"""An objective that processes inherit."""
-
-
-def evaluate_shared(x):
-    return SHARED[0](x)
-
-
-def test_copies_are_refused_with_another_way():
-    cost = coartic.objective("ascending", budget=50)
-    for copied in (pickle.dumps, copy.copy, copy.deepcopy):
-        with pytest.raises(coartic.CoarticError, match="use vectorized=True or objective.many"):
-            copied(cost)
-    assert (cost.evaluations, cost(cost.x0)) == (0, 320)
+COPIED = coartic.objective("ascending", budget=50)
 
 
 @pytest.mark.process
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of fork, beside threads
-def test_another_process_that_inherits_it_is_refused():
-    cost = coartic.objective("ascending", budget=50)
-    SHARED[:] = [cost]
+def test_copies_are_refused_and_a_process_that_inherits_one():
+    for copied in (pickle.dumps, copy.copy, copy.deepcopy):
+        with pytest.raises(coartic.CoarticError, match="use vectorized=True or objective.many"):
+            copied(COPIED)
     refused = pytest.raises(coartic.CoarticError, match="sent to another process")
     with multiprocessing.get_context("fork").Pool(1) as pool, refused:
-        pool.map(evaluate_shared, [cost.x0])
-    assert cost.evaluations == 0
+        pool.map(evaluate_copied, [COPIED.x0])
+    assert (COPIED.evaluations, COPIED(COPIED.x0)) == (0, 320)
+
+
+def evaluate_copied(x):
+    return COPIED(x)
 
 
 def test_points_become_movements():

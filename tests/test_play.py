@@ -35,9 +35,8 @@ NODE = shutil.which("node")
 pytestmark = [pytest.mark.process, pytest.mark.skipif(NODE is None, reason="Node is not installed")]
 
 TASKS = [
-    *("ascending", "descending", "two-armed-1", "two-armed-2"),
-    *("one-armed/v1/i000", "two-armed/v1/i001", "long/v1/i000", "aligned/v1/i002"),
-    *("redundancy/v1/i000", "redundancy/v1/i007"),
+    *("ascending", "two-armed-1", "two-armed-2"),
+    *("one-armed/v1/i000", "long/v1/i000", "aligned/v1/i002", "redundancy/v1/i007"),
 ]
 
 
