@@ -4,7 +4,6 @@ import re
 import shutil
 import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -28,7 +27,7 @@ from coartic.optimisers import FAILED
 from coartic.tasks import families
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import address_of
-from tests.support.processes import python
+from tests.support.processes import ROOT, python
 from tests.support.strategies import tiny_task
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -281,7 +280,7 @@ def test_importing_the_environments_compiles_nothing():
 
 def names_of_program(title):
     """What a program of the page defines."""
-    page = Path(__file__).parent.parent / "docs" / "howto" / "agents.md"
+    page = ROOT / "docs" / "howto" / "agents.md"
     (text,) = re.findall(rf'```python\n("""{title}.*?)```', page.read_text("utf-8"), re.DOTALL)
     names = {}
     exec(text.replace("40_000", "4096"), names)

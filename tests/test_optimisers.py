@@ -7,7 +7,6 @@ import re
 import runpy
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,9 +19,10 @@ from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session, run_method
 from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
+from tests.support.processes import ROOT
 from tests.support.strategies import shipped_optima, tiny_task
 
-DOCS = Path(__file__).parent.parent / "docs"
+DOCS = ROOT / "docs"
 
 
 def test_the_cost_of_a_point_is_what_its_trial_takes():

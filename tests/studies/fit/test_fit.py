@@ -1,7 +1,6 @@
 """Study fit: the reader, the simulator, and fits of people whom other code simulates."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,13 +10,11 @@ from coartic import CONDITIONS, CoarticError, learn, load_task
 from coartic.analysis import SIGNATURES, solutions_of
 from coartic.analysis.solutions import Solutions
 from tests.support import reference
-from tests.support.processes import program
+from tests.support.processes import ROOT, programs
 from tests.support.strategies import metres_task
 
-FOLDER = Path(__file__).parents[3] / "studies" / "fit"
-PROTOCOLS, FIT, STUDY, PLAIN = (
-    program(FOLDER / f"{name}.py") for name in ("protocols", "fit", "study", "plain_person")
-)
+FOLDER = ROOT / "studies" / "fit"
+PROTOCOLS, FIT, STUDY, PLAIN = programs("fit", "protocols", "fit", "study", "plain_person")
 TASK = load_task("two-armed-1")
 
 
@@ -134,8 +131,8 @@ def test_people_of_another_model_are_none_of_the_six():
 
 
 def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
-    example, pages = FOLDER / "example.csv", FOLDER.parents[1] / "docs" / "howto"
-    page = (pages / "people.md").read_text("utf-8")
+    example = FOLDER / "example.csv"
+    page = (ROOT / "docs" / "howto" / "people.md").read_text("utf-8")
     metres = [str(FOLDER / name) for name in ("metres.toml", "metres.csv")]
     options = ("--ticks-per-unit", "100", "--noise", "0.005")
     for given in (("two-armed-1", str(example)), (*metres, *options)):

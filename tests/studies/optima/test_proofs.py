@@ -4,7 +4,6 @@ import functools
 import itertools
 import math
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import clarabel
@@ -18,11 +17,10 @@ from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.motion.solution import Movement, hand_sequences
 from coartic.robot import directions
 from coartic.tasks.task import hands_of, letters_of
-from tests.support.processes import program
+from tests.support.processes import programs
 from tests.support.strategies import UNEVEN, changed, make_trials, uneven_task
 
-FOLDER = Path(__file__).parents[3] / "studies" / "optima"
-PROOF = program(FOLDER / "certificate.py")
+(PROOF,) = programs("optima", "certificate")
 RELAXED, LAGRANGIAN, SPEED = (sys.modules[n] for n in ("relaxation", "lagrangian", "speed"))
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 

@@ -9,7 +9,6 @@ import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -22,13 +21,12 @@ from coartic.tasks import optima
 from coartic.tasks.families import named_by, shipped_families
 from coartic.tasks.optima import best_shipped, essence
 from coartic.tasks.task import hands_of
-from tests.support.processes import program
+from tests.support.processes import ROOT, programs
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
-ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "studies" / "optima"
 THIRD_VERSION = "dcb24843"
-RENEW, PROVE, STUDY = (program(FOLDER / f"{name}.py") for name in ("renew", "prove", "study"))
+RENEW, PROVE, STUDY = programs("optima", "renew", "prove", "study")
 SHIPPED = RENEW.shipped
 ENTRIES = SHIPPED.read()
 DRAWN = [entry for (name, *_), entry in ENTRIES.items() if "/" in name]

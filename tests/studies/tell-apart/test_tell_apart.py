@@ -1,7 +1,5 @@
 """Study tell-apart: its learner is the paper's, and other code finds the same shares."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,18 +7,18 @@ import pytest
 from coartic import Movement, learn, load_task
 from coartic.analysis import figures
 from coartic.tasks.task import hands_of
-from tests.support.processes import program
+from tests.support.processes import ROOT, programs
 from tests.support.reference import correct, execute
 
-FOLDER = Path(__file__).parents[3] / "studies" / "tell-apart"
-
-
-study, changes, steps = (program(FOLDER / f"{name}.py") for name in ("study", "changes", "steps"))
+study, changes, steps = programs("tell-apart", "study", "changes", "steps")
 
 
 def test_tables_and_figure_of_some_of_the_tasks(monkeypatch, tmp_path):
     monkeypatch.setattr(study, "EXPERIMENTS", 200)
-    raw = {name: pd.read_csv(FOLDER / f"{name}.csv") for name in ("changes", "starts", "steps")}
+    raw = {
+        name: pd.read_csv(ROOT / "studies" / "tell-apart" / f"{name}.csv")
+        for name in ("changes", "starts", "steps")
+    }
     few = raw["changes"].task.drop_duplicates()[:6]
     for name, table in raw.items():
         table[table.task.isin(few)].to_csv(tmp_path / f"{name}.csv", index=False)
