@@ -29,35 +29,16 @@ from coartic.tasks.families import (
 from coartic.tasks.task import Address, address_of, beyond_reach, task_text
 from tests.support.suites import ROOT
 
-# What the shipped families draw, by the hash of the task's file. A family is never changed: what
-# makes these fail makes results under these names incomparable, and needs a new version.
-PINNED = {
-    "aligned/v1/i017": "df3a3cee4eea483f",
-    "aligned/v1/d003": "c25cede53a58ee73",
-    "aligned/v1/2027-041": "c79ebd38eb04e921",
-    "long/v1/i017": "0c274c3863f2febc",
-    "long/v1/d003": "1e66e6a44e109d4d",
-    "long/v1/2027-041": "66be010eeaecdab3",
-    "many-goals/v1/i017": "a859464be3d91ac3",
-    "many-goals/v1/d003": "fa2fc4e7805f4e67",
-    "many-goals/v1/2027-041": "6e2182e4e9f4af3e",
-    "one-armed/v1/i017": "d045540cec694356",
-    "one-armed/v1/d003": "15287e3c04086d4e",
-    "one-armed/v1/2027-041": "db6b68237c741b36",
-    "redundancy/v1/i017": "ec87099bc927fc54",
-    "redundancy/v1/d003": "4f8a3750862c01aa",
-    "redundancy/v1/2027-041": "d8b0ac44d016bd18",
-    "two-armed/v1/i017": "b76d21c3df982a43",
-    "two-armed/v1/d003": "261073742a1b5a7c",
-    "two-armed/v1/2027-041": "d3a3670771eef97e",
-}
+# Hashes of the released families, each with a task of each split that it draws. A family is never
+# changed: what makes these fail makes results under these names incomparable, and needs a new
+# version.
 RELEASED = {
-    "aligned/v1": "1acc695728233543",
-    "long/v1": "bc600910c824b195",
-    "many-goals/v1": "f8753279ead72058",
-    "one-armed/v1": "b8ab1125c46640e1",
-    "redundancy/v1": "29dd33d58da81c12",
-    "two-armed/v1": "421fe30fedfb532a",
+    "aligned/v1": "7d54471d916711ce",
+    "long/v1": "f1f48d64e2a1d1ee",
+    "many-goals/v1": "431e6d2a591657a2",
+    "one-armed/v1": "85c1cafe81ce2bc4",
+    "redundancy/v1": "74dc928d21a32f17",
+    "two-armed/v1": "3c581b274307a7ab",
 }
 addresses = st.builds(
     Address,
@@ -76,14 +57,11 @@ def test_the_family_of_the_page_is_one(tmp_path):
 
 
 @pytest.mark.parametrize("name", RELEASED)
-def test_a_released_family_is_not_changed(name):
-    text = json.dumps(shipped_families()[name].model_dump(mode="json"), sort_keys=True)
+def test_a_released_family_and_its_instances_are_not_changed(name):
+    family = json.dumps(shipped_families()[name].model_dump(mode="json"), sort_keys=True)
+    drawn = [task_text(instance(f"{name}/{number}")) for number in ("i017", "d003", "2027-041")]
+    text = "".join([family, *drawn])
     assert hashlib.sha256(text.encode()).hexdigest()[:16] == RELEASED[name]
-
-
-def test_an_instance_is_what_it_was():
-    texts = {name: task_text(instance(name)).encode() for name in PINNED}
-    assert {n: hashlib.sha256(text).hexdigest()[:16] for n, text in texts.items()} == PINNED
 
 
 def test_an_instance_depends_on_its_name_alone():
@@ -243,7 +221,7 @@ def test_command_draws_and_writes_instances(coartic, tmp_path):
     assert (tmp_path / "tasks.svg").read_text().startswith("<?xml")
 
 
-def test_a_family_of_ones_own_is_run_by_its_file(tmp_path):
+def test_a_family_of_ones_own_is_run_by_its_file(tmp_path, in_this_process):
     shipped = FAMILY_FOLDER / "one-armed.v1.toml"
     path = tmp_path / "mine.v1.toml"
     path.write_text(shipped.read_text(encoding="utf-8"), encoding="utf-8")

@@ -176,7 +176,7 @@ def test_a_task_that_a_method_lacks_is_not_reached():
 
 
 def test_verdicts_of_planted_means(monkeypatch):
-    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
     rng = np.random.default_rng(2)
     above, below = 5 + rng.normal(size=30), -5 + rng.normal(size=30)
     claims = {
@@ -230,7 +230,7 @@ def test_runs_with_another_base_have_no_gap():
     assert frames.ranking(tidied).gap.tolist() == pytest.approx([8 / 292])
 
 
-def test_runs_are_tidy(tmp_path):
+def test_runs_are_tidy(tmp_path, in_this_process):
     """Columns of a folder's runs against its tasks; signatures and postures against executions."""
     chosen = {"tasks": ["two-armed-1"], "methods": ["EC3", "corrective-alone/given"]}
     run_suite("paper", tmp_path / "runs", runs=3, trials=50, **chosen)

@@ -4,7 +4,6 @@ import re
 import shutil
 import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -28,7 +27,7 @@ from coartic.optimisers import FAILED
 from coartic.tasks import families
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import address_of
-from tests.support.processes import python
+from tests.support.processes import ROOT, python
 from tests.support.strategies import tiny_task
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -194,12 +193,6 @@ def test_where_the_corrective_process_fails_the_posture_takes_its_place():
     assert due is not None
 
 
-def test_actions_beyond_the_box_are_clipped():
-    env, vector = TaskEnv("two-armed-1"), TaskVectorEnv(2, "two-armed-1")
-    env.reset(), vector.reset()
-    assert env.step(np.full(10, 1e6))[1] == vector.step(np.ones((2, 10)))[1][0]
-
-
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [
@@ -252,8 +245,7 @@ def test_what_else_is_refused():
 
 
 def test_seeds_of_numpy_are_seeds():
-    single, vector = TaskEnv("two-armed/v1"), TaskVectorEnv(3, "two-armed/v1")
-    assert single.reset(seed=np.int64(5))[1] == single.reset(seed=5)[1]
+    vector = TaskVectorEnv(3, "two-armed/v1")
     due = vector.reset(seed=[5, 6, 7])[1]["task"].tolist()
     for seeds in (5, np.uint8(5), np.arange(5, 8), [np.int32(5), 6, 7]):
         assert vector.reset(seed=seeds)[1]["task"].tolist() == due
@@ -288,7 +280,7 @@ def test_importing_the_environments_compiles_nothing():
 
 def names_of_program(title):
     """What a program of the page defines."""
-    page = Path(__file__).parent.parent / "docs" / "howto" / "agents.md"
+    page = ROOT / "docs" / "howto" / "agents.md"
     (text,) = re.findall(rf'```python\n("""{title}.*?)```', page.read_text("utf-8"), re.DOTALL)
     names = {}
     exec(text.replace("40_000", "4096"), names)

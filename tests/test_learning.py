@@ -179,8 +179,8 @@ def test_informed_conditions_equal_the_slow_learner_trial_by_trial(fields, direc
         (failing_task(), "EC4", {**fields, "hand_exploration": "nearest-posture", "epsilon": 0.7}),
     ):
         rules = replace(CONDITIONS[condition], direction=direction, **fields_of_task)
-        slow = assert_equals_reference(task, rules, trials=6, seed=7)
-        plain = learn(task, CONDITIONS[condition], seed=7, trials=6, model=SOON_FAILED)
+        slow = assert_equals_reference(task, rules, trials=4, seed=7)
+        plain = learn(task, CONDITIONS[condition], seed=7, trials=4, model=SOON_FAILED)
         differ += not np.array_equal(plain.rewards.data, slow.rewards)
     assert differ > 0
 
@@ -328,11 +328,8 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
         *((ValueError, "seed is", {"seeds": [seed]}) for seed in (-1, 1.5, None, True, 2**128)),
         *((TypeError, "seeds is .*; it must be", {"seeds": seeds}) for seeds in ("1", 3)),
         (ValueError, "seeds has more than 1,000,000 entries", {"seeds": range(10**9)}),
-        (ValueError, "seeds has more than 1,000,000 entries", {"seeds": itertools.count()}),
         (ValueError, "seeds has more than 20,000 entries",
          {"seeds": itertools.count(), "trials": 10_000}),
-        (ValueError, "seeds has more than 20 entries",
-         {"seeds": range(21), "trials": 10_000_000}),
         *((ValueError, "trials is", {"trials": most}) for most in (0, 1.5, "5", True, 10**12)),
         *((ValueError, "jobs is", {"jobs": jobs}) for jobs in (0, 1.5, None, True, 10**9)),
         *((TypeError, "must be a MotionModel", {"model": model}) for model in (None, {})),
@@ -415,7 +412,7 @@ def own_suite(folder, line):
     return suite
 
 
-def test_any_condition_is_a_setting_of_a_method(tmp_path):
+def test_any_condition_is_a_setting_of_a_method(tmp_path, in_this_process):
     fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
     suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
     run_suite(str(suite), tmp_path / "results")

@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-from pathlib import Path
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
@@ -11,9 +10,9 @@ from coartic.analysis import fill_page
 from coartic.benchmarks.suites import Suite
 from coartic.tasks.families import Family
 from coartic.tasks.task import Task
-from tests.support.processes import program
+from tests.support.processes import ROOT, program
 
-DOCS = Path(__file__).parent.parent / "docs"
+DOCS = ROOT / "docs"
 make_findings = program(DOCS / "make_findings.py")
 
 

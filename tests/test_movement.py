@@ -64,9 +64,9 @@ def random_movements(rng, robot, hand, count, largest):
 @pytest.mark.parametrize("hand", HANDS)
 def test_equals_every_step_many_times(robot, largest, hand):
     rng = np.random.default_rng(15)
-    drawn = random_movements(rng, robot, hand, 1_000, largest)
+    drawn = random_movements(rng, robot, hand, 400, largest)
     models = [MotionModel(step=step) for step in (0.01, 0.003, 0.1)]
-    others = rng.integers(3, size=1_000), rng.random(1_000) < 0.5
+    others = rng.integers(3, size=400), rng.random(400) < 0.5
     for q, target, goal, model, stops in zip(*drawn, *others, strict=True):
         assert_equals_every_step(robot, q, target, hand, goal, 0.1, stops, models[model])
 
@@ -74,7 +74,7 @@ def test_equals_every_step_many_times(robot, largest, hand):
 def test_grazing_a_goal():
     rng = np.random.default_rng(8)
     outcomes = set()
-    for _ in range(2000):
+    for _ in range(800):
         q = rng.uniform(-2, 2, 10)
         target = q + rng.normal(size=10) * 0.3
         middle = q + rng.uniform(0.2, 0.8) * (target - q)

@@ -18,18 +18,21 @@ BEST = {ONE: -292, TWO: -465, THREE: -306, "descending": -292}
 SECTION = {section.id: section for section in SECTIONS}
 
 
-def behind(task, method, *ticks, **more):
-    """Runs whose rewards are so many ticks behind the best known one; None: without a solution."""
-    rewards = [None if each is None else BEST[task] - each for each in ticks]
-    return runs_of(task, method, rewards, **more)
+def behind(tasks, method, *ticks, **more):
+    """Runs on each task whose rewards are so many ticks behind the best known one; None: without a
+    solution."""
+    return [
+        run for task in tasks for run in runs_of(
+            task, method, [None if each is None else BEST[task] - each for each in ticks], **more
+        )
+    ]  # fmt: skip
 
 
-def planted(rows, **more):
+def planted(*cells, **more):
     """The study of these runs, whose tasks have proven optima."""
-    tasks = dict.fromkeys(row["task"] for row in rows)
-    return study_of(
-        rows, optima={task: BestKnown(BEST[task], BEST[task]) for task in tasks}, **more
-    )
+    rows = [row for cell in cells for row in cell]
+    best = {task: BestKnown(BEST[task], BEST[task]) for task in {row["task"] for row in rows}}
+    return study_of(rows, optima=best, **more)
 
 
 def without_signatures(study):
@@ -39,59 +42,45 @@ def without_signatures(study):
 
 
 def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
-    rows = [
-        row
-        for task in (TWO, THREE)
-        for row in (
-            *behind(task, "mine", 10, 11, 12),
-            *behind(task, "mine", 20, 21, 22, setting="sigma=0.1"),
-            *behind(task, "hill-climbing", 15, 14, 13),
-            *behind(task, "dual-process/EC4", 30, 31, 32),
-        )
-    ]
-    table = TABLES["own"](planted(rows))
+    study = planted(
+        behind([TWO, THREE], "mine", 10, 11, 12),
+        behind([TWO, THREE], "mine", 20, 21, 22, setting="sigma=0.1"),
+        behind([TWO, THREE], "hill-climbing", 15, 14, 13),
+        behind([TWO, THREE], "dual-process/EC4", 30, 31, 32),
+    )
+    table = TABLES["own"](study)
     assert (is_setting(table) == (table.own == "mine sigma=0.1")).all()
     assert is_setting(table).sum() == 3
 
 
 def test_a_setting_without_its_method_is_drawn():
-    rows = [
-        row
-        for task in (TWO, THREE)
-        for row in (
-            *behind(task, "cma-es/bandit", 10, 11, None),
-            *behind(task, "cma-es/bandit", 20, 21, 22, setting="sigma=0.1"),
-            *behind(task, "hill-climbing", 15, 14, 13),
-        )
-    ]
-    drawn = FIGURES["ranking"](planted(rows)).data.method
-    assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
+    study = planted(
+        behind([TWO, THREE], "cma-es/bandit", 10, 11, None),
+        behind([TWO, THREE], "cma-es/bandit", 20, 21, 22, setting="sigma=0.1"),
+        behind([TWO, THREE], "hill-climbing", 15, 14, 13),
+    )
+    assert [*FIGURES["ranking"](study).data.method] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
 
 
 def test_the_sentence_of_the_ranking_is_of_methods_on_the_common_tasks():
     """An own method that solved more tasks, but others, is not among them."""
-    rows = [
-        row for task in (ONE, TWO) for method in ("random-search", "hill-climbing", "cma-es/bandit")
-        for row in behind(task, method, 15, 14, 13)
-    ]  # fmt: skip
-    rows += [row for task in (ONE, THREE, "descending") for row in behind(task, "mine", 15, 14, 13)]
-    study = planted(rows)
+    methods = "random-search", "hill-climbing", "cma-es/bandit"
+    study = planted(
+        *(behind([ONE, TWO], method, 15, 14, 13) for method in methods),
+        behind([ONE, THREE, "descending"], "mine", 15, 14, 13),
+    )
     (said,) = [line for line in about.finding(study, SECTION["ranking"]) if "trial" in line]
     assert "hill climbing" in said
     assert "mine" not in said
 
 
 def test_missing_tasks_are_those_without_a_solution_of_every_run():
-    rows = [
-        row
-        for task in (ONE, TWO, THREE)
-        for row in (
-            *(row for method in ("mine", "hill-climbing")
-              for row in behind(task, method, 10, 11, 12 if task == ONE else None)),
-            *behind(task, "random-search", 15, 14, 13),
-        )
-    ]  # fmt: skip
-    missing = TABLES["ranking"](planted(rows)).missing
+    study = planted(
+        *(behind([ONE], method, 10, 11, 12) for method in ("mine", "hill-climbing")),
+        *(behind([TWO, THREE], method, 10, 11, None) for method in ("mine", "hill-climbing")),
+        behind([ONE, TWO, THREE], "random-search", 15, 14, 13),
+    )
+    missing = TABLES["ranking"](study).missing
     assert missing.to_dict() == {"mine": 2, "hill-climbing": 2, "random-search": 0}
 
 
@@ -111,31 +100,33 @@ def test_names_of_tasks_may_end_as_columns_of_intervals_do():
 
 def test_a_learner_over_all_tasks_has_the_gain_of_its_own_conditions():
     """EC1 ran on a task with two arms as well, on which EC4 stands for the learner."""
-    rows = [*behind(ONE, "dual-process/EC1", 8, 8), *behind(TWO, "dual-process/EC1", 35, 35)]
-    rows += [*behind(TWO, "dual-process/EC4", 5, 5), *behind(ONE, "hill-climbing", 8, 8)]
-    rows += behind(TWO, "hill-climbing", 5, 5)
-    study = without_signatures(planted(rows))
+    study = planted(
+        behind([ONE], "dual-process/EC1", 8, 8),
+        behind([TWO], "dual-process/EC1", 35, 35),
+        behind([TWO], "dual-process/EC4", 5, 5),
+        behind([ONE], "hill-climbing", 8, 8),
+        behind([TWO], "hill-climbing", 5, 5),
+    )
+    study = without_signatures(study)
     gain = FIGURES["coarticulation"](study).data.set_index("method").gain
     assert gain["dual-process (EC1, EC4)"] == gain["hill-climbing"]
 
 
 def test_numbers_of_trials_are_joined_with_the_default_number():
-    rows = [
-        row for setting in ("", "trials=100", "trials=1000", "sigma=0.1, trials=100")
-        for row in behind(TWO, "hill-climbing", 5, 6, setting=setting)
-    ]  # fmt: skip
-    data = FIGURES["coarticulation"](without_signatures(planted(rows))).data
+    settings = "", "trials=100", "trials=1000", "sigma=0.1, trials=100"
+    study = planted(*(behind([TWO], "hill-climbing", 5, 6, setting=each) for each in settings))
+    data = FIGURES["coarticulation"](without_signatures(study)).data
     assert data.base.tolist() == ["hill-climbing"] * 3 + ["hill-climbing sigma=0.1"]
 
 
 def test_without_a_best_known_reward_nothing_is_drawn_against_gain():
-    rows = behind(TWO, "mine", None, None) + behind(TWO, "hill-climbing", None, None)
+    rows = behind([TWO], "mine", None, None) + behind([TWO], "hill-climbing", None, None)
     assert FIGURES["coarticulation"](without_signatures(study_of(rows))) is None
 
 
 def test_without_a_reward_of_the_corrective_process_there_is_no_gain(monkeypatch):
-    rows = behind(TWO, "hill-climbing", 5, 15, 25) + behind(TWO, "random-search", 5, 15, 25)
-    study = planted(rows, corrective_best={TWO: np.nan})
+    rows = (behind([TWO], method, 5, 15, 25) for method in ("hill-climbing", "random-search"))
+    study = planted(*rows, corrective_best={TWO: np.nan})
     where = "coartic.analysis.sections.coarticulation.with_control"
     monkeypatch.setattr(where, lambda *_: {"": (np.ones(3), np.ones(3))})
     assert TABLES["signatures"](study).gain.isna().all()

@@ -26,7 +26,7 @@ def test_two_searches_find_what_is_shipped():
 
 def test_searches_keep_the_other_arm_still():
     goals = [[2.6, 1.0], [-1.6, 1.0]]
-    start = {"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
+    start = {"left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
     task = tiny_task(goals=goals, start=start)
     few = {"nodes": 40, "graphs": 1, "chains": 1}
     travels = []

@@ -35,9 +35,8 @@ NODE = shutil.which("node")
 pytestmark = [pytest.mark.process, pytest.mark.skipif(NODE is None, reason="Node is not installed")]
 
 TASKS = [
-    *("ascending", "descending", "two-armed-1", "two-armed-2"),
-    *("one-armed/v1/i000", "two-armed/v1/i001", "long/v1/i000", "aligned/v1/i002"),
-    *("redundancy/v1/i000", "redundancy/v1/i007"),
+    *("ascending", "two-armed-1", "two-armed-2"),
+    *("one-armed/v1/i000", "long/v1/i000", "aligned/v1/i002", "redundancy/v1/i007"),
 ]
 
 
@@ -95,7 +94,7 @@ TRIALS = """(task, cases) => {
 def test_random_trials_are_those_of_the_package(name):
     task = uneven_task() if name == "uneven" else OWN.get(name) or load_task(name)
     rng = np.random.default_rng(5)
-    halves = [sample(task, 125, noise, seed=7) for noise in (0.05, 0.5)]
+    halves = [sample(task, 50, noise, seed=7) for noise in (0.05, 0.5)]
     hands, targets = halves[0][0] + halves[1][0], np.concatenate([half[1] for half in halves])
     targets[rng.random(targets.shape) < 0.1] = np.nan  # joints that keep their value
     targets[rng.random(targets.shape[:2]) < 0.2] = np.nan  # goals that are left to A
@@ -103,7 +102,7 @@ def test_random_trials_are_those_of_the_package(name):
     cases = list(zip(hands, listed(targets), strict=True))
     theirs = node(TRIALS, content(task), cases)
     assert [trial["going"] for trial in theirs] == ours.completed.tolist()
-    assert sum(ours.completed) > 200
+    assert sum(ours.completed) > 80
     assert [trial["ticks"] for trial in theirs] == ours.ticks.tolist()
     assert [trial["corrections"] for trial in theirs] == ours.corrections.tolist()
     for trial, reached in zip(theirs, ours.reached, strict=True):
@@ -186,7 +185,7 @@ RUNS = [
 
 
 def test_the_same_seed_learns_the_same_trial_by_trial():
-    trials = 1500
+    trials = 500
     tasks = [OWN.get(name) or load_task(name) for name, *_ in RUNS]
     cases = [
         (content(task), of, drift, str(seed), trials)
@@ -209,7 +208,7 @@ def test_random_numbers_are_numpys():
       const rng = new coartic.Generator(BigInt(seed));
       return Array.from({ length: count }, (_, k) => k % 3 ? rng.standard_normal() : rng.random());
     })"""
-    seeds, count = [0, 1, 2**32, 2**63 - 25, 2**128 - 1], 30_000  # the tail is 1 in 4000
+    seeds, count = [0, 1, 2**32, 2**63 - 25, 2**128 - 1], 15_000  # the tail is 1 in 4000
     for seed, draws in zip(seeds, node(script, list(map(str, seeds)), count), strict=True):
         rng = np.random.default_rng(seed)
         ours = [rng.standard_normal() if k % 3 else rng.random() for k in range(count)]

@@ -19,7 +19,7 @@ from tests.support.strategies import changed, metres_task
 pytestmark = pytest.mark.browser
 
 
-TRIALS = 300  # of 10,000 that the page makes, as most tests see the same in fewer
+TRIALS = 300  # of 10,000 that the page makes, as tests see the same in fewer
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def address(tmp_path_factory):
 def opened_task(visited, tmp_path):
     """Opens the page of a task, with so many trials and other changes of its code."""
 
-    def open_page(task=None, trials=10_000, changes=()):
+    def open_page(task=None, trials=2000, changes=()):
         html = pages.play_page(*[task] if task else [])
         for old, new in (("TRIALS = 10000;", f"TRIALS = {trials};"), *changes):
             html = html.replace(old, new)
@@ -106,6 +106,7 @@ def trials_made(page):
 def test_it_is_one_small_file_without_addresses():
     html = pages.play_page()
     assert len(html.encode()) <= 300_000
+    assert html.count("TRIALS = 10000;") == 1  # of which tests make fewer
     assert not re.findall(r"(?:src|href)=[\"'](?!data:)|url\(|@import", html)
     for name, label in (
         ("two-armed-2", "Two-armed 2 †"),
@@ -128,7 +129,7 @@ def learned(task, condition, trials=TRIALS):
 def test_coarticulation_appears_with_practice(opened_task):
     page = opened_task()
     trials = trials_made(page)
-    assert trials == 10_000  # on every machine
+    assert trials == 2000  # on every machine
     postures = []  # at the goal that they share
     for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
         runs = [learn(name, "EC1", seed=seed, trials=trials) for seed in range(5)]
@@ -149,11 +150,10 @@ def test_coarticulation_appears_with_practice(opened_task):
     assert reset.is_disabled()
 
 
-@pytest.mark.parametrize("rule", ["best-single-hand", "best-of-all", "RLLR"])
-def test_a_task_from_a_file_begins_with_the_hands_of_the_package(opened_task, tmp_path, rule):
+def test_a_task_from_a_file_begins_with_the_hands_of_the_package(opened_task, tmp_path):
     file = tmp_path / "shelf.toml"
     goals = [(2.1, 3.6), (4.4, 3.6), (5.2, 0.55), (7.0, 3.6)]
-    Task(name="shelf", goals=goals, initial_hands=rule).save(file)
+    Task(name="shelf", goals=goals, initial_hands="best-single-hand").save(file)
     task = load_task(file)
     trials = 1000  # after which it is not as fast as the corrective process by chance
     page = opened_task(task, trials)
@@ -179,9 +179,8 @@ RING = """(canvas, { x, y, width, height }) => {  // radius of the circle, by it
 }"""
 
 
-@pytest.mark.parametrize("radius", [0.01, 0.03])
-def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(opened_task, radius):
-    task = metres_task(radius)
+def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(opened_task):
+    task = metres_task(0.03)
     page = opened_task(task, 100, [("figure = new", "figure = window.player = new")])
     assert ticks(page, "The learner") == learned(task, "EC1", 100)
     assert ticks(page, "Corrective process alone") == -corrective_trial(task, "RRR").reward
@@ -312,7 +311,7 @@ def test_the_link_holds_the_whole_state(opened, address):
     changed_to(page, address, "preset=3&explores=EC3")
     assert ticks(page, "The learner") == learned("two-armed-1", "EC3")
     # Entries that are no state are left out, and goals and joints far out lie nearer.
-    for name in ("constructor", "toString", "__proto__"):
+    for name in ("constructor", "__proto__"):
         changed_to(page, address, f"preset=3&who={name}&mate={name}&explores={name}&{name}=1")
         assert ticks(page, "The learner") > 0
     changed_to(page, address, "preset=1&others=&who=you&own=1,0,1e308,0,0,0,0,0,0,1e9,0")
@@ -330,17 +329,10 @@ def shown_condition(page):
     return eval(code, {"CONDITIONS": CONDITIONS, "replace": replace})
 
 
-@pytest.mark.parametrize(
-    ("state", "fields"),
-    [
-        ("preset=3&drift=0.3", {"drift": 0.3}),
-        ("preset=3&explores=EC3&reward=movement&drift=1", {"drift": 1.0, "credit": "subtask"}),
-    ],
-)
-def test_the_learner_is_that_of_the_python_that_the_page_shows(opened, state, fields):
-    page = settled(opened(state))
+def test_the_learner_is_that_of_the_python_that_the_page_shows(opened):
+    page = settled(opened("preset=3&explores=EC3&reward=movement&drift=1"))
     condition = shown_condition(page)
-    assert {name: getattr(condition, name) for name in fields} == fields
+    assert (condition.drift, condition.credit) == (1.0, "subtask")
     assert ticks(page, "The learner") == learned("two-armed-1", condition)
 
 
@@ -362,7 +354,7 @@ def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
     assert "drift=1" in settled(page).url
     page.get_by_role("radio", name="planner").check()
     assert not dial.is_visible()
-    for nonsense in ("x", "-1", "0.2", "1e9", "NaN", "Infinity", ""):
+    for nonsense in ("x", "0.2", "Infinity", ""):
         changed_to(page, address, f"preset=2&others=&trials=100&drift={nonsense}")
         assert shown_condition(page) == CONDITIONS["EC1"]
         assert ticks(page, "The learner") == by_drift[0]
@@ -507,9 +499,8 @@ def test_a_goal_is_dragged_by_a_finger(opened):
 @pytest.mark.parametrize(
     ("width", "scheme", "state"),
     [
-        (1280, "light", ""),
         (390, "dark", "preset=4&who=you"),
-        (390, "light", "preset=3&drift=0.03&reward=movement"),
+        (1280, "light", "drift=0.03&reward=movement"),
     ],
 )
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme, state):

@@ -28,7 +28,7 @@ def shortest(task, hands):
 
 
 def bent(**changes):
-    start = {"base": [0.0, 0.0], "left": [2.2, -0.4, -0.3, 0.2], "right": [0.8, 0.4, -0.3, 0.5]}
+    start = {"left": [2.2, -0.4, -0.3, 0.2], "right": [0.8, 0.4, -0.3, 0.5]}
     return tiny_task(start=start, **changes)
 
 
@@ -74,7 +74,7 @@ def one_link(left, right, second=0.0):
         robot={"left_links": [REACH], "right_links": [REACH]},
         goals=[meet, [SHOULDER + math.cos(second), 0.1 + math.sin(second)]],
         locked_base=["x", "y"],
-        start={"base": [0.0, 0.0], "left": [left], "right": [right]},
+        start={"left": [left], "right": [right]},
     )
 
 

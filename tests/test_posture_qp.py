@@ -97,7 +97,7 @@ def test_an_unreachable_goal_is_infeasible():
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_every_sequence_keeps_the_best(method):
     goals = [[4.0, 1.5], [-3.0, 2.0]]
-    start = {"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
+    start = {"left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
     task = tiny_task(goals=goals, initial_hands="RL", start=start)
     rewards = {}
     for hands in itertools.product(task.hands, repeat=2):

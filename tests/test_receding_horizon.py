@@ -60,7 +60,7 @@ def planar_task(**changes):
     """A short arm of two links on a fixed base, whose other arm has nothing to do."""
     content = {
         "robot": {"right_links": [1.0, 0.8]},
-        "start": {"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.4, 0.9]},
+        "start": {"left": [0.0] * 4, "right": [0.4, 0.9]},
         "goals": [[1.4, 1.3], [-0.6, 1.0]],
         "hands": ["right"],
         "locked_base": ["x", "y"],

@@ -51,48 +51,42 @@ def study():
     return study_of_trials(trials, plans, forward_kinematics=1_000)
 
 
-def same(table, expected):
-    """The table's columns but the runs behind it are these, in this order."""
-    frame = pd.DataFrame.from_dict(expected, orient="index").rename_axis("row")
-    shown = table[frame.columns]
-    pd.testing.assert_frame_equal(shown, frame, check_dtype=False)
+def same(table, names, cells):
+    """These columns of the table are these, row by row, in this order."""
+    frame = pd.DataFrame.from_dict(cells, orient="index", columns=names).rename_axis("row")
+    pd.testing.assert_frame_equal(table[names], frame, check_dtype=False)
 
 
-LEARNED = {ONE: 10 / 292, TWO: 15 / 465}
-FOUND = {ONE: 1 / 292, TWO: 5 / 465}
-PLANNED = {ONE: 4 / 292, TWO: 35 / 465}
-
-
-def gap_columns(gaps):
-    mean = sum(gaps.values()) / 2 if len(gaps) == 2 else NONE
-    return {"gap": mean, f"on {ONE}": gaps.get(ONE, NONE), f"on {TWO}": gaps.get(TWO, NONE)}
+LEARNED = 10 / 292, 15 / 465
+"""Gaps of the learner on both tasks."""
 
 
 def test_ranking(study):
     table = TABLES["ranking"](study)
-    named = {
-        CMA: (BY_TRIAL, FOUND, 6),
-        BOTH: (BY_TRIAL, LEARNED, 6),
-        PLAN: (BY_FORMULA, PLANNED, 2),
-        EC1: (BY_TRIAL, {ONE: LEARNED[ONE]}, 3),
-        EC4: (BY_TRIAL, {TWO: LEARNED[TWO]}, 3),
+    cells = {
+        name: (name, information, sum(gaps) / 2, *gaps, runs)
+        for name, information, gaps, runs in (
+            (CMA, BY_TRIAL, (1 / 292, 5 / 465), 6),
+            (BOTH, BY_TRIAL, LEARNED, 6),
+            (PLAN, BY_FORMULA, (4 / 292, 35 / 465), 2),
+            (EC1, BY_TRIAL, (LEARNED[0], NONE), 3),
+            (EC4, BY_TRIAL, (NONE, LEARNED[1]), 3),
+        )
     }
-    same(table.loc[list(named)], {
-        name: {"method": name, "information": information, **gap_columns(gaps), "runs": runs}
-        for name, (information, gaps, runs) in named.items()
-    })  # fmt: skip
+    names = ["method", "information", "gap", f"on {ONE}", f"on {TWO}", "runs"]
+    same(table.loc[list(cells)], names, cells)
     assert table.index.tolist()[:3] == [CMA, BOTH, PLAN]
     # Of two-armed 1 there is no spread: half of what ascending's runs span, -300 to -305.
-    assert LEARNED[TWO] / 2 + 8 / 584 <= table.gap_low[BOTH] < table.gap[BOTH]
-    assert table.gap[BOTH] < table.gap_high[BOTH] <= LEARNED[TWO] / 2 + 13 / 584
+    assert LEARNED[1] / 2 + 8 / 584 <= table.gap_low[BOTH] < table.gap[BOTH]
+    assert table.gap[BOTH] < table.gap_high[BOTH] <= LEARNED[1] / 2 + 13 / 584
     assert table.gap_low[[PLAN, EC1, EC4]].isna().all()
 
 
 def test_methods(study):
-    shown = ["runs", "solved", "reward", "reward_sd", "gap", "hands", "trials",
+    names = ["runs", "solved", "reward", "reward_sd", "gap", "hands", "trials",
              "forward_kinematics"]  # fmt: skip
     sd = math.sqrt((2**2 + 1**2 + 3**2) / 2)
-    expected = {
+    cells = {
         f"{ONE} {CMA}": (3, 3, -293.0, 0.0, 1 / 292, "LRLR 3", 100, 1e5),
         f"{ONE} {PLAN}": (1, 1, -296.0, NONE, 4 / 292, "LRLR", 0, 500),
         f"{ONE} {EC1}": (3, 3, -302.0, sd, 10 / 292, "LRLR 3", 1000, 1e6),
@@ -100,9 +94,7 @@ def test_methods(study):
         f"{TWO} {EC4}": (3, 3, -480.0, 0.0, 15 / 465, "LRLR 3", 1000, 1e6),
         f"{TWO} {PLAN}": (1, 1, -500.0, NONE, 35 / 465, "LRLR", 0, 500),
     }
-    same(TABLES["methods"](study), {
-        name: dict(zip(shown, cells, strict=True)) for name, cells in expected.items()
-    })  # fmt: skip
+    same(TABLES["methods"](study), names, cells)
 
 
 def test_the_median_run_is_nearest_to_the_median():
@@ -130,9 +122,7 @@ def test_runtimes(study):
         PLAN: (26 / 40, 0, NONE, NONE, 0, NONE, NONE, 500, NONE, NONE, 0.25, NONE, NONE, NONE),
     }
     table = TABLES["runtimes"](study)
-    same(table.loc[list(cells)], {
-        name: dict(zip(names, row, strict=True)) for name, row in cells.items()
-    })  # fmt: skip
+    same(table.loc[list(cells)], names, cells)
     assert len(table) == 3
 
 
@@ -144,9 +134,7 @@ def test_learning(study):
         f"{ONE} {CMA}": (3, -319.0, -293.0, NONE, NONE),
         f"{TWO} {CMA}": (3, -532.0, -470.0, NONE, NONE),
     }
-    same(TABLES["learning"](study), {
-        name: dict(zip(names, row, strict=True)) for name, row in cells.items()
-    })  # fmt: skip
+    same(TABLES["learning"](study), names, cells)
 
 
 def test_of_planners_the_best_alone_has_a_curve(study):

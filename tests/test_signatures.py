@@ -241,7 +241,7 @@ def test_signs_are_one_number_a_run():
 
 
 def test_choice_in_isolation():
-    start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
+    start = {"left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
     task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
     some = tuple(corrective_trial(task, hands) for hands in ("RL", "LR", "RR"))
     agrees = as_in_isolation(Solutions(task, "", some))
@@ -258,7 +258,7 @@ def test_preshaping_by_the_arm_alone():
     robot = load_task("two-armed-1").robot
     goals = [robot.forward_kinematics(q, hand).tolist()
              for q, hand in ((swung, "right"), (posture(left_1=0.2), "left"))]  # fmt: skip
-    content = {"base": [0.0, 0.0], "left": start[2:6].tolist(), "right": start[6:].tolist()}
+    content = {"left": start[2:6].tolist(), "right": start[6:].tolist()}
     task = tiny_task(goals=goals, initial_hands="RL", start=content, locked_base=["x", "y"])
     end = posture(left_1=0.2, right_1=0.4)
     initial = execute(task, movements_of("RL", [swung, end]))
@@ -299,49 +299,53 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     assert abs(without - now) > 0.05
 
 
-def beside_random_search(
-    posture_difference=2.0,
-    of_random_search=0.5,
-    *,
-    runs=12,
-    random_search_runs=12,
-    random_search_trials=10,
-):
-    """The learner's bases differ so much at goal 1 by the next goal, and those of random search."""
-    cells = []
-    for label, shift, count in (
-        (EC1, posture_difference, runs),
-        (RANDOM_SEARCH, of_random_search, random_search_runs),
-    ):
-        noise = 0.1 * rng(2).standard_normal(count)
-        for task, x in ((load_task("ascending"), 0.0), (load_task("descending"), shift)):
-            cells.append(posed(task, label, [posture(each) for each in noise + x]))
-    study = study_of_solutions(cells)
-    study.runs.loc[study.runs.method == RANDOM_SEARCH, "trials"] = random_search_trials
-    return study
+ONE_ARMED = ("ascending", "descending")
+MANY, ONE = (12, 12), (1, 1)
+FEW_CONTROLS = "undecided: too few runs of random search"
 
 
 @pytest.mark.parametrize(
-    ("made_up", "verdict"),
+    ("method", "difference", "runs", "of_random_search", "its_runs", "its_trials", "verdict"),
     [
-        ({}, "different postures"),
-        ({"posture_difference": 0.5}, "no more than random search"),
-        ({"posture_difference": 0.5, "of_random_search": 2.0}, "no more than random search"),
-        ({"posture_difference": 0.0}, "no significant difference"),
-        ({"runs": 2}, "too few runs"),
-        ({"random_search_runs": 1}, "undecided: too few runs of random search"),
-        # fewer than the learner's
-        ({"random_search_trials": 9}, "undecided: too few runs of random search"),
+        (EC1, 2.0, MANY, 0.5, MANY, 10, "different postures"),
+        (EC1, 0.5, MANY, 0.5, MANY, 10, "no more than random search"),
+        (EC1, 0.5, MANY, 2.0, MANY, 10, "no more than random search"),
+        (EC1, 0.0, MANY, 0.5, MANY, 10, "no significant difference"),
+        (EC1, 2.0, (2, 2), 0.5, MANY, 10, "too few runs"),
+        (EC1, 2.0, MANY, 0.5, ONE, 10, FEW_CONTROLS),
+        (EC1, 2.0, MANY, 0.5, MANY, 9, FEW_CONTROLS),  # fewer trials than the learner's
+        # Methods without trials select nothing; of one that draws nothing there is no test.
+        ("plan", 0.0, ONE, 0.5, MANY, 10, "the same posture"),
+        ("plan", 0.5, ONE, 0.5, MANY, 10, "different postures"),
+        ("mine", 0.5, ONE, 0.5, MANY, 10, "too few runs"),
+        # Of 41 divisions one is as far apart: below 5 %.
+        ("mine", 0.5, (40, 1), 0.5, MANY, 10, "too few runs"),
+        ("mine", 0.5, (9, 9), 0.5, MANY, 10, "different postures"),
+        ("mine", 0.0, (9, 9), 0.5, MANY, 10, "no significant difference"),
     ],
 )
-def test_a_method_that_selects_has_to_exceed_random_search(made_up, verdict):
-    study = beside_random_search(**made_up)
+def test_verdicts_on_postures_at_a_shared_goal(
+    method, difference, runs, of_random_search, its_runs, its_trials, verdict
+):
+    """Bases differ so much at goal 1 by the next goal, in so many runs on each of two tasks."""
+    cells = [
+        posed(load_task(name), label, [posture(x + each) for each in noise[:count]])
+        for label, shift, counts in (
+            (method, difference, runs), (RANDOM_SEARCH, of_random_search, its_runs)
+        )
+        for noise in [0.1 * rng(2).standard_normal(40)]
+        for name, x, count in zip(ONE_ARMED, (0.0, shift), counts, strict=True)
+    ]  # fmt: skip
+    study = study_of_solutions(cells, deterministic=["plan"])
+    of_control = study.runs.method == RANDOM_SEARCH
+    study.runs["trials"] = np.where(of_control, its_trials, 10 * (method == EC1))
+    assert control.selects(study, method) == (method == EC1)
     contexts = coarticulation.shared_goal(study)
-    assert contexts.posture_difference == pytest.approx(made_up.get("posture_difference", 2.0))
+    assert contexts.method == method
     assert coarticulation.verdict_of(study, contexts) == verdict
     compared = control.contexts_of_control(study, contexts)
     if compared is not None:
-        assert compared.posture_difference == pytest.approx(made_up.get("of_random_search", 0.5))
+        assert compared.posture_difference == pytest.approx(of_random_search)
         # Random search is not compared itself.
         assert control.contexts_of_control(study, compared) is None
 
@@ -410,43 +414,3 @@ def test_p_of_shared_goals_is_corrected_by_method():
     assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 70] * 2)
     # Each of its tests alone is significant.
     assert {*table.verdict[EC1]} == {"no significant difference"}
-
-
-ONE_ARMED = ("ascending", "descending")
-
-
-def beside_corrective(posture_difference, stochastic, runs):
-    """A method whose base differs so much at goal 1 by the next goal, with so many runs on each
-    task, and the corrective process."""
-    cells = [
-        posed(load_task(name), label, [posture(shift + 0.01 * run) for run in range(count)])
-        for label, difference, counts in (
-            ("corrective-alone/best-hands", 0.0, (1, 1)),
-            ("mine", posture_difference, runs),
-        )
-        for name, shift, count in zip(ONE_ARMED, (0.0, difference), counts, strict=True)
-    ]
-    study = study_of_solutions(cells, deterministic=[] if stochastic else ["mine"])
-    study.runs["trials"] = 0
-    return study
-
-
-@pytest.mark.parametrize(
-    ("posture_difference", "stochastic", "runs", "verdict"),
-    [
-        (0.0, False, (1, 1), "the same posture"),
-        (0.5, False, (1, 1), "different postures"),
-        (0.5, True, (1, 1), "too few runs"),
-        (0.5, True, (40, 1), "too few runs"),  # of 41 divisions one is as far apart: below 5 %
-        (0.5, True, (9, 9), "different postures"),
-        (0.0, True, (9, 9), "no significant difference"),
-    ],
-)
-def test_no_difference_is_significant_or_not_without_a_test(
-    posture_difference, stochastic, runs, verdict
-):
-    """A method that draws nothing takes none, and one run a context allows none."""
-    study = beside_corrective(posture_difference, stochastic, runs)
-    assert not control.selects(study, "mine")
-    contexts = coarticulation.shared_goal(study)
-    assert coarticulation.verdict_of(study, contexts) == verdict

@@ -91,10 +91,6 @@ def test_crossings_by_brute_force():
         crossing = running_times.budget_for(spends, level)
         assert crossing.value == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
-    steps, shares = running_times.share_by_budget(spends)
-    for budget, at in zip(steps[::7], shares[::7], strict=True):
-        assert at == pytest.approx(share(budget))
-    assert running_times.share_reached(spends) == pytest.approx(share(1e300))
     assert math.isnan(running_times.budget_for([spends[0][:2]], 0.5).low)  # too few runs
     at = np.quantile(budgets, [0.1, 0.5])
     drawn = [

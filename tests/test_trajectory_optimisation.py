@@ -32,7 +32,7 @@ def small_task(**change):
     content = {
         "name": "small",
         "robot": SMALL,
-        "start": {"base": (0.0, 0.0), "left": (1.5,), "right": (0.4, 0.3)},
+        "start": {"left": (1.5,), "right": (0.4, 0.3)},
         "goals": ((2.6, 1.0), (3.2, -0.4)),
     }
     content.update(change)
@@ -255,11 +255,9 @@ def test_of_too_many_hand_sequences_a_beam_is_planned():
     task = small_task(goals=((2.6, 1.0), (3.2, -0.4), (1.2, 1.4)))
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}
-    for most in (3, 8, 64):
+    for most in (3, 64):
         few = {"nodes": 40, "graphs": 1, "chains": 1, "noisy_starts": 0}
         result, *_ = solve(method, task, most_sequences=most, **few)
         costs[most] = result.details["costs"]
-    assert len(costs[3]) == 3
-    assert len(costs[8]) == 8
-    assert costs[64] == costs[8]
-    assert costs[3].items() <= costs[8].items()
+    assert (len(costs[3]), len(costs[64])) == (3, 8)
+    assert costs[3].items() <= costs[64].items()

@@ -19,7 +19,7 @@ METHODS = (HillClimbing, CMAES, GoalByGoal)
 ONE_GOAL = tiny_task(
     hands=["right"],
     goals=[[-3.0, 0.0]],
-    start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.0, 0.3, 0.4, -0.2]},
+    start={"left": [0.0] * 4, "right": [0.0, 0.3, 0.4, -0.2]},
 )
 
 
@@ -72,7 +72,7 @@ def test_the_bandit_exploits_and_explores():
 SECOND_FOR_THE_RIGHT = tiny_task(
     goals=[[2.0, 2.0], [4.3, 0.8]],
     locked_base=["x", "y"],
-    start={"base": [0.0, 0.0], "left": [1.0, -0.5, -0.2, 0.1], "right": [0.8, 0.2, 0.1, 0.1]},
+    start={"left": [1.0, -0.5, -0.2, 0.1], "right": [0.8, 0.2, 0.1, 0.1]},
 )
 """The base is locked and the second goal out of the left hand's reach."""
 
@@ -178,7 +178,7 @@ def test_a_single_joint_to_explore():
         goals=[[0.5, 1.1]],
         locked_base=["x", "y"],
         robot={"right_links": [1.0]},
-        start={"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.5]},
+        start={"left": [0.0] * 4, "right": [0.5]},
     )
     *_, session = solve(CMAES, task, trials=60)
     # Turns by pi/2 - 0.5 less the angle under which half the disc's chord is seen.

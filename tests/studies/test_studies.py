@@ -6,9 +6,7 @@ one verdict of dose there is now undecided, as it hangs on one of five tasks.
 """
 
 import hashlib
-import lzma
 import re
-from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -18,10 +16,9 @@ from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families
 from coartic.tasks.task import address_of, task_text
-from tests.support.processes import program
-from tests.support.suites import InProcess
+from tests.support.processes import ROOT, program
+from tests.support.suites import InProcess, unpacked
 
-ROOT = Path(__file__).parents[2]
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
 STUDIES = [folder for folder in ALL if (folder / "suite.toml").exists()]
 """Studies of runs; the others have protocols of their own."""
@@ -51,10 +48,9 @@ def comparable(table, path):
 @pytest.fixture(scope="module", params=STUDIES, ids=lambda folder: folder.name)
 def measured(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    content = lzma.decompress((SMALL / request.param.name / "runs.sqlite.xz").read_bytes())
-    (folder / "runs.sqlite").write_bytes(content)
     study = program(request.param / "study.py")
-    return request.param, study, study.measure(load(folder))
+    stored = load(unpacked(SMALL / request.param.name, folder))
+    return request.param, study, study.measure(stored)
 
 
 def test_tables_are_those_of_version_1(measured, tmp_path):

@@ -97,6 +97,11 @@ def program(path):
     return module
 
 
+def programs(study, *names):
+    """Programs of a folder of ``studies/``."""
+    return [program(ROOT / "studies" / study / f"{name}.py") for name in names]
+
+
 def forget(*packages):
     """Have these imported anew."""
     for name in [name for name in sys.modules if name.partition(".")[0] in packages]:

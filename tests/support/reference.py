@@ -11,6 +11,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 
 from coartic.analysis import verify
 from coartic.model import PAPER
@@ -140,6 +141,18 @@ def preferred_posture(task, condition, q, number, hand, values, targets):
         explores = _explored(task, condition, best)
         p[explores] = middle[explores]
     return p
+
+
+def hits_of(task, condition, *, trials, seed, subject):
+    """Hits of a person who learns like this, as people's trials are recorded."""
+    run = learn(task, condition, seed=seed, trials=trials)
+    rows = [
+        [subject, trial, goal, hand, ticks, *q]
+        for trial, (visited, spent) in enumerate(zip(run.visits, run.ticks_by_goal, strict=True), 1)
+        for goal, ((_, hand, q), ticks) in enumerate(zip(visited, spent, strict=True), 1)
+    ]
+    names = ["subject", "trial", "goal", "hand", "ticks", *task.robot.joint_names]
+    return pd.DataFrame(rows, columns=names)
 
 
 def learn(task, condition, *, seed, trials, model=PAPER, start=()):

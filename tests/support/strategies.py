@@ -47,7 +47,7 @@ def tiny_task(**changes):
     content = {
         "name": "tiny",
         "goals": [[5.0, 1.0], [5.0, 2.0]],
-        "start": {"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.0] * 4},
+        "start": {"left": [0.0] * 4, "right": [0.0] * 4},
     }
     content.update(changes)
     content.setdefault("initial_hands", "R" * len(content["goals"]))

@@ -1,6 +1,7 @@
 """Suites run into folders, in this process where processes are not what is tested."""
 
 import contextlib
+import lzma
 import os
 import sqlite3
 from contextlib import closing
@@ -97,6 +98,13 @@ def made_once(tmp_path_factory, name, make):
         if not made.exists():
             make(folder)
             made.touch()
+    return folder
+
+
+def unpacked(place, folder):
+    """A results folder of the packed runs that are stored in a place."""
+    packed = (place / f"{RUNS_FILE}.xz").read_bytes()
+    (folder / RUNS_FILE).write_bytes(lzma.decompress(packed))
     return folder
 
 

@@ -1,7 +1,5 @@
 """The dial: gains, and verdicts, of planted runs."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,14 +7,9 @@ import pytest
 from coartic import corrective_trial, hand_sequences, load_task
 from coartic.analysis import judging, ranking, runtimes, shares
 from tests.support.made_up import study_of_rewards
-from tests.support.processes import program
+from tests.support.processes import programs
 
-FOLDER = Path(__file__).parents[3] / "studies" / "dial"
-
-
-STUDY, PROTOCOLS, SHIFTS = (
-    program(FOLDER / f"{name}.py") for name in ("study", "protocols", "shifts")
-)
+STUDY, PROTOCOLS, SHIFTS = programs("dial", "study", "protocols", "shifts")
 
 
 def planted(gains, quarters=None):
@@ -43,7 +36,7 @@ def planted(gains, quarters=None):
 
 @pytest.fixture(autouse=True)
 def _fewer_resamples(monkeypatch):
-    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
 
 
 def verdicts(*arguments):

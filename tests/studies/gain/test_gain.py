@@ -1,16 +1,14 @@
 """Differences at equal gain, of planted tasks, and of every stored run in plain loops."""
 
-import lzma
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from coartic.analysis import load
-from tests.support.processes import program
+from tests.support.processes import ROOT, programs
+from tests.support.suites import unpacked
 
-GAIN = program(Path(__file__).parents[3] / "studies" / "gain" / "study.py")
+(GAIN,) = programs("gain", "study")
 
 
 def planted(*rows):
@@ -60,16 +58,17 @@ def test_a_learner_that_gains_nothing_covers_no_gain():
 
 def test_cells_are_means_over_runs(tmp_path):
     """Of each run's ticks and its own signatures, in loops over runs."""
-    stored = Path(__file__).parent / "runs.sqlite.xz"
-    (tmp_path / "runs.sqlite").write_bytes(lzma.decompress(stored.read_bytes()))
-    study = load(tmp_path)
+    study = load(unpacked(ROOT / "tests" / "studies" / "gain", tmp_path))
     cells = GAIN.measure_cells(study)
-    signature = study.signature("arm")
+    runs = [
+        (named, run.task, run.trials, float(run.reward) - run.corrective_best, arm)
+        for (_, run), arm in zip(study.runs.iterrows(), study.signature("arm"), strict=True)
+        for named in [next(name for key, name in GAIN.NAMES.items() if run.method.startswith(key))]
+    ]
     for row in cells.to_dict("records"):
-        mine = []
-        for at, run in study.runs.iterrows():
-            named = next(name for key, name in GAIN.NAMES.items() if run.method.startswith(key))
-            if (run.task, named) == (row["task"], row["name"]) and row["trials"] in (0, run.trials):
-                mine.append((float(run.reward) - run.corrective_best, signature[at]))
+        mine = [
+            measured for named, task, trials, *measured in runs
+            if (task, named) == (row["task"], row["name"]) and row["trials"] in (0, trials)
+        ]  # fmt: skip
         assert len(mine) in (1, 3)
         assert np.allclose(np.nanmean(mine, axis=0), (row["gain"], row["arm"]))

@@ -4,7 +4,6 @@ import functools
 import itertools
 import math
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import clarabel
@@ -18,11 +17,10 @@ from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.motion.solution import Movement, hand_sequences
 from coartic.robot import directions
 from coartic.tasks.task import hands_of, letters_of
-from tests.support.processes import program
+from tests.support.processes import programs
 from tests.support.strategies import UNEVEN, changed, make_trials, uneven_task
 
-FOLDER = Path(__file__).parents[3] / "studies" / "optima"
-PROOF = program(FOLDER / "certificate.py")
+(PROOF,) = programs("optima", "certificate")
 RELAXED, LAGRANGIAN, SPEED = (sys.modules[n] for n in ("relaxation", "lagrangian", "speed"))
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 
@@ -152,7 +150,7 @@ def failing(change, rng, share):
 def test_any_solution_of_the_solver_gives_a_bound(name, failure, monkeypatch):
     rng = np.random.default_rng(3)
     monkeypatch.setattr(clarabel, "DefaultSolver", failing(FAILURES[failure], rng, 1.0))
-    for task, hands, q, length in paths(name):
+    for task, hands, q, length in itertools.islice(paths(name), 0, None, 4):
         chosen = undecided(hands, rng)
         root, angles = RELAXED.Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
         box = np.stack([angles - rng.random(len(angles)), angles + rng.random(len(angles))], 1)
@@ -170,13 +168,13 @@ def test_a_proof_with_a_solver_that_fails_is_loose(failure, monkeypatch):
     """The optimum is 125 ticks: no claim of more is ever proven."""
     task, rng = load_task("two-armed/v1/i004"), np.random.default_rng(1)
     monkeypatch.setattr(clarabel, "DefaultSolver", failing(FAILURES[failure], rng, 0.3))
-    assert PROOF.certify(task, 140, 300).ticks <= 125
+    assert PROOF.certify(task, 140, 100).ticks <= 125
 
 
 @pytest.mark.filterwarnings("ignore:Solution may be inaccurate")
 @pytest.mark.parametrize(
     ("name", "nodes"),
-    [("two-armed/v1/i037", 60), ("redundancy/v1/i010", 80), ("one-armed/v1/i025", 60)],
+    [("two-armed/v1/i037", 40), ("redundancy/v1/i010", 40), ("one-armed/v1/i025", 40)],
 )
 def test_the_bound_is_that_of_cvxpy(name, nodes, monkeypatch):
     """At 200 nodes in all: numbers that are changed in place give what CVXPY's multipliers give."""
@@ -189,17 +187,14 @@ def test_the_bound_is_that_of_cvxpy(name, nodes, monkeypatch):
         problem.solve("CLARABEL", canon_backend="SCIPY")
         relaxed = solve(root, box, min(gap, 1e-3))
         least = bound(root, box, relaxed.multipliers, longest)
-        if problem.status == "infeasible":
-            assert least > longest
-        else:
-            held, speeds, _, pulls, forces, _ = (c.dual_value for c in problem.constraints)
-            pulls, forces = -pulls[1], -forces[1]
-            pulls[root.held] += held
-            # Both stop within a thousandth; a term's least value may say more than half-spaces.
-            exact = bound(root, box, (pulls, forces, speeds), longest)
-            assert least == pytest.approx(exact, rel=5e-3, abs=2e-3)
-            assert least >= problem.value * (1 - 2e-3) - 2e-3
-        checked.append(problem.status)
+        held, speeds, _, pulls, forces, _ = (c.dual_value for c in problem.constraints)
+        pulls, forces = -pulls[1], -forces[1]
+        pulls[root.held] += held
+        # Both stop within a thousandth; a term's least value may say more than half-spaces.
+        exact = bound(root, box, (pulls, forces, speeds), longest)
+        assert least == pytest.approx(exact, rel=5e-3, abs=2e-3)
+        assert least >= problem.value * (1 - 2e-3) - 2e-3
+        checked.append(least)
         return relaxed
 
     monkeypatch.setattr(RELAXED.Relaxation, "solve", both)
@@ -280,7 +275,7 @@ def test_the_least_of_a_term_is_exact():
 SMALL = Robot(left_links=(1.0,), right_links=(1.2,))
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(5))
 def test_the_proof_agrees_with_an_exhaustive_search(seed):
     """Two goals, one link an arm, the base on a rail: every path on a fine grid."""
     rng = np.random.default_rng(seed)
@@ -288,7 +283,7 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         name="small",
         robot=SMALL,
         locked_base=("y",),
-        start={"base": (0.0, 0.0), "left": (1.2,), "right": (0.4,)},
+        start={"left": (1.2,), "right": (0.4,)},
         goals=tuple(
             (round(x, 3), round(y, 3)) for x, y in rng.uniform((-2, -0.7), (2, 0.9), (2, 2))
         ),

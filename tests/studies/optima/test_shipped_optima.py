@@ -7,8 +7,8 @@ import sqlite3
 import subprocess
 import sys
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -21,13 +21,12 @@ from coartic.tasks import optima
 from coartic.tasks.families import named_by, shipped_families
 from coartic.tasks.optima import best_shipped, essence
 from coartic.tasks.task import hands_of
-from tests.support.processes import program
+from tests.support.processes import ROOT, programs
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
-ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "studies" / "optima"
 THIRD_VERSION = "dcb24843"
-RENEW, PROVE, STUDY = (program(FOLDER / f"{name}.py") for name in ("renew", "prove", "study"))
+RENEW, PROVE, STUDY = programs("optima", "renew", "prove", "study")
 SHIPPED = RENEW.shipped
 ENTRIES = SHIPPED.read()
 DRAWN = [entry for (name, *_), entry in ENTRIES.items() if "/" in name]
@@ -40,19 +39,25 @@ def test_the_first_forty_test_instances_of_every_family_have_one():
     assert counts == dict.fromkeys(shipped_families(), 40)
 
 
+def held(entry):
+    """The task of an entry, and the execution of the solution, which is what the entry says."""
+    task = load_task(entry["task"])
+    assert entry["essence"] == essence(task)
+    execution = execute(task, SHIPPED.movements_of(entry["solution"]))
+    assert (execution.reward, execution.hands) == (entry["reward"], entry["hands"])
+    assert entry["bound"] >= entry["reward"]
+    return task, execution
+
+
 @pytest.mark.parametrize("family", sorted(shipped_families()))
 def test_solutions_come_to_the_best_known_reward(family):
-    """Executed, with the hands of the table, and no better than what is proven."""
     for entry in (entry for entry in DRAWN if entry["task"].startswith(f"{family}/")):
-        task = load_task(entry["task"])
+        task, execution = held(entry)
         shipped = best_shipped(task)
-        assert shipped is not None
-        assert entry["essence"] == essence(task)
-        execution = execute(task, SHIPPED.movements_of(entry["solution"]))
-        assert (execution.reward, execution.hands) == (shipped.reward, shipped.hands)
-        assert shipped.bound is None or shipped.reward <= shipped.bound
+        known = tuple(entry[key] for key in ("reward", "hands", "bound"))
+        assert (shipped.reward, shipped.hands, shipped.bound) == known
         alone = corrective_trial(task, task.initial_hands).reward
-        assert alone is None or shipped.reward >= alone
+        assert alone is None or execution.reward >= alone
 
 
 def name_of(entry):
@@ -61,14 +66,8 @@ def name_of(entry):
 
 @pytest.mark.parametrize("entry", SOLVED, ids=name_of)
 def test_what_is_shipped_holds(entry):
-    """The solution gives its reward, also as a point; the searches agree; the bound is not above
-    it."""
-    task = load_task(entry["task"])
-    assert entry["essence"] == essence(task)
-    solution = SHIPPED.movements_of(entry["solution"])
-    execution = execute(task, solution)
-    assert execution.reward == entry["reward"]
-    assert execution.hands == entry["hands"]
+    """The solution gives its reward, also as a point; the searches agree."""
+    task, execution = held(entry)
     assert execution.corrections == 0
     if entry["other_arm"] == "still":
         assert other_arm_travel(task, hands_of(execution.hands), execution.configurations) == 0.0
@@ -79,12 +78,11 @@ def test_what_is_shipped_holds(entry):
     assert max(entry["searches"].values()) == entry["reward"]
     cost = objective(with_locks(task, entry["base"]), entry["hands"])
     targets = [np.full(len(task.q0), np.nan) if m.kind == "corrective" else m.target
-               for m in solution]  # fmt: skip
+               for m in SHIPPED.movements_of(entry["solution"])]  # fmt: skip
     assert cost(np.array(targets)[cost.joints]) == -entry["reward"]
     # On two-armed 1 with the other arm still only random starts find the best.
     apart = 3 if name_of(entry) == "two-armed-1-still-task" else 1
     assert entry["reward"] - min(entry["searches"].values()) <= apart
-    assert entry["bound"] >= entry["reward"]
 
 
 @pytest.mark.parametrize("name", builtin_tasks())
@@ -183,25 +181,29 @@ def test_a_solution_with_another_reward_is_refused():
         SHIPPED.solution_in_short(load_task("ascending"), movements, -291)
 
 
-def prove(folder, *asked):
-    """What ``prove.py`` prints, in a process of its own, and its log."""
-    command = [sys.executable, FOLDER / "prove.py", *asked, "--out", folder]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return done.stdout.splitlines(), SHIPPED.read_log(folder)
+def prove(monkeypatch, capsys, folder, *asked):
+    """What ``prove.py`` prints, in this process, and its log."""
+    monkeypatch.setattr(PROVE, "ProcessPoolExecutor", ThreadPoolExecutor)
+    monkeypatch.setattr("sys.argv", ["prove.py", *map(str, asked), "--out", str(folder)])
+    PROVE.main()
+    return capsys.readouterr().out.splitlines(), SHIPPED.read_log(folder)
 
 
-def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(files, tmp_path):
+def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(
+    files, tmp_path, monkeypatch, capsys
+):
     """A log whose last line was cut off, as where a process was killed."""
     family = (each for each in ENTRIES.values() if each["task"].startswith("two-armed/v1"))
     task, reward = next((e["task"], e["reward"]) for e in family if e["reward"] != e["bound"])
     folder, names = tmp_path / "optima", (task, "two-armed/v1/i002..i003")
-    shown, log = prove(folder, *names, "--seconds", "0.1")
+    asked = monkeypatch, capsys, folder, *names, "--seconds"
+    shown, log = prove(*asked, "0.1")
     assert [row["task"] for row in log] == [names[0]]  # the others are proven
     assert shown[0].startswith(f"{task} (base task, other arm free): {reward}, no solution ")
     with (folder / SHIPPED.LOG).open("a") as file:
         file.write('{"task": "two-armed/v1/i0')
-    assert prove(folder, *names, "--seconds", "0.1") == ([], log)
-    _, longer = prove(folder, *names, "--seconds", "0.2")
+    assert prove(*asked, "0.1") == ([], log)
+    _, longer = prove(*asked, "0.2")
     assert [row["asked"] for row in longer] == [0.1, 0.2]
     known = SHIPPED.read()
     key = SHIPPED.key_of(log[0])
@@ -228,7 +230,7 @@ def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refuse
 def test_a_better_solution_is_found_on_the_way():
     """From the open subproblems of least bound, if the reward that is known is poor."""
     entry = ENTRIES["two-armed/v1/i001", *SHIPPED.FREE] | {"reward": -400}
-    row = PROVE.prove(entry, 4.0)
+    row = PROVE.prove(entry, 0.5)
     assert -400 < row["reward"] <= row["bound"]
     execution = execute(load_task(row["task"]), SHIPPED.movements_of(row["solution"]))
     assert (execution.reward, execution.hands) == (row["reward"], row["hands"])
@@ -238,7 +240,8 @@ def test_a_task_of_ones_own_is_searched_and_proven(tmp_path):
     task = load_task("ascending").model_copy(update={"name": "mine", "goals": ((6.0, 0.5),)})
     task = task.model_copy(update={"initial_hands": "R", "provenance": {}})
     task.save(tmp_path / "mine.toml")
-    (sentence,), _ = prove(tmp_path / "out", tmp_path / "mine.toml")
+    command = [sys.executable, FOLDER / "prove.py", tmp_path / "mine.toml", "--out", tmp_path]
+    sentence = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "mine.toml (base task, other arm free): -1" in sentence
     assert ", proven optimal, " in sentence
 

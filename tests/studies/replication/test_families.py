@@ -9,17 +9,16 @@ import pytest
 from coartic.analysis import SIGNATURES, judging
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
 from tests.support.made_up import MadeUp, made
-from tests.support.processes import program
-from tests.support.suites import ROOT
+from tests.support.processes import programs
 from tests.test_random_tasks import ALONE, ONE, RISING, TWO, hands_of, rewarded
 
-STUDY = program(ROOT / "studies" / "replication" / "study.py")
+(STUDY,) = programs("replication", "study")
 claims, reader = map(importlib.import_module, ("claims", "reader"))
 
 
 @pytest.fixture(autouse=True)
 def _fewer_resamples(monkeypatch):
-    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
 
 
 def made_up_signatures(study, hand=1.0, idle=0.3, of_random_search=0.5):

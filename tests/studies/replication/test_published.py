@@ -6,12 +6,9 @@ from coartic import PAPER, Robot, corrective_trial, hand_sequences, load_task
 from coartic.learner import learning
 from coartic.learner.conditions import CONDITIONS
 from coartic.tasks.catalogue import builtin_tasks
-from tests.support.processes import program
-from tests.support.suites import ROOT
+from tests.support.processes import programs
 
-FOLDER = ROOT / "studies" / "replication"
-CLAIMS = program(FOLDER / "claims.py").CLAIMS
-PUBLISHED = program(FOLDER / "published.py")
+REGISTER, PUBLISHED = programs("replication", "claims", "published")
 ENTRIES, RUNS, published_cell = PUBLISHED.ENTRIES, PUBLISHED.RUNS, PUBLISHED.published_cell
 TASKS = list(builtin_tasks())
 
@@ -113,7 +110,7 @@ def test_what_is_learned_never_selects():
         than, task = entry.get("than", {}), entry["task"]
         learned = "condition" in {*entry, *than} or entry["kind"] == "hand sequences"
         assert not learned or entry["role"] in ("test", "setting"), entry
-        assert set(entry.get("claims", ())) <= {*CLAIMS.index}, entry
+        assert set(entry.get("claims", ())) <= {*REGISTER.CLAIMS.index}, entry
         goals = None if task == "general" else len(load_task(task).goals)
         assert all(len(e["hands"]) == goals for e in (entry, than) if "hands" in e), entry
 

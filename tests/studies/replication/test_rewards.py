@@ -11,13 +11,10 @@ from coartic import corrective_trial, initial_hands, load_task
 from coartic.analysis.study import solved
 from coartic.estimates import Estimate
 from tests.support.made_up import runs_of, study_of
-from tests.support.processes import program
-from tests.support.suites import ROOT
+from tests.support.processes import ROOT, programs
 
 FOLDER = ROOT / "studies" / "replication"
-REWARDS, SOLUTIONS, STUDY = (
-    program(FOLDER / f"{name}.py") for name in ("rewards", "solutions", "study")
-)
+REWARDS, SOLUTIONS, STUDY = programs("replication", "rewards", "solutions", "study")
 
 
 def test_solutions_are_of_the_run_with_the_median_reward(traced):

@@ -1,7 +1,5 @@
 """Study tell-apart: its learner is the paper's, and other code finds the same shares."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,18 +7,18 @@ import pytest
 from coartic import Movement, learn, load_task
 from coartic.analysis import figures
 from coartic.tasks.task import hands_of
-from tests.support.processes import program
+from tests.support.processes import ROOT, programs
 from tests.support.reference import correct, execute
 
-FOLDER = Path(__file__).parents[3] / "studies" / "tell-apart"
-
-
-study, changes, steps = (program(FOLDER / f"{name}.py") for name in ("study", "changes", "steps"))
+study, changes, steps = programs("tell-apart", "study", "changes", "steps")
 
 
 def test_tables_and_figure_of_some_of_the_tasks(monkeypatch, tmp_path):
     monkeypatch.setattr(study, "EXPERIMENTS", 200)
-    raw = {name: pd.read_csv(FOLDER / f"{name}.csv") for name in ("changes", "starts", "steps")}
+    raw = {
+        name: pd.read_csv(ROOT / "studies" / "tell-apart" / f"{name}.csv")
+        for name in ("changes", "starts", "steps")
+    }
     few = raw["changes"].task.drop_duplicates()[:6]
     for name, table in raw.items():
         table[table.task.isin(few)].to_csv(tmp_path / f"{name}.csv", index=False)
@@ -51,7 +49,7 @@ def corrected(task, q, hand, goal):
 @pytest.mark.parametrize("name", ["one-armed/v1/i002", "two-armed/v1/i001"])
 def test_share_at_once_by_other_code(monkeypatch, name):
     """By the step-by-step reference, one movement after the other."""
-    monkeypatch.setattr(changes, "AFTER", [1, 300])
+    monkeypatch.setattr(changes, "AFTER", [1, 100])
     monkeypatch.setattr(changes, "EVOLVED", 2)
     monkeypatch.setattr(changes, "PLANNERS", {})
     task, practised = load_task(name), learn(name, changes.condition(load_task(name)), seed=0)
@@ -59,7 +57,7 @@ def test_share_at_once_by_other_code(monkeypatch, name):
     hands = hands_of(practised.hands)
     rows = [row for row in changes.change_goals(task, 0) if row["distance"] == 0.5]
     for n, (g, _, after) in enumerate(cases):
-        run = learn(after, practised.condition, seed=1, trials=300, start=practised.solution)
+        run = learn(after, practised.condition, seed=1, trials=100, start=practised.solution)
         before, first, end = (
             execute(*each).hits[g]
             for each in ((task, practised.solution), (after, practised.solution),
@@ -75,7 +73,7 @@ def test_share_at_once_by_other_code(monkeypatch, name):
         parts = [m for m in practised.solution if m.goal <= g], [m for m in practised.solution
                                                                  if m.goal > g + 1]  # fmt: skip
         informed = [*parts[0], Movement(g + 1, hand, "learned", before + way), *parts[1]]
-        run = learn(after, practised.condition, seed=1, trials=300, start=informed)
+        run = learn(after, practised.condition, seed=1, trials=100, start=informed)
         first, end = (execute(after, movements).hits[g] for movements in (informed, run.solution))
         row = [row for row in rows if row["model"] == "learner, informed"][n]
         assert (first - before) @ (end - before) == pytest.approx(row["dot_1"], abs=1e-6)
