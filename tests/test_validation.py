@@ -79,13 +79,10 @@ from coartic.analysis.statistics.hypotheses import (
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
-from coartic.benchmarks.suites import SUITE_FOLDER
-from coartic.cli.arguments import value_in
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import RENAMED, did_you_mean
 from coartic.method import Information, Session, outline_of
 from coartic.motion.trial import reach_goals
-from coartic.runs.record import movement_data
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
 from coartic.tasks.optima import essence
 from coartic.tasks.task import TASK_FOLDER
@@ -95,7 +92,6 @@ from tests.support.suites import KNOWN, ROOT
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 FAMILY_FILE = FAMILY_FOLDER / "long.v1.toml"
-SUITE_FILE = SUITE_FOLDER / "quick.toml"
 NO_METHOD = Path(__file__).parents[1] / "LICENSE"
 FAMILY = """
 title = "Mine"
@@ -157,12 +153,10 @@ FAMILIES = [
     (family("[4, 4]", "[5, 4]"), "links is [5, 4]; it should have the lower number first"),
     (family("[-5, 5]", "[5, -5]"), "region.x is [5, -5]; it should have the lower number first"),
     (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
-    (family("[-5, 5]", "[-5, inf]"), "region.x[1] is inf; it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
 SUITES = [
-    (suite("process/", "proces/"), "did you mean 'dual-process/EC1'"),
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
     (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
@@ -177,16 +171,11 @@ SUITES = [
 ]
 METHODS = [
     ("import nothing_like_this", "cannot be imported: ModuleNotFoundError"),
-    ("raise SystemExit(3)", "cannot be imported: SystemExit: 3"),
     ("x = 1", "defines no subclass of coartic.Method"),
     ("def (", "cannot be imported: SyntaxError"),
     (method("def solve", "def solves"), "that is complete: A has no solve"),
     (method("title = ", ""), "title must be a text"),
-    (method('"a"', '"a b"'), "the name 'a b' must begin"),
-    (method('"a"', '"dual-process/EC1"'), "'dual-process/EC1' is reserved"),
     (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
-    (method('"a"', '"CMA-ES"'), "'CMA-ES' is a name of a method here"),
-    (method('"a"', '"ec4"'), "'ec4' is a name of a method here"),
     (method("frozenset()", '"goals"'), "information must be a set of Information"),
     (METHOD + "    files = ('w.npy',)", "w.npy"),
 ]
@@ -226,23 +215,13 @@ def test_of_many_problems_the_first_are_said(tmp_path):
     [
         ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
         ({"methods": ["dual-process/EC9"]}, "unknown method 'dual-process/EC9'; did you mean"),
-        (
-            {"tasks": ["ascending"], "methods": ["EC4"]},
-            "no method to run on task 'ascending': EC4 uses the left",
-        ),
-        ({"tasks": ["ascending.toml"]}, "name 'ascending' is already taken"),
-        ({"tasks": ["left.toml"]}, "no method to run on task 'left': EC1 uses the right"),
         ({"tasks": ["absent.toml"]}, "absent.toml"),
-        ({"tasks": "a.toml"}, "tasks is 'a.toml'; it should be a list, such as ['a.toml']"),
         ({"tasks": Path("a.toml")}, "tasks is PosixPath('a.toml'); it should be a list"),
         ({"tasks": [3]}, "3 is no task; it should be a name, a path or a task"),
-        ({"tasks": None}, "tasks is None; it should be a list"),
-        ({"methods": 3}, "methods is 3; it should be a list"),
         ({"methods": [3]}, "methods[0] is 3; it should be a text"),
         ({"jobs": 2}, "jobs is no option: give executor=Local(jobs)"),
         ({"scheduler": "x"}, "scheduler is no option: give executor=Dask(scheduler)"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
-        ({"runs": "3"}, "runs is '3'; it must be a whole number"),
         ({"runs": True}, "runs is True; it must be a whole number"),
         ({"seed": -1}, "seed is -1; it should be at least 0"),
         ({"trials": 10**9}, "trials is 1000000000; it should be at most 10000000"),
@@ -253,20 +232,13 @@ def test_of_many_problems_the_first_are_said(tmp_path):
 )
 def test_an_argument(wrong, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("mine", "ascending", "left"):
-        text = GOOD.replace("mine", name)
-        if name == "left":
-            text = 'hands = ["left"]' + text.replace("RR", "LL")
-        Path(f"{name}.toml").write_text(text, encoding="utf-8")
     with pytest.raises(CoarticError) as caught:
         run_suite(**{"suite": "paper", "folder": "out"} | wrong)
     assert words in str(caught.value)
     assert not Path("out").exists()
 
 
-@pytest.mark.parametrize(
-    "read", [load_task, plan_suite, read_family, lambda path: registry([path])]
-)
+@pytest.mark.parametrize("read", [load_task, lambda path: registry([path])])
 @pytest.mark.parametrize("kind", ["absent", "pipe", "device", "folder", "large", "long"])
 def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
     path = tmp_path / "mine.v1.toml"
@@ -339,14 +311,9 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (["run", "paper", "--runs", "0"], "runs is 0; it must be a whole number from 1"),
         (["run", "paper", "--tasks", ""], "unknown task ''"),
         (["draw", "ascending", "--out", ""], "is empty"),
-        (["draw", "ascending", "--out", "a" * 5000], "File name too long"),
-        (["animate", "x", "--out", ""], "is empty"),
         (["report", "a" * 5000], "File name too long"),
-        (["run", "paper", "--out", "a" * 5000], "File name too long"),
-        (["check", "/dev/zero.toml"], "No such file"),
         (["list", "two-armed/v2/i003"], "two-armed/v1"),
         (["list", "two-armed1"], "two-armed-1"),
         (["check", "two-armed-1"], "two-armed-1 is a task, not a method. `coartic draw"),
@@ -361,30 +328,24 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
         (["animate", "0", "--width", "1.5"], "--width is 1.5; it must be a whole number from 200"),
         (["run"], "name a suite: ablations, "),
-        (["run", "papr"], "did you mean 'paper'"),
         (["run", "paper", "--family-file", TASK_FILE], "is a task: coartic run SUITE --tasks"),
         (["run", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
-        (["check", SUITE_FILE], "is a suite: coartic run"),
         (["check", "quick"], "quick is a suite: coartic run quick"),
         (["check", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
         (["check", "two-armed"], "is a shipped family: coartic list two-armed"),
         (["list", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
-        (["list", "mine.py"], "coartic check METHOD --method-file mine.py"),
         (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
         (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "column run_ids of a report's"),
         (["report", "nowhere"], "there is no folder nowhere"),
-        (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
-        (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),
         (["play", "--out", "x.txt"], "the name must end in .html"),
         (["animate", "1a2b", "--out", "x.txt"], "the name must end in .gif or .mp4"),
         (["draw", "ascending", "--out", "x.txt"], "the name must end in .svg or .pdf or .png"),
         (["new", "my-search", "--out", "x.txt"], "the name must end in .py"),
-        (["run", "comparison", "--tasks", "arm.urdf"], OF_ANOTHER_PROGRAM),
-        *(
-            ([command, "arm.urdf"], OF_ANOTHER_PROGRAM)
-            for command in ("check", "draw", "play", "list")
-        ),
-        (["run", "paper", "--seed", "-1"], "it should be at least 0"),
+        (["new", "my search"], "the name 'my search' must begin with a letter or digit"),
+        (["new", "dual-process/EC1"], "'dual-process/EC1' is reserved"),
+        (["new", "cma-es"], "'cma-es' is a name of a method here"),
+        (["new", "ec4"], "'ec4' is a name of a method here"),
+        *(([command, "arm.urdf"], OF_ANOTHER_PROGRAM) for command in ("check", "draw", "list")),
     ],
 )
 def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, coartic):
@@ -586,28 +547,16 @@ def test_all_functions_are_called_wrongly():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: mean([1.0, 2.0], resamples=-1), "resamples is -1; it must be a whole number"),
         (lambda: mean([1.0, 2.0], resamples=np.nan), "resamples is nan; it must be a whole"),
         (lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)), "goal has True; needed are real"),
         (lambda: parse_task({}, np.inf), "source is inf; needed is a text"),
-        (lambda: parse_task({}, source=5, reach=1), "source is 5"),
         (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
         (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
         (lambda: Movement(1, "right", "planned", MASKED), f"target {UNMASKED}"),
         (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints {UNMASKED}"),
-        (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), f"p_values {UNMASKED}"),
-        *(
-            (call, UNMASKED)
-            for call in (
-                lambda: movement_data(Movement(1, "right", "planned", MASKED)),
-                lambda: movements_of("RRR", np.ma.array([MASKED] * 3)),
-                lambda: make_trials(TASK, "RRR", np.ma.masked_equal(np.zeros((1, 3, 10)), 0.0)),
-                lambda: make_trials(TASK, "RRR", [[MASKED] * 3]),
-                lambda: move(ROBOT, TASK.q0, MASKED, "right", (5, 1), 0.1),
-                lambda: mean([1.0, 2.0, np.ma.masked]),
-                lambda: other_tasks({"family": [MASKED]}),
-            )
-        ),
+        (lambda: make_trials(TASK, "RRR", [[MASKED] * 3]), UNMASKED),
+        (lambda: mean([1.0, 2.0, np.ma.masked]), UNMASKED),
+        (lambda: other_tasks({"family": [MASKED]}), UNMASKED),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
         (lambda: interval({}, "gap"), "the row has no numbers gap, gap_low, gap_high"),
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
@@ -706,6 +655,3 @@ def test_advice_about_instances_and_their_families_is_taken(tmp_path):
         plan_suite("paper", family_files=[family])
     advice = str(caught.value).rpartition("such as ")[2]
     assert len(plan_suite("paper", family_files=[family], tasks=[advice], methods=["EC4"])) == 10
-    with pytest.raises(CoarticError, match=r"such as range\(50, 100\), or 50\.\.99 in a command"):
-        plan_suite("paper", runs="x")
-    assert value_in("50..99") == range(50, 100)
