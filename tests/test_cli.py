@@ -12,21 +12,19 @@ from pathlib import Path
 
 import pytest
 
-from coartic import __version__, corrective_trial, learn, load_task
+from coartic import __version__, corrective_trial, film, learn, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks import pool, template
+from coartic.benchmarks import template
 from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
-from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
 from tests.support.strategies import metres_task, tiny_task
 from tests.support.suites import (
-    BROKEN,
     KNOWN,
     ROOT,
     InProcess,
@@ -60,32 +58,6 @@ def test_run_resumes(coartic, tmp_path):
     assert coartic(*SMALL, "--out", out)[1].startswith("2 runs (2 reused) in ")
     assert coartic(*SMALL, "--runs", 3, "--out", out)[1].startswith("3 runs (2 reused) in ")
     assert len(load(out).runs) == 3
-
-
-def test_seed_jobs_and_budget_reach_the_runs(coartic, monkeypatch, tmp_path):
-    jobs = []
-
-    class Watched(InProcess):
-        def __init__(self, count):
-            jobs.append(count)
-
-    monkeypatch.setattr(pool, "Local", Watched)
-    options = ("--seed", 5, "--jobs", 3, "--trial-budget", 12, "--out", tmp_path)
-    assert coartic(*SMALL, *options)[0] == 0
-    runs = load(tmp_path).runs
-    assert jobs == [3]
-    assert list(runs.seed) == [run_seed(5, "ascending", number) for number in (0, 1)]
-    assert list(runs.trials) == [12, 12]
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
-    code, text, _ = coartic(
-        "run", "paper", "--tasks", "ascending", "--methods", "test/quits",
-        "--method-file", BROKEN, "--runs", 1, "--jobs", 1, "--out", tmp_path / "out",
-    )  # fmt: skip
-    assert code == 1
-    assert "1 failed" in text
 
 
 @pytest.mark.parametrize("failed", [0, 1])
@@ -127,14 +99,10 @@ def test_a_terminal_without_a_sign_shows_one_like_it(encoding, printed):
     assert terminal.buffer.getvalue().decode(encoding) == f"{printed}{os.linesep}"
 
 
-@pytest.mark.usefixtures("in_this_process")
-def test_check(coartic, tmp_path):
-    assert coartic("check", TASK_FILE)[0] == 0
+def test_a_broken_law_makes_the_exit_code_of_check(coartic, tmp_path):
     (tmp_path / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), encoding="utf-8")
-    assert coartic("check", tmp_path / "mine.toml")[0] != 0
-    code, text, _ = coartic("check", "test/peeks", "--method-file", BROKEN)
-    assert code == 1
-    assert "FAIL" in text
+    code, text, _ = coartic("check", tmp_path / "mine.toml")
+    assert (code, "FAIL" in text) == (1, True)
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -213,7 +181,6 @@ coartic.__main__.main()
         ("2500", "SIGTERM", 2),
         ("calling back", "SIGHUP", 1),
         ("cleaning", "SIGINT", 3),
-        ("cleaning", "SIGTERM", 1),
     ],
 )
 def test_an_interrupted_command_ends_with_a_sentence(tmp_path_factory, moment, name, times):
@@ -237,17 +204,17 @@ def test_what_a_method_file_starts_ends_with_the_command(tmp_path):
     assert status == 2, words
 
 
-def call_apart(place, command):
+def call_apart(place, command, temporary="temporary"):
     """Exit code and standard error of a command that leaves no process and no temporary folder."""
-    (place / "temporary").mkdir()
+    (place / temporary).mkdir()
     done = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=place,
-        env=os.environ | {"TMPDIR": str(place / "temporary"), "PYTHONPATH": str(ROOT)},
+        env=os.environ | {"TMPDIR": str(place / temporary), "PYTHONPATH": str(ROOT)},
         start_new_session=True,
     )  # fmt: skip
     _, words = done.communicate()
     # Python tries a folder for temporary files with a file, which a signal can leave behind.
-    assert not [path for path in (place / "temporary").iterdir() if path.is_dir()]
+    assert not [path for path in (place / temporary).iterdir() if path.is_dir()]
     assert comes(lambda: not folders_of_session(done.pid))
     return done.returncode, words
 
@@ -257,7 +224,7 @@ def test_a_locale_changes_no_report(tmp_path, coartic, in_this_process):
     (tmp_path / "mine.toml").write_text(f'title = "Grüße †"\n{GOOD}', "utf-8")
     runs, task = tmp_path / "runs", tmp_path / "mine.toml"
     alone = ("--methods", "corrective-alone/given")
-    assert coartic("run", "quick", "--tasks", f"ascending,{task}", *alone, "--out", runs)[0] == 0
+    assert coartic("run", "quick", "--tasks", task, *alone, "--out", runs)[0] == 0
     assert coartic("report", runs, "--out", tmp_path / "here")[0] == 0
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     python("-m", "coartic", "report", runs, "--out", tmp_path / "there", **locale)
@@ -267,23 +234,6 @@ def test_a_locale_changes_no_report(tmp_path, coartic, in_this_process):
     )
     assert here == there
     assert "Grüße †".encode() in here[Path("report.html")]
-
-
-@pytest.mark.process
-def test_modules_in_the_working_folder_are_not_imported(tmp_path):
-    """By no process of a command that is installed, whatever a stranger has put there."""
-    program, gift = tmp_path / "bin" / "program.py", tmp_path / "gift"
-    program.parent.mkdir()
-    gift.mkdir()
-    program.write_text("from coartic.__main__ import main\nmain()")
-    for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
-        (gift / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
-    run = ["run", "quick", "--tasks", "ascending", "--methods", "corrective-alone/given"]
-    temporary = tmp_path / ("long" * 30)  # the system takes no long socket
-    temporary.mkdir()
-    python(program, *run, "--jobs", "1", "--out", "out", cwd=gift, TMPDIR=str(temporary))
-    assert not list(temporary.iterdir())
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -354,20 +304,29 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and streams of POSIX")
-@pytest.mark.parametrize("what", ["blocked", "closed"])
-def test_a_command_ends_well_whatever_started_it(tmp_path, what):
+@pytest.mark.parametrize(
+    ("what", "temporary"),
+    [("blocked", "temporary"), ("closed", "long" * 30)],  # the system takes no long socket
+)
+def test_a_command_ends_well_whatever_started_it(tmp_path, what, temporary):
     """With all signals blocked, or without input, output and errors. What a method prints is not
-    shown."""
-    mine, prints = tmp_path / "mine.py", "import sys; print('it prints', file=sys.stderr)"
+    shown, and modules that a stranger has put into the working folder are imported by no process
+    of a command that is installed."""
+    for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
+    program = tmp_path / "bin" / "program.py"
+    program.parent.mkdir()
+    program.write_text("from coartic.__main__ import main\nmain()")
+    mine, prints = program.with_name("mine.py"), "print('it prints', file=sys.stderr)"
     text = Path(template.__file__).read_text()
-    mine.write_text(text.replace("while True:", f"{prints}\n        while True:"))
+    mine.write_text("import sys\n" + text.replace("while True:", f"{prints}\n        while True:"))
     own = ("--methods", "NAME", "--method-file", mine, "--jobs", 1)
-    command = ("-m", "coartic", *SMALL, *own, "--out")
-    status, words = call_apart(
-        tmp_path, [sys.executable, "-c", SURROUNDED, what, *map(str, command), tmp_path / "out"]
-    )
+    command = [*map(str, (program, *SMALL, *own, "--out", tmp_path / "out"))]
+    code = [sys.executable, "-I", "-c", SURROUNDED, what, *command]
+    status, words = call_apart(tmp_path, code, temporary)
     assert (status, "it prints" in words) == (0, False)
     assert load(tmp_path / "out").runs.status.tolist() == ["ok"] * 2
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.process
@@ -422,24 +381,7 @@ def test_draw(coartic, tmp_path, monkeypatch):
     (tmp_path / "other" / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 2.1]"), "utf-8")
     files = [tmp_path / "mine.toml", tmp_path / "other" / "mine.toml"]
     assert "two tasks are called 'mine'" in coartic("draw", *files, "--out", tmp_path / "two")[2]
-    drawing = tmp_path / "own.svg"
-    assert coartic("draw", tmp_path / "mine.toml", "--out", drawing)[0] == 0
-    before = drawing.read_bytes()
-    code, _, error = coartic("draw", "ascending", "--out", drawing)
-    assert (code, drawing.read_bytes()) == (2, before)
-    assert "--replace" in error
-    assert coartic("draw", "ascending", "--out", drawing, "--replace")[0] == 0
-    assert drawing.read_bytes() == (tmp_path / "one.svg").read_bytes() != before
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_animate(coartic, tmp_path):
-    out, film, near = tmp_path / "out", tmp_path / "film.gif", tmp_path / "near.toml"
-    near.write_text(NEAR)
-    assert coartic("run", "paper", "--tasks", near, "--trials", 5, "--out", out)[0] == 0
-    run_id = load(out).runs.run_id[0]
-    assert coartic("animate", run_id, "--in", out, "--out", film, "--width", 200)[0] == 0
-    assert film.read_bytes().startswith(b"GIF89a")
+    assert coartic("draw", tmp_path / "mine.toml", "--out", tmp_path / "own.svg")[0] == 0
 
 
 def test_play(coartic, tmp_path, monkeypatch):
@@ -451,8 +393,6 @@ def test_play(coartic, tmp_path, monkeypatch):
         f"{page}: {len(page.read_bytes()) // 1000} kB.\n",
     )
     assert shown == [page.as_uri()]
-    assert "--replace" in coartic("play", "--out", page)[2]
-    assert "did you mean 'ascending'" in coartic("play", "ascendin")[2]
     wrong = coartic("run", "quick", "--methods", "shortest-path", "--out", tmp_path / "runs")[2]
     assert "did you mean 'shortest-path plan'" in wrong
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -492,7 +432,7 @@ def test_help_has_no_types_of_python_and_examples_have_options_that_there_are(
 
 
 @pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize("radius", [1e-3, 0.01, 0.3, 1.0])
+@pytest.mark.parametrize("radius", [1e-3, 1.0])
 def test_a_task_of_any_radius_passes_every_door(coartic, tmp_path, radius):
     task, file = metres_task(radius, name="arm"), tmp_path / "arm.toml"
     if radius > 0.2:  # elsewhere, all goals are hit at the start
@@ -525,7 +465,7 @@ OPTIONS = {
     "list paper --method-file": ("list paper", "list paper --method-file mine.py"),
     "list nearest-hand --method-file": ("list EC1", "list nearest-hand --method-file mine.py"),
     "report --for-paper": ("report out", "report out --for-paper"),
-    "report --out": ("report out", "report out --out elsewhere"),
+    "report --out": ("report out", "report out --out mine.py"),
     "animate --in": ("animate {run} --width 200 --in out", "animate {run} --in nowhere"),
     "animate --initial --out": (
         "animate {run} --width 200 --in out --out b.gif",
@@ -564,6 +504,8 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     coartic, commands, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(film, "HOLD_S", 0.0)  # films end at once
+    monkeypatch.setattr(film, "PAUSE_S", 0.0)
     Path("near.toml").write_text(NEAR, "utf-8")
     near = paper_cells(tasks=["near.toml"], methods=["EC1"])
     study = run_and_write(tmp_path / "out", near, runs=1, trials=5)
@@ -580,6 +522,7 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
         assert said[0] != said[1], name
         assert ("has no effect" in said[1][2]) == (name in REFUSED), (name, said[1])
         assert said[1][0] == 2 or name not in REFUSED
+    assert Path("b.gif").read_bytes().startswith(b"GIF89a")
     tried = {f"{name.split()[0]} {word}" for name in OPTIONS for word in name.split()[1:]}
     for command, known in commands.commands.items():
         for option in known.params:
