@@ -14,7 +14,7 @@ import pytest
 
 from coartic import __version__, corrective_trial, film, learn, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks import template
+from coartic.benchmarks import pool, template
 from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
@@ -27,6 +27,7 @@ from tests.support.strategies import metres_task, tiny_task
 from tests.support.suites import (
     KNOWN,
     ROOT,
+    Failing,
     InProcess,
     cell_on,
     edit,
@@ -58,6 +59,12 @@ def test_run_resumes(coartic, tmp_path):
     assert coartic(*SMALL, "--out", out)[1].startswith("2 runs (2 reused) in ")
     assert coartic(*SMALL, "--runs", 3, "--out", out)[1].startswith("3 runs (2 reused) in ")
     assert len(load(out).runs) == 3
+
+
+def test_a_crashed_run_makes_the_exit_code(coartic, tmp_path, monkeypatch):
+    monkeypatch.setattr(pool, "Local", lambda _: Failing(0))
+    code, text, _ = coartic(*SMALL, "--out", tmp_path)
+    assert (code, "1 failed" in text) == (1, True)
 
 
 @pytest.mark.parametrize("failed", [0, 1])

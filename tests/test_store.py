@@ -475,6 +475,7 @@ def test_a_value_that_no_run_can_have(copied, tmp_path, change):
         "cells SET trial_budget = 5",
         "environments SET content = json_set(content, '$.packages', 1)",
         "environments SET content = 'x'",
+        "results SET environment = 99",
         "suite SET name = NULL",
         "suite SET date = NULL",
         "suite SET seed = 'x'",
