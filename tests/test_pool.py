@@ -222,23 +222,19 @@ PRINTS = """for _ in range(1000):
         os._exit(3)"""
 
 
-def test_what_a_worker_prints_is_bounded(tmp_path):
-    """100 MB are printed; the last words are kept, in little memory."""
+def test_the_last_words_of_a_run_are_kept(tmp_path):
+    """Of 100 MB, in little memory; those of an earlier run are not those of a crash."""
     resource = pytest.importorskip("resource")
-    task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", PRINTS)])
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    study = run_and_write(tmp_path / "out", [cell_on(task, does)], executor=Local(1), runs=1)
-    assert study.runs.reason[0].endswith("the end")
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50 * 2**10
-
-
-def test_words_of_an_earlier_run_are_not_those_of_a_crash(tmp_path):
     task, says = load_task("ascending"), "print('x', flush=True); return Result(corrected(session))"
-    does, _ = entries(tmp_path, [("says", says), ("quits", "os._exit(0)")])
-    cells = [cell_on(task, does, what=what) for what in ("says", "quits")]
+    bodies = {"says": says, "quits": "os._exit(0)", "prints": PRINTS}
+    does, _ = entries(tmp_path, bodies.items())
+    cells = [cell_on(task, does, what=what) for what in bodies]
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     runs = run_and_write(tmp_path / "out", cells, executor=Local(1), runs=1).runs
-    assert runs.status.tolist() == ["ok", "crashed"]
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50 * 2**10
+    assert runs.status.tolist() == ["ok", "crashed", "crashed"]
     assert runs.reason[1].endswith("exit code 0): it left no message")
+    assert runs.reason[2].endswith("the end")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test finds the processes in /proc")
@@ -317,10 +313,9 @@ def test_a_process_that_cannot_begin_says_what_ended_and_blames_no_file(
         entries(tmp_path, [("honest", "pass")])
 
 
-@pytest.mark.parametrize("allowed", [8, 14, 63])
-def test_too_few_open_files_get_a_sentence_before_a_process_begins(tmp_path, monkeypatch, allowed):
+def test_too_few_open_files_get_a_sentence_before_a_process_begins(tmp_path, monkeypatch):
     resource = pytest.importorskip("resource")
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (allowed, allowed))
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (63, 63))
     with pytest.raises(CoarticError, match="mine.py is not read: .*after `ulimit -n 1024`"):
         entries(tmp_path, [("honest", "pass")])
     with pytest.raises(CoarticError, match="Too many open files"):
