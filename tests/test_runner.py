@@ -13,7 +13,6 @@ from coartic import (
     CoarticError,
     Movement,
     corrective_trial,
-    execute,
     initial_hands,
     load_task,
 )
@@ -28,7 +27,7 @@ from coartic.benchmarks.worker import fail, perform_job
 from coartic.method import Meter
 from coartic.motion.batch import SLOTS
 from coartic.runs.plan import Job, run_seed
-from coartic.runs.record import Outcome, Times, movement_from, too_long
+from coartic.runs.record import Outcome, Times, too_long
 from tests.support.strategies import STUCK, tiny_task
 from tests.support.suites import (
     BROKEN,
@@ -260,21 +259,6 @@ def test_ten_thousand_movements_are_not_too_many():
     task, move = load_task("ascending"), Movement(1, "right", "corrective")
     assert too_long(task, [move] * 10_000) is None
     assert "10001 movements" in str(too_long(task, [move] * 10_001))
-
-
-def test_robots_of_different_size_share_a_table(tmp_path):
-    small = tiny_task(
-        name="small", robot={"left_links": [2.0], "right_links": [2.0] * 2},
-        start={"left": [0.1], "right": [0.1] * 2}, goals=[[3.0, 1.0]], initial_hands="R",
-    )  # fmt: skip
-    cells = [cell_on(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
-    study = run_and_write(tmp_path, cells, trials=20)
-    names = ["goal", "hand", "kind", "ticks", "path"]
-    for run in study.runs.itertuples():
-        rows = study.solutions[study.solutions.run_id == run.run_id]
-        task = study.tasks[run.task]
-        movements = map(movement_from, rows[names].to_numpy().tolist())
-        assert execute(task, movements).reward == run.reward
 
 
 def test_some_runs_of_every_cell_are_performed_again(results, monkeypatch):

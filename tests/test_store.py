@@ -41,7 +41,11 @@ from tests.support.suites import (
     same_results,
 )
 
-NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
+NEAR = tiny_task(
+    name="near", hands=["right"], goals=[[3.0, 1.0]], initial_hands="R",
+    robot={"left_links": [2.0], "right_links": [2.0] * 2}, start={"left": [0.1], "right": [0.1] * 2}
+)  # fmt: skip
+"""Of a robot of another size than that of the other tasks."""
 CELLS = [
     cell_on(failing_task(), KNOWN["dual-process/EC4"], epsilon=0.5),
     cell_on(NEAR, KNOWN["posture-qp/current-goal"]),
