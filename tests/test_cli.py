@@ -290,8 +290,6 @@ def test_a_new_file_can_be_imported_and_hides_no_module(coartic, tmp_path, monke
     assert file.stem.isidentifier()
     assert file.stem not in {*sys.stdlib_module_names, "numpy"}
     compile(f"import {file.stem}", "", "exec")
-    code, _, error = coartic("new", "My Search")
-    assert (code, "Mine" in error, "such as 'my-search'" in error) == (2, False, True)
 
 
 def test_help_has_a_short_name(coartic):
@@ -470,7 +468,6 @@ OPTIONS = {
     "list --method-file": ("list", "list --method-file mine.py"),
     "list EC1 --method-file": ("list EC1", "list EC1 --method-file mine.py"),
     "list paper --method-file": ("list paper", "list paper --method-file mine.py"),
-    "list nearest-hand --method-file": ("list EC1", "list nearest-hand --method-file mine.py"),
     "report --for-paper": ("report out", "report out --for-paper"),
     "report --out": ("report out", "report out --out mine.py"),
     "animate --in": ("animate {run} --width 200 --in out", "animate {run} --in nowhere"),

@@ -42,7 +42,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
 
 FILES = {
     "mine.py": f"from mine_helper import STEP\nimport mine_parts.more\n{TEXT}    files = ('w',)",
-    "mine_helper.py": "'Numbers.'\n__version__ = '1'\nSTEP = 1  # at least",
+    "mine_helper.py": "STEP = 1",
     "mine_parts/more.py": "def more(x):\n    return x + 1",
     "mine_parts/__init__.py": "RATE = 1",
     "w": "weights",
@@ -58,12 +58,9 @@ def code_with(folder, **changed):
 
 
 def test_what_counts_as_the_code_of_a_method(tmp_path):
-    """Numbers in it and in what it imports and reads; no comment, docstring or version."""
+    """Numbers in it and in what it imports and reads."""
     first = code_with(tmp_path)
     assert registry([tmp_path / "mine.py"])["nearest-hand"].code == first
-    helper = "'Other words.'\n__version__ = '2'\nSTEP = 1"
-    words = {"mine_helper.py": helper, "mine.py": "# x\n" + FILES["mine.py"]}
-    assert code_with(tmp_path, **words) == first
     changes = (
         {"mine_helper.py": "STEP = 2"},
         {"mine_parts/more.py": "def more(x):\n    return x + 2"},

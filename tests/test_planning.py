@@ -8,13 +8,14 @@ import pytest
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
-from coartic.benchmarks.planning import plan_suite
+from coartic.benchmarks.planning import plan, plan_suite, request_for
+from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import run_suite
+from coartic.benchmarks.suites import load_suite
 from tests.support.suites import ROOT, InProcess, suite_of
 
 MINE = Path(template.__file__).read_text(encoding="utf-8")
 FAMILY = (ROOT / "coartic" / "tasks" / "families" / "long.v1.toml").read_text(encoding="utf-8")
-ONE = {"tasks": ["ascending"], "methods": ["EC1"], "runs": 2, "trials": 20}
 
 
 @pytest.fixture
@@ -27,28 +28,20 @@ def here(tmp_path, monkeypatch):
     Path("strips.v1.toml").write_text(FAMILY, encoding="utf-8")
 
 
-@pytest.mark.usefixtures("here")
-def test_a_second_value_of_an_argument_of_run_suite_changes_what_it_does(monkeypatch):
+def test_every_argument_of_run_suite_has_an_effect(tmp_path):
     seen = []
-    monkeypatch.setattr(pool, "Local", InProcess)
 
     class Watched(InProcess):
         def perform(self, jobs):
             seen.append("executor")
             return super().perform(jobs)
 
-    values = {
-        "executor": Watched(),
-        "watch": lambda progress, cell: seen.append("watch"),
-        "suite": "quick",
-        "folder": "other",
-    }
-    assert {*inspect.signature(run_suite).parameters} == {*values, "options"}
-    run_suite("paper", "first", executor=InProcess(), **ONE)
-    for name, value in values.items():
-        run_suite(**{"suite": "paper", "folder": name, "executor": InProcess(), name: value} | ONE)
+    watch = {"executor": Watched(), "watch": lambda progress, cell: seen.append("watch")}
+    assert {*inspect.signature(run_suite).parameters} == {*watch, "suite", "folder", "options"}
+    options = {"tasks": ["ascending"], "methods": ["EC1"], "runs": 2, "trials": 20}
+    run_suite("quick", tmp_path, **watch, **options)
     assert {*seen} == {"executor", "watch"}
-    assert [load(name).suite for name in ("first", "suite", "other")] == ["paper", "quick", "paper"]
+    assert load(tmp_path).suite == "quick"
 
 
 OPTIONS = {
@@ -110,11 +103,11 @@ def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, comman
 
 @pytest.mark.usefixtures("here")
 def test_a_method_file_that_is_named_runs():
+    registered = registry([Path("mine.py")])
+
     def methods(suite="paper", **selection):
-        plan = plan_suite(
-            suite, **{"tasks": ["ascending"], "method_files": ["mine.py"]} | selection
-        )
-        return [job.cell.method.name for job in plan]
+        request = request_for(**{"tasks": ["ascending"]} | selection)
+        return [job.cell.method.name for job in plan(load_suite(suite), request, registered)]
 
     assert methods() == ["dual-process/EC1", "first", "second"]
     assert methods(methods=["EC1"]) == ["dual-process/EC1", "first", "second"]
