@@ -464,6 +464,7 @@ def test_a_task_of_any_radius_passes_every_door(coartic, tmp_path, radius):
 
 TAKEN = (
     "play --no-open [--out a.html]",
+    "play --no-open --out a.html [--replace]",
     "list [--method-file mine.py]",
     "report out [--for-paper]",
     "report out [--out mine.py]",

@@ -222,6 +222,7 @@ def test_of_many_problems_the_first_are_said(tmp_path):
         ({"jobs": 2}, "jobs is no option: give executor=Local(jobs)"),
         ({"scheduler": "x"}, "scheduler is no option: give executor=Dask(scheduler)"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
+        ({"runs": 0}, "runs is 0; it must be a whole number from 1"),
         ({"runs": True}, "runs is True; it must be a whole number"),
         ({"seed": -1}, "seed is -1; it should be at least 0"),
         ({"trials": 10**9}, "trials is 1000000000; it should be at most 10000000"),
@@ -538,6 +539,7 @@ def test_all_functions_are_called_wrongly():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
+        (lambda: mean([1.0, 2.0], resamples=-1), "resamples is -1; it must be a whole number"),
         (lambda: mean([1.0, 2.0], resamples=np.nan), "resamples is nan; it must be a whole"),
         (lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)), "goal has True; needed are real"),
         (lambda: parse_task({}, np.inf), "source is inf; needed is a text"),
