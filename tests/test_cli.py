@@ -12,23 +12,22 @@ from pathlib import Path
 
 import pytest
 
-from coartic import __version__, corrective_trial, learn, load_task
+from coartic import __version__, corrective_trial, film, learn, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
 from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
-from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
 from tests.support.strategies import metres_task, tiny_task
 from tests.support.suites import (
-    BROKEN,
     KNOWN,
     ROOT,
+    Failing,
     InProcess,
     cell_on,
     edit,
@@ -62,30 +61,10 @@ def test_run_resumes(coartic, tmp_path):
     assert len(load(out).runs) == 3
 
 
-def test_seed_jobs_and_budget_reach_the_runs(coartic, monkeypatch, tmp_path):
-    jobs = []
-
-    class Watched(InProcess):
-        def __init__(self, count):
-            jobs.append(count)
-
-    monkeypatch.setattr(pool, "Local", Watched)
-    options = ("--seed", 5, "--jobs", 3, "--trial-budget", 12, "--out", tmp_path)
-    assert coartic(*SMALL, *options)[0] == 0
-    runs = load(tmp_path).runs
-    assert jobs == [3]
-    assert list(runs.seed) == [run_seed(5, "ascending", number) for number in (0, 1)]
-    assert list(runs.trials) == [12, 12]
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
-    code, text, _ = coartic(
-        "run", "paper", "--tasks", "ascending", "--methods", "test/quits",
-        "--method-file", BROKEN, "--runs", 1, "--jobs", 1, "--out", tmp_path / "out",
-    )  # fmt: skip
-    assert code == 1
-    assert "1 failed" in text
+def test_a_crashed_run_makes_the_exit_code(coartic, tmp_path, monkeypatch):
+    monkeypatch.setattr(pool, "Local", lambda _: Failing(0))
+    code, text, _ = coartic(*SMALL, "--out", tmp_path)
+    assert (code, "1 failed" in text) == (1, True)
 
 
 @pytest.mark.parametrize("failed", [0, 1])
@@ -127,14 +106,10 @@ def test_a_terminal_without_a_sign_shows_one_like_it(encoding, printed):
     assert terminal.buffer.getvalue().decode(encoding) == f"{printed}{os.linesep}"
 
 
-@pytest.mark.usefixtures("in_this_process")
-def test_check(coartic, tmp_path):
-    assert coartic("check", TASK_FILE)[0] == 0
+def test_a_broken_law_makes_the_exit_code_of_check(coartic, tmp_path):
     (tmp_path / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), encoding="utf-8")
-    assert coartic("check", tmp_path / "mine.toml")[0] != 0
-    code, text, _ = coartic("check", "test/peeks", "--method-file", BROKEN)
-    assert code == 1
-    assert "FAIL" in text
+    code, text, _ = coartic("check", tmp_path / "mine.toml")
+    assert (code, "FAIL" in text) == (1, True)
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -213,7 +188,6 @@ coartic.__main__.main()
         ("2500", "SIGTERM", 2),
         ("calling back", "SIGHUP", 1),
         ("cleaning", "SIGINT", 3),
-        ("cleaning", "SIGTERM", 1),
     ],
 )
 def test_an_interrupted_command_ends_with_a_sentence(tmp_path_factory, moment, name, times):
@@ -237,17 +211,17 @@ def test_what_a_method_file_starts_ends_with_the_command(tmp_path):
     assert status == 2, words
 
 
-def call_apart(place, command):
+def call_apart(place, command, temporary="temporary"):
     """Exit code and standard error of a command that leaves no process and no temporary folder."""
-    (place / "temporary").mkdir()
+    (place / temporary).mkdir()
     done = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=place,
-        env=os.environ | {"TMPDIR": str(place / "temporary"), "PYTHONPATH": str(ROOT)},
+        env=os.environ | {"TMPDIR": str(place / temporary), "PYTHONPATH": str(ROOT)},
         start_new_session=True,
     )  # fmt: skip
     _, words = done.communicate()
     # Python tries a folder for temporary files with a file, which a signal can leave behind.
-    assert not [path for path in (place / "temporary").iterdir() if path.is_dir()]
+    assert not [path for path in (place / temporary).iterdir() if path.is_dir()]
     assert comes(lambda: not folders_of_session(done.pid))
     return done.returncode, words
 
@@ -257,7 +231,7 @@ def test_a_locale_changes_no_report(tmp_path, coartic, in_this_process):
     (tmp_path / "mine.toml").write_text(f'title = "Grüße †"\n{GOOD}', "utf-8")
     runs, task = tmp_path / "runs", tmp_path / "mine.toml"
     alone = ("--methods", "corrective-alone/given")
-    assert coartic("run", "quick", "--tasks", f"ascending,{task}", *alone, "--out", runs)[0] == 0
+    assert coartic("run", "quick", "--tasks", task, *alone, "--out", runs)[0] == 0
     assert coartic("report", runs, "--out", tmp_path / "here")[0] == 0
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     python("-m", "coartic", "report", runs, "--out", tmp_path / "there", **locale)
@@ -267,23 +241,6 @@ def test_a_locale_changes_no_report(tmp_path, coartic, in_this_process):
     )
     assert here == there
     assert "Grüße †".encode() in here[Path("report.html")]
-
-
-@pytest.mark.process
-def test_modules_in_the_working_folder_are_not_imported(tmp_path):
-    """By no process of a command that is installed, whatever a stranger has put there."""
-    program, gift = tmp_path / "bin" / "program.py", tmp_path / "gift"
-    program.parent.mkdir()
-    gift.mkdir()
-    program.write_text("from coartic.__main__ import main\nmain()")
-    for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
-        (gift / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
-    run = ["run", "quick", "--tasks", "ascending", "--methods", "corrective-alone/given"]
-    temporary = tmp_path / ("long" * 30)  # the system takes no long socket
-    temporary.mkdir()
-    python(program, *run, "--jobs", "1", "--out", "out", cwd=gift, TMPDIR=str(temporary))
-    assert not list(temporary.iterdir())
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -333,8 +290,6 @@ def test_a_new_file_can_be_imported_and_hides_no_module(coartic, tmp_path, monke
     assert file.stem.isidentifier()
     assert file.stem not in {*sys.stdlib_module_names, "numpy"}
     compile(f"import {file.stem}", "", "exec")
-    code, _, error = coartic("new", "My Search")
-    assert (code, "Mine" in error, "such as 'my-search'" in error) == (2, False, True)
 
 
 def test_help_has_a_short_name(coartic):
@@ -354,20 +309,29 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and streams of POSIX")
-@pytest.mark.parametrize("what", ["blocked", "closed"])
-def test_a_command_ends_well_whatever_started_it(tmp_path, what):
+@pytest.mark.parametrize(
+    ("what", "temporary"),
+    [("blocked", "temporary"), ("closed", "long" * 30)],  # the system takes no long socket
+)
+def test_a_command_ends_well_whatever_started_it(tmp_path, what, temporary):
     """With all signals blocked, or without input, output and errors. What a method prints is not
-    shown."""
-    mine, prints = tmp_path / "mine.py", "import sys; print('it prints', file=sys.stderr)"
+    shown, and modules that a stranger has put into the working folder are imported by no process
+    of a command that is installed."""
+    for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
+    program = tmp_path / "bin" / "program.py"
+    program.parent.mkdir()
+    program.write_text("from coartic.__main__ import main\nmain()")
+    mine, prints = program.with_name("mine.py"), "print('it prints', file=sys.stderr)"
     text = Path(template.__file__).read_text()
-    mine.write_text(text.replace("while True:", f"{prints}\n        while True:"))
+    mine.write_text("import sys\n" + text.replace("while True:", f"{prints}\n        while True:"))
     own = ("--methods", "NAME", "--method-file", mine, "--jobs", 1)
-    command = ("-m", "coartic", *SMALL, *own, "--out")
-    status, words = call_apart(
-        tmp_path, [sys.executable, "-c", SURROUNDED, what, *map(str, command), tmp_path / "out"]
-    )
+    command = [*map(str, (program, *SMALL, *own, "--out", tmp_path / "out"))]
+    code = [sys.executable, "-I", "-c", SURROUNDED, what, *command]
+    status, words = call_apart(tmp_path, code, temporary)
     assert (status, "it prints" in words) == (0, False)
     assert load(tmp_path / "out").runs.status.tolist() == ["ok"] * 2
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.process
@@ -422,24 +386,7 @@ def test_draw(coartic, tmp_path, monkeypatch):
     (tmp_path / "other" / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 2.1]"), "utf-8")
     files = [tmp_path / "mine.toml", tmp_path / "other" / "mine.toml"]
     assert "two tasks are called 'mine'" in coartic("draw", *files, "--out", tmp_path / "two")[2]
-    drawing = tmp_path / "own.svg"
-    assert coartic("draw", tmp_path / "mine.toml", "--out", drawing)[0] == 0
-    before = drawing.read_bytes()
-    code, _, error = coartic("draw", "ascending", "--out", drawing)
-    assert (code, drawing.read_bytes()) == (2, before)
-    assert "--replace" in error
-    assert coartic("draw", "ascending", "--out", drawing, "--replace")[0] == 0
-    assert drawing.read_bytes() == (tmp_path / "one.svg").read_bytes() != before
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_animate(coartic, tmp_path):
-    out, film, near = tmp_path / "out", tmp_path / "film.gif", tmp_path / "near.toml"
-    near.write_text(NEAR)
-    assert coartic("run", "paper", "--tasks", near, "--trials", 5, "--out", out)[0] == 0
-    run_id = load(out).runs.run_id[0]
-    assert coartic("animate", run_id, "--in", out, "--out", film, "--width", 200)[0] == 0
-    assert film.read_bytes().startswith(b"GIF89a")
+    assert coartic("draw", tmp_path / "mine.toml", "--out", tmp_path / "own.svg")[0] == 0
 
 
 def test_play(coartic, tmp_path, monkeypatch):
@@ -451,8 +398,6 @@ def test_play(coartic, tmp_path, monkeypatch):
         f"{page}: {len(page.read_bytes()) // 1000} kB.\n",
     )
     assert shown == [page.as_uri()]
-    assert "--replace" in coartic("play", "--out", page)[2]
-    assert "did you mean 'ascending'" in coartic("play", "ascendin")[2]
     wrong = coartic("run", "quick", "--methods", "shortest-path", "--out", tmp_path / "runs")[2]
     assert "did you mean 'shortest-path plan'" in wrong
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -492,7 +437,7 @@ def test_help_has_no_types_of_python_and_examples_have_options_that_there_are(
 
 
 @pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize("radius", [1e-3, 0.01, 0.3, 1.0])
+@pytest.mark.parametrize("radius", [1e-3, 1.0])
 def test_a_task_of_any_radius_passes_every_door(coartic, tmp_path, radius):
     task, file = metres_task(radius, name="arm"), tmp_path / "arm.toml"
     if radius > 0.2:  # elsewhere, all goals are hit at the start
@@ -517,46 +462,38 @@ def test_a_task_of_any_radius_passes_every_door(coartic, tmp_path, radius):
     assert env.step(env.action_space.sample())[1] < 0
 
 
-OPTIONS = {
-    "play --out": ("play --no-open", "play --no-open --out a.html"),
-    "play --replace": ("play --no-open", "play --no-open --replace"),
-    "list --method-file": ("list", "list --method-file mine.py"),
-    "list EC1 --method-file": ("list EC1", "list EC1 --method-file mine.py"),
-    "list paper --method-file": ("list paper", "list paper --method-file mine.py"),
-    "list nearest-hand --method-file": ("list EC1", "list nearest-hand --method-file mine.py"),
-    "report --for-paper": ("report out", "report out --for-paper"),
-    "report --out": ("report out", "report out --out elsewhere"),
-    "animate --in": ("animate {run} --width 200 --in out", "animate {run} --in nowhere"),
-    "animate --initial --out": (
-        "animate {run} --width 200 --in out --out b.gif",
-        "animate {run} --width 200 --in out --out b.gif --replace --initial",
-    ),
-    "animate --width": ("animate {run} --width 200 --in out --out b.gif --replace",
-                        "animate {run} --width 300 --in out --out b.gif --replace"),
-    "animate --replace": ("animate {run} --width 200 --in out --out b.gif",
-                          "animate {run} --width 200 --in out --out b.gif --replace"),
-    "reproduce --in": ("reproduce {run} --in out", "reproduce {run} --in nowhere"),
-    "reproduce --method-file": ("reproduce {run} --in out",
-                                "reproduce {run} --in out --method-file mine.py"),
-    "verify --again": ("verify out", "verify out --again 1"),
-    "verify --method-file": ("verify out", "verify out --method-file mine.py"),
-    "verify --again --method-file": ("verify out --again 1",
-                                     "verify out --again 1 --method-file mine.py"),
-    "new --out": ("new a-search", "new a-search --out b.py"),
-    "new --replace": ("new a-search", "new a-search --replace"),
-    "check --method-file": ("check corrective-alone/given",
-                            "check corrective-alone/given --method-file mine.py"),
-    "check --verbose": ("check task.toml", "check task.toml --verbose"),
-    "draw --out": ("draw ascending --out e.svg", "draw ascending --out f.svg"),
-    "draw --replace": ("draw ascending --out e.svg", "draw ascending --out e.svg --replace"),
-    "draw folder --replace": ("draw ascending --out g", "draw ascending --out g --replace"),
-    "cite --analysis": ("cite", "cite --analysis"),
-}  # fmt: skip
-REFUSED = {
-    *("play --replace", "list EC1 --method-file", "list paper --method-file", "check --verbose"),
-    *("reproduce --method-file", "verify --method-file", "verify --again --method-file"),
-    *("check --method-file", "draw folder --replace"),
-}
+TAKEN = (
+    "play --no-open [--out a.html]",
+    "play --no-open --out a.html [--replace]",
+    "list [--method-file mine.py]",
+    "report out [--for-paper]",
+    "report out [--out mine.py]",
+    "animate {run} --width 200 [--in out]",
+    "animate {run} --width 200 --in out [--out b.gif]",
+    "animate {run} --width 200 --in out --out b.gif [--replace]",
+    "animate {run} --width 200 --in out --out b.gif --replace [--initial]",
+    "animate {run} --width 200 --in out --out b.gif --replace [--width 300]",
+    "reproduce {run} [--in out]",
+    "verify out [--again 1]",
+    "new a-search [--out b.py]",
+    "new a-search [--replace]",
+    "draw ascending [--out f.svg]",
+    "draw ascending --out f.svg [--replace]",
+    "cite [--analysis]",
+)
+"""Commands with and without what is in brackets, in this order: some write over what earlier ones
+have written."""
+REFUSED = (
+    "play --no-open [--replace]",
+    "list EC1 [--method-file mine.py]",
+    "list paper [--method-file mine.py]",
+    "check task.toml [--verbose]",
+    "check corrective-alone/given [--method-file mine.py]",
+    "reproduce {run} --in out [--method-file mine.py]",
+    "verify out [--method-file mine.py]",
+    "verify out --again 1 [--method-file mine.py]",
+    "draw ascending --out g [--replace]",
+)
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -564,6 +501,8 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     coartic, commands, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(film, "HOLD_S", 0.0)  # films end at once
+    monkeypatch.setattr(film, "PAUSE_S", 0.0)
     Path("near.toml").write_text(NEAR, "utf-8")
     near = paper_cells(tasks=["near.toml"], methods=["EC1"])
     study = run_and_write(tmp_path / "out", near, runs=1, trials=5)
@@ -571,16 +510,19 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
         (ROOT / "tests" / "methods" / "nearest_hand.py").read_text("utf-8"), "utf-8"
     )
     Path("task.toml").write_text(TASK_FILE.read_text("utf-8"), "utf-8")
-    for name, (plain, changed) in OPTIONS.items():
+    tried = set()
+    for entry in (*TAKEN, *REFUSED):
         said = []
-        for words in (plain, changed):
+        for words in (re.sub(r" \[.*\]", "", entry), re.sub(r"[][]", "", entry)):
             code, text, error = coartic(*words.format(run=study.runs.run_id[0][:8]).split())
             films = [path.stat().st_size for path in Path().glob("b.gif")]
             said.append((code, re.sub("in [0-9]+ s", "", text), error, films))
-        assert said[0] != said[1], name
-        assert ("has no effect" in said[1][2]) == (name in REFUSED), (name, said[1])
-        assert said[1][0] == 2 or name not in REFUSED
-    tried = {f"{name.split()[0]} {word}" for name in OPTIONS for word in name.split()[1:]}
+        assert said[0] != said[1], entry
+        assert ("has no effect" in said[1][2]) == (entry in REFUSED), (entry, said[1])
+        assert said[1][0] == 2 or entry not in REFUSED
+        option = re.search(r"\[(--[a-z-]+)", entry)[1]
+        tried.add(f"{entry.split()[0]} {option}")
+    assert Path("b.gif").read_bytes().startswith(b"GIF89a")
     for command, known in commands.commands.items():
         for option in known.params:
             if command != "run" and option.opts[0] not in (option.name, "--help", "--open"):

@@ -8,13 +8,14 @@ import pytest
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
-from coartic.benchmarks.planning import Request, plan_suite
+from coartic.benchmarks.planning import plan, plan_suite, request_for
+from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import run_suite
+from coartic.benchmarks.suites import load_suite
 from tests.support.suites import ROOT, InProcess, suite_of
 
 MINE = Path(template.__file__).read_text(encoding="utf-8")
 FAMILY = (ROOT / "coartic" / "tasks" / "families" / "long.v1.toml").read_text(encoding="utf-8")
-ONE = {"tasks": ["ascending"], "methods": ["EC1"], "runs": 2, "trials": 20}
 
 
 @pytest.fixture
@@ -27,56 +28,20 @@ def here(tmp_path, monkeypatch):
     Path("strips.v1.toml").write_text(FAMILY, encoding="utf-8")
 
 
-CHANGED = {
-    "tasks": ["descending"],
-    "methods": ["corrective-alone/given", "EC1"],
-    "method_files": ["mine.py"],
-    "family_files": ["strips.v1.toml"],
-    "runs": 3,
-    "trials": 21,
-    "seed": 1,
-    "time_limit_s": 5.0,
-    "trial_budget": 7,
-}
-
-
-def outline(plan):
-    return [(job, job.cell.label, job.cell.trial_budget) for job in plan]
-
-
-@pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("option", Request.model_fields)
-def test_a_second_value_of_an_option_changes_the_plan_or_is_refused(option):
-    changed = ONE | {option: CHANGED[option]}
-    if option == "family_files":  # none of its tasks is asked for
-        with pytest.raises(CoarticError, match="strips.v1.toml has no effect: no instance of"):
-            plan_suite("paper", **changed)
-        changed |= {"tasks": ["strips/v1/i000"], "methods": ["EC4"]}
-    assert outline(plan_suite("paper", **changed)) != outline(plan_suite("paper", **ONE))
-
-
-@pytest.mark.usefixtures("here")
-def test_a_second_value_of_an_argument_of_run_suite_changes_what_it_does(monkeypatch):
+def test_every_argument_of_run_suite_has_an_effect(tmp_path):
     seen = []
-    monkeypatch.setattr(pool, "Local", InProcess)
 
     class Watched(InProcess):
         def perform(self, jobs):
             seen.append("executor")
             return super().perform(jobs)
 
-    values = {
-        "executor": Watched(),
-        "watch": lambda progress, cell: seen.append("watch"),
-        "suite": "quick",
-        "folder": "other",
-    }
-    assert {*inspect.signature(run_suite).parameters} == {*values, "options"}
-    run_suite("paper", "first", executor=InProcess(), **ONE)
-    for name, value in values.items():
-        run_suite(**{"suite": "paper", "folder": name, "executor": InProcess(), name: value} | ONE)
+    watch = {"executor": Watched(), "watch": lambda progress, cell: seen.append("watch")}
+    assert {*inspect.signature(run_suite).parameters} == {*watch, "suite", "folder", "options"}
+    options = {"tasks": ["ascending"], "methods": ["EC1"], "runs": 2, "trials": 20}
+    run_suite("quick", tmp_path, **watch, **options)
     assert {*seen} == {"executor", "watch"}
-    assert [load(name).suite for name in ("first", "suite", "other")] == ["paper", "quick", "paper"]
+    assert load(tmp_path).suite == "quick"
 
 
 OPTIONS = {
@@ -129,17 +94,20 @@ def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, comman
         "before", {"methods": ("--methods", "corrective-alone/given"), "runs": (), "trials": ()}
     )
     for name, words in OPTIONS.items():
-        assert told(name, {name: words}) != usual, name
+        answer = told(name, {name: words})
+        assert answer != usual, name
+        assert isinstance(answer, str) == (name in ("family_file", "scheduler")), answer
+        assert name != "family_file" or "strips.v1.toml has no effect: no instance of" in answer
     assert "--jobs has no effect with --scheduler" in told("x", {"x": OPTIONS["scheduler"]})
 
 
 @pytest.mark.usefixtures("here")
 def test_a_method_file_that_is_named_runs():
+    registered = registry([Path("mine.py")])
+
     def methods(suite="paper", **selection):
-        plan = plan_suite(
-            suite, **{"tasks": ["ascending"], "method_files": ["mine.py"]} | selection
-        )
-        return [job.cell.method.name for job in plan]
+        request = request_for(**{"tasks": ["ascending"]} | selection)
+        return [job.cell.method.name for job in plan(load_suite(suite), request, registered)]
 
     assert methods() == ["dual-process/EC1", "first", "second"]
     assert methods(methods=["EC1"]) == ["dual-process/EC1", "first", "second"]
@@ -172,7 +140,10 @@ def test_the_command_outranks_a_grid_and_a_block(tmp_path):
         ),
         ({"methods": ["corrective-alone/given"], "runs": 2}, "runs has no effect: no run of"),
         ({"methods": ["EC1", "EC4"]}, "EC4 uses the left and right hand"),
-        ({"methods": ["EC4"], "tasks": ["ascending", "two-armed-1"]}, "EC4 uses the left"),
+        (
+            {"methods": ["EC4"], "tasks": ["ascending", "two-armed-1"]},
+            "no method to run on task 'ascending': EC4 uses the left",
+        ),
         ({"runs": range(3, 3)}, r"runs is range\(3, 3\); it must be .*, or a range, such as"),
         ({"runs": range(0, 9, 2)}, r"runs is range\(0, 9, 2\); it must be"),
         ({"runs": range(-1, 9)}, "its first run is -1"),

@@ -55,6 +55,8 @@ class Does(Method):
 class Again(Does):
     name = "test/again"
 """
+TASK = load_task("ascending")
+PLAN = planned([cell_on(TASK, KNOWN["dual-process/EC1"])])
 HONEST = -319  # what these movements are worth
 HANDLED = {
     "hangs_once": ("if not os.path.exists(__file__ + '.slept'):\n"
@@ -66,7 +68,6 @@ HANDLED = {
                        "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
     "exits": ("print('last', 'words', file=sys.stderr, flush=True); os._exit(7)",
               "crashed", "exit code 7): last words"),
-    "quits_well": ("os._exit(0)", "crashed", "exit code 0): it left no message"),
     "forks": ("os.fork() or signal.pause(); return Result(corrected(session))", "ok", ""),
     "forks_and_goes_on": ("os.fork(); return Result(corrected(session))", "ok", ""),
     "leaves_a_thread": ("threading.Thread(target=signal.pause).start()\n"
@@ -95,7 +96,6 @@ HANDLED = {
     "generates": ("return Result(m for m in corrected(session))", "ok", ""),
     "nothing": ("return None", "solver-failed", "returned NoneType, not a Result"),
     "no_solution": ("return Result(None)", "solver-failed", "cannot be kept: TypeError"),
-    "too_few": ("return Result(corrected(session)[:1])", "solver-failed", "wanted [1, 2, 3]"),
     "nan": ("return Result((Movement(1, 'right', 'planned', session.q0 * np.nan),) * 3)",
             "solver-failed", "finite"),
     "far": ("return Result((Movement(1, 'right', 'planned', session.q0 + 1e6),) * 3)",
@@ -123,26 +123,32 @@ HANDLED = {
 """What a method does, how its run ends, and words of the reason."""
 
 
-def entries(folder, bodies):
+def entries(folder, **bodies):
     """Methods of a file, which do one of these things."""
-    text = "".join(f"    def {name}(self, session):\n        {body}\n" for name, body in bodies)
+    things = bodies.items()
+    text = "".join(f"    def {name}(self, session):\n        {body}\n" for name, body in things)
     head, mark, tail = METHODS.partition("class Again")
     (folder / "mine.py").write_text(head + text + mark + tail, encoding="utf-8")
     methods = registry([folder / "mine.py"])
     return methods["test/does"], methods["test/again"]
 
 
+def cells_of(folder, **bodies):
+    """Cells of a method that does these things, one each."""
+    does, _ = entries(folder, **bodies)
+    return [cell_on(TASK, does, what=name) for name in bodies]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Of runs in the same workers, then others, then this project's; wall time ends one run, and
     CPU time all others, however long they have to wait for it."""
-    task = load_task("ascending")
 
     def make(folder):
         folder.mkdir()
-        does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-        once, *others = [cell_on(task, does, what=name) for name in HANDLED]
-        others += [cell_on(task, again), cell_on(task, KNOWN["corrective-alone/given"])]
+        does, again = entries(folder, **{name: body for name, (body, _, _) in HANDLED.items()})
+        once, *others = [cell_on(TASK, does, what=name) for name in HANDLED]
+        others += [cell_on(TASK, again), cell_on(TASK, KNOWN["corrective-alone/given"])]
         for name, cells, timeout_s, limit_s in (
             ("hangs", [once], 0.5, 0.3),
             ("others", others, 600.0, 0.5),
@@ -169,7 +175,7 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.status == status, run.reason
     assert words in run.reason
     assert run.reason.isprintable()
-    died = name in ("exits", "quits_well", "is_killed", "removes_its_folder")
+    died = name in ("exits", "is_killed", "removes_its_folder")
     assert run.isna().wall_s == (died or "CPU" in words)
     assert run.isna().cpu_s == died
     assert run.isna().reward if status != "ok" else run.reward == HONEST
@@ -179,9 +185,8 @@ def test_a_run_that_waits_is_no_result_and_is_performed_again(tmp_path):
     body = """if not os.path.exists(__file__ + '.ready'):
             time.sleep(999)
         return Result(corrected(session))"""
-    does, _ = entries(tmp_path, [("waits", body)])
-    cells, local = [cell_on(load_task("ascending"), does, what="waits")], Local(1, timeout_s=0.5)
-    options = {"executor": local, "runs": 1, "time_limit_s": 0.3}
+    cells = cells_of(tmp_path, waits=body)
+    options = {"executor": Local(1, timeout_s=0.5), "runs": 1, "time_limit_s": 0.3}
     words = "run 0 of test/does what=waits on ascending is not kept: wall time limit of 1.4 s"
     with pytest.warns(UserWarning, match=words), pytest.raises(CoarticError, match="has 0 of 1"):
         run_and_write(tmp_path / "out", cells, **options)
@@ -191,18 +196,15 @@ def test_a_run_that_waits_is_no_result_and_is_performed_again(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test chooses the core of processes")
 def test_other_work_on_the_core_changes_no_outcome(tmp_path):
-    """A run that has three beside it takes less CPU time than its limit, and more wall time."""
+    """A run that has two beside it takes less CPU time than its limit, and more wall time."""
     burn = """os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
         end = time.process_time() + self.seconds
         while time.process_time() < end: pass
         return Result(corrected(session))"""
-    names = ["short", "long", "longer", "longest"]
-    seconds = {name: "0.3" if name == "short" else "99" for name in names}
-    bodies = [(name, burn.replace("self.seconds", seconds[name])) for name in names]
-    task, (does, _) = load_task("ascending"), entries(tmp_path, bodies)
-    cells = [cell_on(task, does, what=name) for name in names]
-    study = run_and_write(tmp_path / "out", cells, executor=Local(4), runs=1, time_limit_s=0.6)
-    assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 3
+    short, long = (burn.replace("self.seconds", seconds) for seconds in ("0.3", "99"))
+    cells = cells_of(tmp_path, short=short, long=long, longer=long)
+    study = run_and_write(tmp_path / "out", cells, executor=Local(3), runs=1, time_limit_s=0.6)
+    assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 2
     assert set(study.runs.reason[1:]) == {"CPU time limit of 0.6 s exceeded"}
 
 
@@ -222,23 +224,17 @@ PRINTS = """for _ in range(1000):
         os._exit(3)"""
 
 
-def test_what_a_worker_prints_is_bounded(tmp_path):
-    """100 MB are printed; the last words are kept, in little memory."""
+def test_the_last_words_of_a_run_are_kept(tmp_path):
+    """Of 100 MB, in little memory; those of an earlier run are not those of a crash."""
     resource = pytest.importorskip("resource")
-    task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", PRINTS)])
+    says = "print('x', flush=True); return Result(corrected(session))"
+    cells = cells_of(tmp_path, says=says, quits="os._exit(0)", prints=PRINTS)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    study = run_and_write(tmp_path / "out", [cell_on(task, does)], executor=Local(1), runs=1)
-    assert study.runs.reason[0].endswith("the end")
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50 * 2**10
-
-
-def test_words_of_an_earlier_run_are_not_those_of_a_crash(tmp_path):
-    task, says = load_task("ascending"), "print('x', flush=True); return Result(corrected(session))"
-    does, _ = entries(tmp_path, [("says", says), ("quits", "os._exit(0)")])
-    cells = [cell_on(task, does, what=what) for what in ("says", "quits")]
     runs = run_and_write(tmp_path / "out", cells, executor=Local(1), runs=1).runs
-    assert runs.status.tolist() == ["ok", "crashed"]
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50 * 2**10
+    assert runs.status.tolist() == ["ok", "crashed", "crashed"]
     assert runs.reason[1].endswith("exit code 0): it left no message")
+    assert runs.reason[2].endswith("the end")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test finds the processes in /proc")
@@ -250,8 +246,8 @@ def test_what_somebody_kills_is_repeated(tmp_path, whom):
         except FileExistsError:  # all others wait until somebody is killed
             while not os.path.exists(__file__ + ".killed"): time.sleep(0.01)
         return Result(corrected(session))"""
-    task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", body)])
-    cells, killed = [cell_on(task, replace(does, stochastic=True))], []
+    does, _ = entries(tmp_path, honest=body)
+    cells, killed = [cell_on(TASK, replace(does, stochastic=True))], []
 
     def kill(progress, _):
         if progress.done != 1:
@@ -280,8 +276,8 @@ def test_without_a_place_for_answers_the_suite_ends(tmp_path, monkeypatch, why):
             {end[why]}
         while not os.path.exists(__file__ + ".begun"): time.sleep(0.01)
         return Result(corrected(session))"""
-    task, methods = load_task("ascending"), entries(tmp_path, [("honest", body)])
-    plan, out = planned([cell_on(task, method) for method in methods]), tmp_path / "out"
+    cells = [cell_on(TASK, method) for method in entries(tmp_path, honest=body)]
+    plan, out = planned(cells), tmp_path / "out"
     resource = pytest.importorskip("resource")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     if why == "full":  # as a disk that takes a little more, and the file of results
@@ -294,9 +290,7 @@ def test_without_a_place_for_answers_the_suite_ends(tmp_path, monkeypatch, why):
     with writing(out) as store:
         assert {status for *_, status, _ in store.present()} <= {"ok"}
     (tmp_path / "mine.py.over").touch()
-    assert run_and_write(
-        out, [job.cell for job in plan], executor=Local(2)
-    ).runs.status.tolist() == ["ok", "ok"]
+    assert run_and_write(out, cells, executor=Local(2)).runs.status.tolist() == ["ok", "ok"]
 
 
 @pytest.mark.parametrize(
@@ -314,17 +308,16 @@ def test_a_process_that_cannot_begin_says_what_ended_and_blames_no_file(
 
     monkeypatch.setattr("coartic.benchmarks.method_files.start_process", fails)
     with pytest.raises(CoarticError, match=f"mine.py is not read: .*{words}"):
-        entries(tmp_path, [("honest", "pass")])
+        entries(tmp_path, honest="pass")
 
 
-@pytest.mark.parametrize("allowed", [8, 14, 63])
-def test_too_few_open_files_get_a_sentence_before_a_process_begins(tmp_path, monkeypatch, allowed):
+def test_too_few_open_files_get_a_sentence_before_a_process_begins(tmp_path, monkeypatch):
     resource = pytest.importorskip("resource")
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (allowed, allowed))
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (63, 63))
     with pytest.raises(CoarticError, match="mine.py is not read: .*after `ulimit -n 1024`"):
-        entries(tmp_path, [("honest", "pass")])
+        entries(tmp_path, honest="pass")
     with pytest.raises(CoarticError, match="Too many open files"):
-        list(Local(1).perform(planned([cell_on(load_task("ascending"), KNOWN["hill-climbing"])])))
+        list(Local(1).perform(PLAN))
 
 
 def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):
@@ -332,9 +325,9 @@ def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
     with pytest.raises(CoarticError, match="mine.py is not read: .* working folder was removed"):
-        entries(tmp_path, [("honest", "pass")])
+        entries(tmp_path, honest="pass")
     with pytest.raises(CoarticError, match="processes cannot begin .* working folder was removed"):
-        list(Local(1).perform(planned([cell_on(load_task("ascending"), KNOWN["hill-climbing"])])))
+        list(Local(1).perform(PLAN))
     monkeypatch.chdir(tmp_path)
 
 
@@ -344,9 +337,8 @@ def test_other_methods_and_the_parent_notice_nothing(folder, runs):
 
 
 def test_workers_that_cannot_begin_get_a_sentence():
-    plan = planned([cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])])
-    task = load_task("ascending").model_copy(update={"goals": ()})
-    job = replace(plan[0], cell=replace(plan[0].cell, task=task), numbers=(0,))
+    task = TASK.model_copy(update={"goals": ()})
+    job = replace(PLAN[0], cell=replace(PLAN[0].cell, task=task), numbers=(0,))
     with pytest.raises(CoarticError, match="processes cannot begin"):
         list(Local(1).perform([job] * 10))
 
@@ -368,7 +360,7 @@ def script(tmp_path_factory):
         while self.name == "test/again":
             pass
         return Result(corrected(session))"""
-    entries(folder, [("honest", body)])
+    entries(folder, honest=body)
     (folder / "script.py").write_text(SCRIPT)
     command = [sys.executable, "script.py"]
     with subprocess.Popen(

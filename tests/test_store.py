@@ -41,13 +41,18 @@ from tests.support.suites import (
     same_results,
 )
 
-NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
+NEAR = tiny_task(
+    name="near", hands=["right"], goals=[[3.0, 1.0]], initial_hands="R",
+    robot={"left_links": [2.0], "right_links": [2.0] * 2}, start={"left": [0.1], "right": [0.1] * 2}
+)  # fmt: skip
+"""Of a robot of another size than that of the other tasks."""
 CELLS = [
     cell_on(failing_task(), KNOWN["dual-process/EC4"], epsilon=0.5),
     cell_on(NEAR, KNOWN["posture-qp/current-goal"]),
 ]
 ONE = paper_cells(tasks=["ascending"])
 FEW = {"runs": 9, "trials": 20}
+PLAN = planned(ONE, **FEW)
 
 
 @pytest.fixture(scope="module")
@@ -147,17 +152,16 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
 
 def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
     """Batches are of eight runs and of one: the second is not begun."""
-    plan = planned(ONE, **FEW)
 
     def watch(progress, _):
         if progress.done == 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        perform(plan, tmp_path, executor=InProcess(2), watch=watch)
+        perform(PLAN, tmp_path, executor=InProcess(2), watch=watch)
     with pytest.raises(CoarticError, match=r"has 8 of 9 runs.*Repeat"):
         load(tmp_path)
-    assert perform(plan, tmp_path, executor=InProcess(2)).done == 1
+    assert perform(PLAN, tmp_path, executor=InProcess(2)).done == 1
     same_results(load(tmp_path), undisturbed)
 
 
@@ -217,17 +221,16 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
 
 def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path):
-    plan = planned(ONE, **FEW)
     busy = r"another `coartic run` is at work.*wait"
 
     def watch(progress, _):
         if progress.done == 9:  # before the last one is seen
             with pytest.raises(CoarticError, match=busy):
-                perform(plan, tmp_path, executor=InProcess())
+                perform(PLAN, tmp_path, executor=InProcess())
             with pytest.raises(CoarticError, match=busy):
                 load(tmp_path)
 
-    perform(plan, tmp_path, executor=InProcess(), watch=watch)
+    perform(PLAN, tmp_path, executor=InProcess(), watch=watch)
     same_results(load(tmp_path), undisturbed)
 
 
@@ -259,7 +262,7 @@ def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, be
                 yield pair
                 program.join()
 
-    perform(planned(ONE, **FEW), tmp_path, executor=Read(2))
+    perform(PLAN, tmp_path, executor=Read(2))
     assert held == [[(0,)], [(0,)], [(8,)], [(8,)]]
     assert [path.name for path in tmp_path.iterdir()] == [RUNS_FILE]
     same_results(load(tmp_path), undisturbed)
@@ -286,9 +289,8 @@ def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lo
         if progress.done == when:
             lose(tmp_path / "out")
 
-    plan = planned(ONE, **FEW)
     with pytest.raises(CoarticError, match="out/.* was removed, renamed or replaced while"):
-        perform(plan, tmp_path / "out", executor=InProcess(2), watch=watch)
+        perform(PLAN, tmp_path / "out", executor=InProcess(2), watch=watch)
 
 
 class TooSlow(InProcess):
@@ -298,17 +300,17 @@ class TooSlow(InProcess):
 
 
 def test_what_is_performed_again(undisturbed, tmp_path):
-    def counts(executor=None, *, time_limit_s=1.0, **how):
+    def counts(time_limit_s, executor):
         plan = planned(ONE, time_limit_s=time_limit_s, **FEW)
-        progress = perform(plan, tmp_path, executor=executor or InProcess(), **how)
+        progress = perform(plan, tmp_path, executor=executor)
         return progress.present, progress.done, progress.failed, progress.crashed
 
-    assert counts(TooSlow()) == (0, 9, 9, 0)
-    assert counts() == (9, 0, 9, 0)  # with the same limit they would be too slow again
-    assert counts(time_limit_s=0.5) == (9, 0, 9, 0)
-    assert counts(Failing(0), time_limit_s=2.0) == (0, 9, 1, 1)
+    assert counts(1.0, TooSlow()) == (0, 9, 9, 0)
+    assert counts(1.0, InProcess()) == (9, 0, 9, 0)  # they would be too slow again
+    assert counts(0.5, InProcess()) == (9, 0, 9, 0)
+    assert counts(2.0, Failing(0)) == (0, 9, 1, 1)
     assert load(tmp_path).runs.status.tolist() == ["crashed"] + ["ok"] * 8
-    assert counts(time_limit_s=3.0) == (8, 1, 0, 0)
+    assert counts(3.0, InProcess()) == (8, 1, 0, 0)
     assert load(tmp_path).runs.result.tolist() == undisturbed.runs.result.tolist()
 
 
@@ -316,7 +318,7 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     (cell,) = ONE
     other = replace(cell, method=replace(cell.method, code="0" * 12))
     run_and_write(tmp_path, [other], **FEW)
-    report = perform(planned(ONE, **FEW), tmp_path, executor=InProcess())
+    report = perform(PLAN, tmp_path, executor=InProcess())
     assert (report.stale, report.present, report.done) == (9, 0, 9)
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
     one = replace(report, stale=1)
@@ -325,7 +327,7 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     same_results(load(tmp_path), undisturbed)
     with open_store(tmp_path) as store:
         assert len(store.ids()) == 18
-    fewer = perform(planned(ONE, **FEW | {"runs": 4}), tmp_path, executor=InProcess())
+    fewer = perform([replace(PLAN[0], numbers=range(4))], tmp_path, executor=InProcess())
     words = "4 runs made by a different version of the code and 10 runs of earlier commands"
     assert words in repr(fewer)
     assert len(load(tmp_path).runs) == 4
@@ -410,7 +412,7 @@ def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words)
 
     spoil(copied)
     before = content()
-    for use in (load, lambda folder: run_and_write(folder, ONE, **FEW)):
+    for use in (load, lambda folder: perform(PLAN, folder, executor=InProcess())):
         with pytest.raises(CoarticError, match=words) as caught:
             use(tmp_path)
         assert str(tmp_path) in str(caught.value)
@@ -428,7 +430,7 @@ def test_what_other_programs_add_does_no_harm(copied, undisturbed, tmp_path, sta
         db.execute(statement)
     same_results(load(tmp_path), undisturbed)
     assert check_runs(tmp_path).wrong == []
-    assert perform(planned(ONE, **FEW), tmp_path, executor=InProcess()).done == 0
+    assert perform(PLAN, tmp_path, executor=InProcess()).done == 0
 
 
 def read_all(folder):
@@ -475,6 +477,7 @@ def test_a_value_that_no_run_can_have(copied, tmp_path, change):
         "cells SET trial_budget = 5",
         "environments SET content = json_set(content, '$.packages', 1)",
         "environments SET content = 'x'",
+        "results SET environment = 99",
         "suite SET name = NULL",
         "suite SET date = NULL",
         "suite SET seed = 'x'",

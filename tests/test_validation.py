@@ -79,13 +79,10 @@ from coartic.analysis.statistics.hypotheses import (
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
-from coartic.benchmarks.suites import SUITE_FOLDER
-from coartic.cli.arguments import value_in
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import RENAMED, did_you_mean
 from coartic.method import Information, Session, outline_of
 from coartic.motion.trial import reach_goals
-from coartic.runs.record import movement_data
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
 from coartic.tasks.optima import essence
 from coartic.tasks.task import TASK_FOLDER
@@ -95,7 +92,6 @@ from tests.support.suites import KNOWN, ROOT
 
 TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 FAMILY_FILE = FAMILY_FOLDER / "long.v1.toml"
-SUITE_FILE = SUITE_FOLDER / "quick.toml"
 NO_METHOD = Path(__file__).parents[1] / "LICENSE"
 FAMILY = """
 title = "Mine"
@@ -157,12 +153,10 @@ FAMILIES = [
     (family("[4, 4]", "[5, 4]"), "links is [5, 4]; it should have the lower number first"),
     (family("[-5, 5]", "[5, -5]"), "region.x is [5, -5]; it should have the lower number first"),
     (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
-    (family("[-5, 5]", "[-5, inf]"), "region.x[1] is inf; it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
 SUITES = [
-    (suite("process/", "proces/"), "did you mean 'dual-process/EC1'"),
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
     (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
@@ -177,16 +171,11 @@ SUITES = [
 ]
 METHODS = [
     ("import nothing_like_this", "cannot be imported: ModuleNotFoundError"),
-    ("raise SystemExit(3)", "cannot be imported: SystemExit: 3"),
     ("x = 1", "defines no subclass of coartic.Method"),
     ("def (", "cannot be imported: SyntaxError"),
     (method("def solve", "def solves"), "that is complete: A has no solve"),
     (method("title = ", ""), "title must be a text"),
-    (method('"a"', '"a b"'), "the name 'a b' must begin"),
-    (method('"a"', '"dual-process/EC1"'), "'dual-process/EC1' is reserved"),
     (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
-    (method('"a"', '"CMA-ES"'), "'CMA-ES' is a name of a method here"),
-    (method('"a"', '"ec4"'), "'ec4' is a name of a method here"),
     (method("frozenset()", '"goals"'), "information must be a set of Information"),
     (METHOD + "    files = ('w.npy',)", "w.npy"),
 ]
@@ -226,23 +215,14 @@ def test_of_many_problems_the_first_are_said(tmp_path):
     [
         ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
         ({"methods": ["dual-process/EC9"]}, "unknown method 'dual-process/EC9'; did you mean"),
-        (
-            {"tasks": ["ascending"], "methods": ["EC4"]},
-            "no method to run on task 'ascending': EC4 uses the left",
-        ),
-        ({"tasks": ["ascending.toml"]}, "name 'ascending' is already taken"),
-        ({"tasks": ["left.toml"]}, "no method to run on task 'left': EC1 uses the right"),
         ({"tasks": ["absent.toml"]}, "absent.toml"),
-        ({"tasks": "a.toml"}, "tasks is 'a.toml'; it should be a list, such as ['a.toml']"),
         ({"tasks": Path("a.toml")}, "tasks is PosixPath('a.toml'); it should be a list"),
         ({"tasks": [3]}, "3 is no task; it should be a name, a path or a task"),
-        ({"tasks": None}, "tasks is None; it should be a list"),
-        ({"methods": 3}, "methods is 3; it should be a list"),
         ({"methods": [3]}, "methods[0] is 3; it should be a text"),
         ({"jobs": 2}, "jobs is no option: give executor=Local(jobs)"),
         ({"scheduler": "x"}, "scheduler is no option: give executor=Dask(scheduler)"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
-        ({"runs": "3"}, "runs is '3'; it must be a whole number"),
+        ({"runs": 0}, "runs is 0; it must be a whole number from 1"),
         ({"runs": True}, "runs is True; it must be a whole number"),
         ({"seed": -1}, "seed is -1; it should be at least 0"),
         ({"trials": 10**9}, "trials is 1000000000; it should be at most 10000000"),
@@ -253,20 +233,13 @@ def test_of_many_problems_the_first_are_said(tmp_path):
 )
 def test_an_argument(wrong, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("mine", "ascending", "left"):
-        text = GOOD.replace("mine", name)
-        if name == "left":
-            text = 'hands = ["left"]' + text.replace("RR", "LL")
-        Path(f"{name}.toml").write_text(text, encoding="utf-8")
     with pytest.raises(CoarticError) as caught:
         run_suite(**{"suite": "paper", "folder": "out"} | wrong)
     assert words in str(caught.value)
     assert not Path("out").exists()
 
 
-@pytest.mark.parametrize(
-    "read", [load_task, plan_suite, read_family, lambda path: registry([path])]
-)
+@pytest.mark.parametrize("read", [load_task, lambda path: registry([path])])
 @pytest.mark.parametrize("kind", ["absent", "pipe", "device", "folder", "large", "long"])
 def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
     path = tmp_path / "mine.v1.toml"
@@ -339,14 +312,9 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (["run", "paper", "--runs", "0"], "runs is 0; it must be a whole number from 1"),
         (["run", "paper", "--tasks", ""], "unknown task ''"),
         (["draw", "ascending", "--out", ""], "is empty"),
-        (["draw", "ascending", "--out", "a" * 5000], "File name too long"),
-        (["animate", "x", "--out", ""], "is empty"),
         (["report", "a" * 5000], "File name too long"),
-        (["run", "paper", "--out", "a" * 5000], "File name too long"),
-        (["check", "/dev/zero.toml"], "No such file"),
         (["list", "two-armed/v2/i003"], "two-armed/v1"),
         (["list", "two-armed1"], "two-armed-1"),
         (["check", "two-armed-1"], "two-armed-1 is a task, not a method. `coartic draw"),
@@ -361,30 +329,24 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
         (["animate", "0", "--width", "1.5"], "--width is 1.5; it must be a whole number from 200"),
         (["run"], "name a suite: ablations, "),
-        (["run", "papr"], "did you mean 'paper'"),
         (["run", "paper", "--family-file", TASK_FILE], "is a task: coartic run SUITE --tasks"),
         (["run", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
-        (["check", SUITE_FILE], "is a suite: coartic run"),
         (["check", "quick"], "quick is a suite: coartic run quick"),
         (["check", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
         (["check", "two-armed"], "is a shipped family: coartic list two-armed"),
         (["list", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
-        (["list", "mine.py"], "coartic check METHOD --method-file mine.py"),
         (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
         (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "column run_ids of a report's"),
         (["report", "nowhere"], "there is no folder nowhere"),
-        (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
-        (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),
         (["play", "--out", "x.txt"], "the name must end in .html"),
         (["animate", "1a2b", "--out", "x.txt"], "the name must end in .gif or .mp4"),
         (["draw", "ascending", "--out", "x.txt"], "the name must end in .svg or .pdf or .png"),
         (["new", "my-search", "--out", "x.txt"], "the name must end in .py"),
-        (["run", "comparison", "--tasks", "arm.urdf"], OF_ANOTHER_PROGRAM),
-        *(
-            ([command, "arm.urdf"], OF_ANOTHER_PROGRAM)
-            for command in ("check", "draw", "play", "list")
-        ),
-        (["run", "paper", "--seed", "-1"], "it should be at least 0"),
+        (["new", "My Search"], "coartic new: My Search: the name 'My Search' must begin with"),
+        (["new", "dual-process/EC1"], "'dual-process/EC1' is reserved"),
+        (["new", "cma-es"], "'cma-es' is a name of a method here"),
+        (["new", "ec4"], "'ec4' is a name of a method here"),
+        *(([command, "arm.urdf"], OF_ANOTHER_PROGRAM) for command in ("check", "draw", "list")),
     ],
 )
 def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, coartic):
@@ -414,75 +376,66 @@ FOUND = mean_beyond("{}", [1.0, 2.0, 3.0])
 GROUPS = [np.eye(3, 10), np.eye(4, 10)]
 FRAME = pd.DataFrame({"method": "a", "task": "t", "reward": [-300.0], "best_known": -292,
                       "run": 0, "trials": 5})  # fmt: skip
+USUAL = {
+    "task": TASK, "robot": ROBOT, "q": TASK.q0, "target": TASK.q0, "hand": "right",
+    "goal": (3.0, 2.0), "hands": "RRR", "radius": 0.1, "left_links": (0.5, 0.5),
+    "right_links": (0.5, 0.5), "solution": TRIAL.movements, "movements": TRIAL.movements,
+    "condition": "EC1", "seed": 0, "seeds": [0], "trials": 3, "jobs": 1, "half_width": 1.0,
+    "budget": 5, "runs": SOLUTIONS, "name_or_path": "ascending", "family": "long/v1",
+    "split": "test", "count": 2, "year": None, "content": {"goals": [[3.0, 2.0]]}, "source": "x",
+    "reach": True, "width": 200, "replace": True, "frame": FRAME, "hits": FRAME, "by": ["method"],
+    "columns": ["reward"], "values": [1.0, 2.0, 3.0], "resamples": 99, "sentence": "{}",
+    "bound": 0.0, "side": "less", "claims": {"a": ("x", "y", FOUND)}, "value": 1.5, "digits": 2,
+    "row": {"a": 1.0, "a_low": 0.0, "a_high": 2.0}, "column": "a", "scale": 1.0, "unit": "",
+    "scores": {"a": [np.array([1.0, 2.0])]}, "method": GROUPS, "other": GROUPS,
+    "rng": np.random.default_rng(0), "alternative": "less", "p_values": [0.1, 0.2],
+    "differences": [1.0, 2.0], "total": 5, "share": 0.5, "folder": "nowhere", "tables": {},
+    "draw": lambda results: Figure(), "template": "nowhere.jinja", "ticks_per_unit": 1.0,
+    "difference": np.ones(10), "jacobian": ROBOT.jacobian(TASK.q0, "right"),
+    "rewards": [-300.0, None],
+}  # fmt: skip
+"""Arguments by the names of parameters, for all functions that take no others of these names."""
+
+
+def with_arguments(function, **own):
+    """A function, and arguments that it takes."""
+    parameters = inspect.signature(function).parameters
+    return function, {name: USUAL[name] for name in USUAL if name in parameters} | own
+
+
+RIGHT = {"hands": ["right"]}
 CALLS = (
-    (execute, {"task": TASK, "solution": TRIAL.movements}),
-    (trajectory, {"task": TASK, "movements": TRIAL.movements}),
-    (movements_of, {"hands": "RRR", "targets": TRIAL.configurations}),
-    (corrective_trial, {"task": TASK, "hands": "RRR"}),
-    (learn, {"task": TASK, "condition": "EC1", "seed": 0, "trials": 3}),
-    (load_task, {"name_or_path": "ascending"}),
-    (ROBOT.forward_kinematics, {"q": TASK.q0, "hand": "right"}),
-    (ROBOT.jacobian, {"q": TASK.q0, "hand": "right"}),
-    (Task, {"goals": [(3.0, 2.0)], "hands": ["right"], "locked_base": ["y"], "radius": 0.1}),
-    (Robot, {"left_links": (0.5, 0.5), "right_links": (0.5, 0.5)}),
-    (ranking, {"frame": FRAME}),
-    (means, {"frame": FRAME, "by": ["method"], "columns": ["reward"]}),
-    (ecdf, {"frame": FRAME, "targets": [0.1]}),
-    (plan_suite, {"suite": "quick", "tasks": ["ascending"], "methods": ["EC1"], "runs": 1,
-                  "seed": 0, "trials": 5, "time_limit_s": 1.0, "trial_budget": 5}),
-    (correct, {"robot": ROBOT, "q": TASK.q0, "hand": "right", "goal": (3.0, 2.0)}),
-    (move, {"robot": ROBOT, "q": TASK.q0, "target": TASK.q0, "hand": "right",
-            "goal": (3.0, 2.0), "radius": 0.1}),
-    (ROBOT.base_outline, {"q": TASK.q0}),
-    (hand_sequences, {"task": TASK, "hands": ["right"]}),
-    (initial_hands, {"task": TASK, "hands": ["right"]}),
-    (learn_many, {"task": TASK, "condition": "EC1", "seeds": [0], "trials": 3, "jobs": 1}),
-    (objective, {"task": TASK, "hands": "RRR", "half_width": 1.0, "budget": 5}),
-    (problems, {"family": "long/v1", "split": "test", "count": 1}),
-    (parse_task, {"content": {"goals": [[3.0, 2.0]]}, "source": "x", "reach": True}),
-    (PATH.animate, {"path": ".gif", "width": 200, "replace": True}),
-    *((function, {"frame": FRAME}) for function in (gaps, shares, by_task)),
-    (mean, {"values": [1.0, 2.0, 3.0], "resamples": 99}),
-    (mean_beyond, {"sentence": "{}", "values": [1.0, 2.0, 3.0], "bound": 0.0, "side": "less"}),
-    (judge, {"claims": {"a": ("x", "y", FOUND)}}),
-    (number, {"value": 1.5, "digits": 2}),
-    (interval, {"row": {"a": 1.0, "a_low": 0.0, "a_high": 2.0}, "column": "a", "digits": 1,
-                "scale": 1.0, "unit": ""}),
-    (other_tasks, {"scores": {"a": [np.array([1.0, 2.0])]}}),
-    (beyond_p, {"method": GROUPS, "other": GROUPS, "rng": np.random.default_rng(0),
-                "resamples": 99}),
-    (posture_difference_below, {"first": GROUPS[0], "second": GROUPS[1], "bound": 1.0,
-                                "rng": np.random.default_rng(0), "resamples": 99}),
-    (holm, {"p_values": [0.1, 0.2], "family": 2}),
-    (bootstrap_test, {"first": [1.0, 2.0], "second": 0.0, "alternative": "less", "resamples": 99}),
-    (sign_flip_test, {"differences": [1.0, 2.0]}),
-    (share_test, {"count": 3, "total": 5, "share": 0.5, "alternative": "greater"}),
-    (write_study, {"folder": "nowhere", "tables": {}, "draw": lambda results: Figure()}),
-    (fill_page, {"template": "nowhere.jinja"}),
-    (read_hits, {"path": "nowhere.csv", "task": TASK, "ticks_per_unit": 1.0}),
-    (solutions_of, {"task": TASK, "hits": FRAME}),
-    (load, {"folder": "nowhere"}),
-    *((function, {"runs": SOLUTIONS}) for function in (
+    *map(with_arguments, (
+        execute, trajectory, corrective_trial, learn, learn_many, load_task, objective, parse_task,
+        Robot, ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, correct, move,
+        ranking, means, gaps, shares, by_task, mean, mean_beyond, judge, number, interval,
+        other_tasks, beyond_p, sign_flip_test, write_study, fill_page, solutions_of, load,
         measures.arm, measures.as_in_isolation, measures.gain_at_next, measures.hand,
-        measures.other_arm, measures.ticks_slower)),
-    (measures.isolated_reaches, {"task": TASK, "q": np.tile(TASK.q0, (3, 1)), "goals": [1, 2, 3],
-                                 "hands": [1, 1, 1]}),
-    (two_contexts.movable, {"task": TASK, "hand": "right"}),
-    (two_contexts.motor_equivalence, {"difference": np.ones(10),
-                                      "jacobian": ROBOT.jacobian(TASK.q0, "right")}),
-    (reach_goals, {"robot": ROBOT, "q": [TASK.q0], "hands": [1], "goals": [(3.0, 2.0)],
-                   "radius": 0.1, "targets": None, "checks": True, "locked_base": (),
-                   "model": PAPER}),
-    (PAPER.for_radius, {"radius": 0.1}),
-    *((getattr(SESSION, name), usual) for name, usual in {
-        "trial": {"solution": TRIAL.movements},
-        "correct": {"q": TASK.q0, "hand": "right", "goal": 1},
-        "trials": {"hands": "RRR", "targets": TRIAL.configurations[None], "until": None},
-        "spend": {"solver_iterations": 1}, "find_initial_hands": {"hands": ("right",)},
-    }.items()),
-    (gym.column, {"rewards": [-300.0, None]}),
-    (instance_names, {"family": "long/v1", "split": "test", "count": 2, "year": None}),
-    *((function, {"task": TASK}) for function in (essence, outline_of)),
+        measures.other_arm, measures.ticks_slower, two_contexts.movable,
+        two_contexts.motor_equivalence, PAPER.for_radius, gym.column, instance_names, essence,
+        outline_of, problems, SESSION.trial,
+    )),
+    with_arguments(movements_of, targets=TRIAL.configurations),
+    with_arguments(Task, goals=[(3.0, 2.0)], locked_base=["y"], **RIGHT),
+    with_arguments(ecdf, targets=[0.1]),
+    with_arguments(plan_suite, suite="quick", tasks=["ascending"], methods=["EC1"], runs=1,
+                   seed=0, trials=5, time_limit_s=1.0, trial_budget=5),
+    with_arguments(hand_sequences, **RIGHT),
+    with_arguments(initial_hands, **RIGHT),
+    with_arguments(PATH.animate, path=".gif"),
+    with_arguments(posture_difference_below, first=GROUPS[0], second=GROUPS[1], bound=1.0),
+    with_arguments(holm, family=2),
+    with_arguments(bootstrap_test, first=[1.0, 2.0], second=0.0),
+    with_arguments(share_test, alternative="greater"),
+    with_arguments(read_hits, path="nowhere.csv"),
+    with_arguments(measures.isolated_reaches, q=np.tile(TASK.q0, (3, 1)), goals=[1, 2, 3],
+                   hands=[1, 1, 1]),
+    with_arguments(reach_goals, q=[TASK.q0], hands=[1], goals=[(3.0, 2.0)], targets=None,
+                   checks=True, locked_base=(), model=PAPER),
+    with_arguments(SESSION.correct, goal=1),
+    with_arguments(SESSION.spend, solver_iterations=1),
+    with_arguments(SESSION.trials, targets=TRIAL.configurations[None], until=None),
+    with_arguments(SESSION.find_initial_hands, **RIGHT),
 )  # fmt: skip
 CELL = {"task": "two-armed-1", "method": "EC4"}
 OF_STUDY = {
@@ -590,24 +543,13 @@ def test_all_functions_are_called_wrongly():
         (lambda: mean([1.0, 2.0], resamples=np.nan), "resamples is nan; it must be a whole"),
         (lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)), "goal has True; needed are real"),
         (lambda: parse_task({}, np.inf), "source is inf; needed is a text"),
-        (lambda: parse_task({}, source=5, reach=1), "source is 5"),
         (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
         (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
         (lambda: Movement(1, "right", "planned", MASKED), f"target {UNMASKED}"),
         (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints {UNMASKED}"),
-        (lambda: holm(np.ma.array([0.1, 0.2], mask=[0, 1])), f"p_values {UNMASKED}"),
-        *(
-            (call, UNMASKED)
-            for call in (
-                lambda: movement_data(Movement(1, "right", "planned", MASKED)),
-                lambda: movements_of("RRR", np.ma.array([MASKED] * 3)),
-                lambda: make_trials(TASK, "RRR", np.ma.masked_equal(np.zeros((1, 3, 10)), 0.0)),
-                lambda: make_trials(TASK, "RRR", [[MASKED] * 3]),
-                lambda: move(ROBOT, TASK.q0, MASKED, "right", (5, 1), 0.1),
-                lambda: mean([1.0, 2.0, np.ma.masked]),
-                lambda: other_tasks({"family": [MASKED]}),
-            )
-        ),
+        (lambda: make_trials(TASK, "RRR", [[MASKED] * 3]), UNMASKED),
+        (lambda: mean([1.0, 2.0, np.ma.masked]), UNMASKED),
+        (lambda: other_tasks({"family": [MASKED]}), UNMASKED),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
         (lambda: interval({}, "gap"), "the row has no numbers gap, gap_low, gap_high"),
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
@@ -706,6 +648,3 @@ def test_advice_about_instances_and_their_families_is_taken(tmp_path):
         plan_suite("paper", family_files=[family])
     advice = str(caught.value).rpartition("such as ")[2]
     assert len(plan_suite("paper", family_files=[family], tasks=[advice], methods=["EC4"])) == 10
-    with pytest.raises(CoarticError, match=r"such as range\(50, 100\), or 50\.\.99 in a command"):
-        plan_suite("paper", runs="x")
-    assert value_in("50..99") == range(50, 100)

@@ -293,7 +293,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("kernel", ["Haswell", "Prescott"])
-def test_a_folder_is_sound_under_other_kernels_of_blas(true_folder, kernel):
-    done = python(checker.__file__, true_folder, OPENBLAS_CORETYPE=kernel)
+def test_a_folder_is_sound_under_another_kernel_of_blas(true_folder):
+    """One without the fused operations that this machine's kernel has."""
+    done = python(checker.__file__, true_folder, OPENBLAS_CORETYPE="Prescott")
     assert "Nothing differs" in done.stdout

@@ -257,19 +257,3 @@ class Undrawn(Good):
 
     name = "test/undrawn"
     stochastic = True
-
-
-class Quits(Good):
-    name = "test/quits"
-
-    def solve(self, session):
-        raise SystemExit(0)
-
-
-class Pretender(Good):
-    """Names its details like the learner's columns."""
-
-    name = "test/pretender"
-
-    def solve(self, session):
-        return Result(by_correction(session), {"replay_reward": -1, "best_trial": "third"})
