@@ -179,9 +179,7 @@ class Store:
         """Return the plan of the folder, the jobs of its last suite. Raises CoarticError if no plan
         is stored yet."""
         with explain_errors(self.folder):
-            suite = self._one("SELECT * FROM suite")
-            if suite is None:
-                raise CoarticError("it is not finished; repeat the `coartic run` command")
+            suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
                 raise ValueError("the plan is not as it was written")
             return [
@@ -197,11 +195,9 @@ class Store:
 
     def made_with(self) -> dict[str, Any]:
         """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``,
-        by name."""
+        by name. Raises CoarticError if no plan is stored yet."""
         with explain_errors(self.folder):
-            row = self._one(
-                "SELECT content, command, date FROM suite JOIN environments ON id = environment"
-            )
+            row = self._suite()
             how = {"command": json.loads(row["command"]), "date": row["date"]}
             return dict(json.loads(row["content"]) | how)
 
@@ -325,6 +321,14 @@ class Store:
                 yield run_id, _unpack(blob, trials)
 
     # Rows.
+
+    def _suite(self) -> Any:
+        """Return the row of the last suite, with its environment. Raises CoarticError if there is
+        none."""
+        row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
+        if row is None:
+            raise CoarticError("it is not finished; repeat the `coartic run` command")
+        return row
 
     def _write_run(self, run: Run) -> None:
         """Write a run into the tables, in place of an earlier run with its id."""
@@ -511,7 +515,7 @@ def writing(folder: Path) -> Iterator[Store]:
     with _lock(folder):
         with explain_errors(folder):
             _check_files(folder)
-            opened = _connect(str(folder / RUNS_FILE), WAIT_S)
+            opened = _connect((folder / RUNS_FILE).absolute().as_uri(), WAIT_S)
         with closing(opened) as connection:
             with explain_errors(folder):
                 is_there = _has_tables(connection)  # raises before anything is written
@@ -560,10 +564,8 @@ def _lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
 
 
 def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """Return a connection to a path or a ``file:`` address that waits ``timeout_s`` for a lock."""
-    connection = sqlite3.connect(
-        where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
-    )
+    """Return a connection to a ``file:`` address that waits ``timeout_s`` for a lock."""
+    connection = sqlite3.connect(where, timeout=timeout_s, isolation_level=None, uri=True)
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")
     connection.execute("PRAGMA cell_size_check = ON")
