@@ -11,7 +11,6 @@ import errno
 import inspect
 import json
 import multiprocessing
-import re
 import signal
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict
@@ -118,7 +117,7 @@ def _methods_of_module(
     """Yield the infos of a module's methods, with their code. Raises CoarticError if the module
     defines no method."""
     for method in methods:
-        check_declaration(method, origin)
+        _check_declaration(method, origin)
         try:
             code = code_of(file, tuple(file.parent / name for name in method.files))
         except OSError as error:
@@ -144,19 +143,15 @@ def _methods_of_module(
         )
 
 
-def check_declaration(method: type[Method], origin: str) -> None:
-    """Check the declaration of a method; ``origin`` is the name of its file in messages. Raises
-    CoarticError if a required attribute is missing or wrong."""
+def _check_declaration(method: type[Method], origin: str) -> None:
+    """Check the declaration of a method but for its id, which the registry checks; ``origin`` is
+    the name of its file in messages. Raises CoarticError if a required attribute is missing or
+    wrong."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)
         if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
             raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
-    if not METHOD_NAME.fullmatch(method.name):
-        raise CoarticError(
-            f"{where}: the name {method.name!r} must begin with a letter or digit and have only "
-            "letters, digits, '.', '_', '+', '/' and '-', such as 'my-search'"
-        )
     information = getattr(method, "information", None)
     if not isinstance(information, frozenset | set) or not all(
         isinstance(i, Information) for i in information
@@ -164,6 +159,3 @@ def check_declaration(method: type[Method], origin: str) -> None:
         raise CoarticError(
             f"{where}: information must be a set of Information, not {information!r}"
         )
-
-
-METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")

@@ -346,17 +346,13 @@ def new(
 ) -> None:
     """Write a working method, to be changed into your own."""
     from coartic.benchmarks import template
-    from coartic.benchmarks.method_files import check_declaration
-    from coartic.benchmarks.registry import add_methods, registry
+    from coartic.benchmarks.registry import check_id, registry
     from coartic.internal.files import write_output
-    from coartic.runs.method_info import method_info
 
     path = Path(given.file_name(name)) if out is None else out
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
-    mine = type(name, (template.Mine,), {"name": name})
-    check_declaration(mine, "coartic new")
-    add_methods(registry(with_code=False), [method_info(mine, "coartic new", "", "")])
+    check_id(name, "coartic new", registry(with_code=False))
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     file = quote(str(path))
