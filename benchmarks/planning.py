@@ -33,7 +33,7 @@ from coartic.internal.limits import (
 from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain_inline, sentence_error
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, trials_in
+from coartic.runs.plan import Job, cell_of, tasks_by_name, trials_in
 from coartic.tasks.families import instance_of, named_by, own_families, read_family
 from coartic.tasks.task import address_of, check_task
 
@@ -151,7 +151,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
         ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
     methods = [registered[name] for name in ids]
     jobs += _extra_jobs(jobs, own, methods, job)
-    there = {each.cell.task.name: each.cell.task for each in jobs} | own
+    there = tasks_by_name([*(each.cell.task for each in jobs), *own.values()])
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
         words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
@@ -194,7 +194,9 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
     methods = {job.cell.method.name: job.cell.method for job in jobs}
     if request.trials and not any("trials" in each.defaults for each in methods.values()):
         raise CoarticError(f"trials has no effect: no parameter of {', '.join(methods)} is trials")
-    if request.runs not in (None, 1) and not any(each.stochastic for each in methods.values()):
+    if request.runs not in (None, 1, range(1)) and not any(
+        each.stochastic for each in methods.values()
+    ):
         raise CoarticError(
             f"runs has no effect: no run of {', '.join(methods)} depends on a seed, so one is made"
         )
@@ -213,7 +215,7 @@ def _asked_tasks(
     """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
     a function that gives a task by its name.
 
-    A request brings its task files, its tasks, and instances that the suite does not have. Raises
+    A request brings task files, tasks and instances, those that the suite does not have. Raises
     CoarticError for a task whose name belongs to another task.
     """
     for path in request.family_files:
@@ -242,6 +244,8 @@ def _asked_tasks(
             )
         names[task.name] = None
     of_suite = {name for block in suite.blocks for each in block.tasks for name in named_by(each)}
+    files = [load_task(name) for name in of_suite if name.endswith(".toml")]
+    own = {name: task for name, task in own.items() if task not in files}
     brought = (name for name in names if name not in of_suite and address_of(name))
     own |= {name: task_named(name) for name in brought}
     return names, own, task_named
@@ -326,7 +330,7 @@ def _why_nothing_runs(
 ) -> str:
     """Return a sentence that says why methods have nothing to run: on the first task of ``idle``,
     tasks that a request names and that have no job, or else on the tasks of ``jobs``."""
-    tasks = idle[:1] or list({job.cell.task.name: job.cell.task for job in jobs}.values())
+    tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)
     there_is = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "nothing there"
     why = "; ".join(filter(None, reasons)) or f"suite {suite.name!r} has {there_is}"
@@ -337,16 +341,11 @@ def _why_nothing_runs(
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
     """Return the jobs, one for each cell.
 
-    Raises CoarticError for two tasks of one name, for two numbers of runs of a cell, and for too
-    many trials.
+    Raises CoarticError for two numbers of runs of a cell, and for too many trials.
     """
-    tasks, distinct = dict[str, Task](), dict[str, Job]()
+    distinct = dict[str, Job]()
     for job in jobs:
         cell, where = job.cell, f"{job.cell.task.name} x {job.cell.label}"
-        if tasks.setdefault(cell.task.name, cell.task) != cell.task:  # names distinguish results
-            raise CoarticError(
-                f"two different tasks are called {cell.task.name!r}: give one another name"
-            )
         if trials_in(cell.parameters) > MOST_TRIALS:
             raise CoarticError(
                 f"{where}: {trials_in(cell.parameters):,} trials a run; at most {MOST_TRIALS:,} "

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, SkipValidation
 
+from coartic.errors import CoarticError
 from coartic.model import PAPER
 from coartic.runs.method_info import MethodInfo
 from coartic.tasks.task import Task
@@ -110,6 +111,16 @@ def cell_of(
         method = replace(method, defaults=method.defaults | {"trials": trials})
         parameters = {"trials": trials, **parameters}
     return Cell(task, method, method.complete(parameters), trial_budget)
+
+
+def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
+    """Return tasks by name. Raises CoarticError for two different tasks of one name: names
+    distinguish results."""
+    named = dict[str, Task]()
+    for task in tasks:
+        if named.setdefault(task.name, task) != task:
+            raise CoarticError(f"two tasks are called {task.name!r}: give one of them another name")
+    return named
 
 
 def run_seed(suite_seed: int, task: str, number: int) -> int:
