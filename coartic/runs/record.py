@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from operator import attrgetter
 from types import SimpleNamespace
@@ -22,7 +22,6 @@ from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.motion.trial import compiled_task
-from coartic.robot import Array
 from coartic.runs.plan import Cell, Job
 from coartic.tasks.task import Task
 
@@ -206,46 +205,6 @@ class Run:
         used = ", ".join(self.outcome.used)
         return row | {"suite_seed": self.job.seed, "used": used, "details": details}
 
-    @classmethod
-    def from_row(
-        cls,
-        row: Mapping[str, Any],
-        cell: Cell,
-        environment: dict[str, Any],
-        movements: Mapping[str, tuple[Movement, ...]],
-        rewards: list[int | None],
-    ) -> Run:
-        """Return a run from its row of table ``results``, its movements by part, and the rewards of
-        its trials.
-
-        Raises ValueError if the id of the row belongs to another run.
-        """
-        meter = {name: row[name] for name in vars(Meter())}
-        outcome = Outcome(
-            row["status"],
-            row["reason"],
-            details=json.loads(row["details"]),
-            used=tuple(filter(None, row["used"].split(", "))),
-            meter=None if row["trials"] is None else Meter(**meter),
-            rewards=rewards,
-            times=Times(**{each.name: row[each.name] for each in fields(Times)}),
-            environment=environment,
-        )
-        scores = {
-            part: Score(row[f"{prefix}reward"], row[f"{prefix}hands"], movements[part])
-            for part, prefix in PREFIXES.items()
-            if movements[part]
-        }
-        if "solution" in scores:
-            scores["solution"] = scores["solution"]._replace(
-                corrections=row["solution_corrections"], other_arm_travel=row["other_arm_travel"]
-            )
-        job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
-        run = cls(job, outcome, scores, row["date"])
-        if (run.id, run.seed) != (row["run_id"], row["seed"]):
-            raise ValueError(f"run {row['run_id']} is not the run that its id says")
-        return run
-
 
 class _RunColumn(NamedTuple):
     """A column of view ``runs``, which has a row for each run of the plan."""
@@ -363,7 +322,7 @@ def movement_from(data: Sequence[Any]) -> Movement:
 
 
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
-    """Return the rewards of trials as bytes, which :func:`rewards_from` reads.
+    """Return the rewards of trials as bytes.
 
     The numbers are the best reward, then for each trial by how much it is worse, plus 1; 0 stands
     for None. All lowest bytes of the numbers come first, then all next bytes: so they pack best.
@@ -372,14 +331,6 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)
     numbers = np.append(best, np.where(np.isnan(values), 0.0, best - values + 1.0))
     return numbers.astype(np.int64).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
-
-
-def rewards_from(content: bytes) -> Array:
-    """Return the rewards of trials from :func:`reward_bytes`, shape ``(trials,)``; NaN stands for
-    None. Raises ValueError for other bytes."""
-    numbers = np.frombuffer(content, np.uint8).reshape(4, -1).T.copy().view("<u4").ravel()
-    best = numbers[:1].view("<i4")
-    return np.where(numbers[1:] == 0, np.nan, best + 1.0 - numbers[1:])
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
