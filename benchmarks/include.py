@@ -24,15 +24,9 @@ from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
 from coartic.runs.plan import Job, hash_of
-from coartic.runs.record import PREFIXES, Run
+from coartic.runs.record import Run
 from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, open_store, writing
-
-_SCORED = (
-    *(f"{prefix}{name}" for prefix in PREFIXES.values() for name in ("reward", "hands")),
-    "solution_corrections",
-)
-"""Columns of table ``results`` that follow from the solutions of a run."""
 
 
 def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
@@ -98,9 +92,7 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         if not held.issuperset((digest, n) for n in job.numbers)
     ]
     parts = {**plans, "this command": missing}
-    _check_together(
-        {name: part[0] for name, part in plans.items()} | {"this command": plan[0]}, parts
-    )
+    _check_together(plan[0], parts)
     methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
     for job in plan:  # failures are performed again where the code is here
         if methods[job.cell.method.name].code == job.cell.method.code:
@@ -152,9 +144,9 @@ def _named(jobs: Sequence[Job]) -> str:
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
-def _check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]) -> None:
-    """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin,
-    ``first`` one job of each part.
+def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
+    """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin;
+    ``first`` stands for a part without jobs.
 
     Raises CoarticError if two parts say different things about the suite, a task, a method or a
     cell.
@@ -166,7 +158,8 @@ def _check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]
         if there != value:
             raise CoarticError(f"{what} is {there} in {origin} and {value} in {where}{hint}")
 
-    for where, job in first.items():
+    for where, part in parts.items():
+        job = part[0] if part else first
         agree(where, "the suite", repr(job.suite))
         agree(where, "the seed", job.seed)
         agree(where, "the trial budget", job.cell.trial_budget)
@@ -221,8 +214,9 @@ def _check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) ->
         before, after = run.to_row(), scored.to_row()
         wrong = [
             f"{column} is {after[column]}, not {before[column]}"
-            for column in _SCORED
+            for column in before
             if before[column] != after[column]
+            and column not in ("date", "result", "other_arm_travel")
         ]
         if {run.result, scored.result} != {results[run.id]}:
             wrong.append("a joint, a tick or a trial was changed")
