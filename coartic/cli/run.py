@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -138,15 +136,36 @@ def list_(
     method_file: given.MethodFiles = None,
 ) -> None:
     """List tasks, suites and methods, or describe one of them."""
+    from coartic import builtin_tasks, load_task
     from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
+    from coartic.tasks.families import shipped_families
+    from coartic.tasks.task import address_of
 
-    registered, methods = registry(method_file or [], with_code=False), list[str]()
-    pairs = _overview(registered) if name is None else describe(name, registered)
-    if name is not None:
-        with suppress(CoarticError):  # no method
+    registered = registry(method_file or [], with_code=False)
+    if name is None:
+        return say_pairs(_overview(registered))
+    (name,) = given.tasks_meant([name])
+    if name.endswith(".toml"):
+        check_kind(name, "suite", "task")
+    kind, families, methods = kind_of(name), shipped_families(), list[str]()
+    if kind == "suite":
+        pairs = _describe_suite(name, load_suite(name))
+    elif name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
+        pairs = _describe_task(name, load_task(name))
+    elif kind == "shipped family":
+        pairs = _describe_family(families.get(name) or families[f"{name}/v1"])
+    else:
+        try:
             methods = given.methods_meant([name], registered)
-        given.check_used(method_file, registered, methods)
-    say_pairs(pairs)
+        except CoarticError as error:
+            if not str(error).startswith("unknown"):
+                raise
+            names = [*suites(), *builtin_tasks(), *families, *registered]
+            raise CoarticError(unknown("task, suite, method or family", name, names)) from error
+        pairs = (pair for each in methods for pair in _describe_method(registered[each]))
+    given.check_used(method_file, registered, methods)
+    return say_pairs(pairs)
 
 
 def _overview(registered: Registry) -> Iterator[tuple[str, str]]:
@@ -165,36 +184,6 @@ def _overview(registered: Registry) -> Iterator[tuple[str, str]]:
     names = given.method_names(registered)
     yield from ((f"  {name}", names[name]) for name in registered)
     yield "More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"
-
-
-def describe(name: str, registered: Registry) -> Iterable[tuple[str, str]]:
-    """Return the properties of a task, a suite, a family or a method, as pairs of word and text.
-
-    Raises CoarticError for any other name.
-    """
-    from coartic import builtin_tasks, load_task
-    from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
-    from coartic.tasks.families import shipped_families
-    from coartic.tasks.task import address_of
-
-    (name,) = given.tasks_meant([name])
-    if name.endswith(".toml"):
-        check_kind(name, "suite", "task")
-    kind, families = kind_of(name), shipped_families()
-    if kind == "suite":
-        return _describe_suite(name, load_suite(name))
-    if name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
-        return _describe_task(name, load_task(name))
-    if kind == "shipped family":
-        return _describe_family(families.get(name) or families[f"{name}/v1"])
-    try:
-        ids = given.methods_meant([name], registered)
-    except CoarticError as error:
-        if not str(error).startswith("unknown"):
-            raise
-        names = [*suites(), *builtin_tasks(), *families, *registered]
-        raise CoarticError(unknown("task, suite, method or family", name, names)) from error
-    return itertools.chain(*(_describe_method(registered[id_]) for id_ in ids))
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
