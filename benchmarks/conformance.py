@@ -28,7 +28,7 @@ from coartic.internal.text import counted
 from coartic.method import METERED
 from coartic.motion.solution import goals_without_target, hint_of
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of
+from coartic.runs.plan import Job, cell_of, in_words
 from coartic.runs.record import Outcome, Run
 from coartic.tasks.task import check_task
 
@@ -88,7 +88,7 @@ def check_method(
     runs = dict(zip(jobs, perform_in_order([*jobs.values()], verbose=verbose), strict=True))
     last = tasks[-1].name
     runs["elsewhere", last] = next(perform_in_order([jobs["first", last]]))
-    values = ", ".join(f"{key}={value}" for key, value in parameters.items())
+    values = in_words(parameters)
     return [*laws, *_laws_of_runs(info, runs, f" (checked with {values})" if values else "")]
 
 
@@ -198,14 +198,13 @@ def _laws_of_declaration(info: MethodInfo) -> list[Law]:
         problems.append("an unknown parameter is accepted; forbid extra keys")
     if config["frozen"] is not True:
         problems.append("they can be changed after validation; freeze them")
-    values = ", ".join(f"{key}={value}" for key, value in parameters.items())
     return [
         _law(
             "declaration",
             (f"{name} is empty" for name in empty),
             f"{info.title}; information: {', '.join(info.information) or 'none'}",
         ),
-        _law("parameters", problems, values or "none"),
+        _law("parameters", problems, in_words(parameters) or "none"),
     ]
 
 

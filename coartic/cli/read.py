@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -40,14 +41,12 @@ def report(
     with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
         files, failures = write_report(study, out, for_paper=for_paper, watch=say_part)
     say_part("")
-    tables = sum(name.endswith(".csv") for name in files)
-    figures = sum(name.endswith(".svg") for name in files)
-    latex = sum(name.endswith(".tex") for name in files)
-    paper = f"CSV, {latex} as LaTeX) and {counted(figures, 'figure')} (SVG and PDF"
-    what = paper if for_paper else "CSV"
+    made, what = Counter(Path(name).suffix for name in files), "CSV"
+    if for_paper:
+        what = f"CSV, {made['.tex']} as LaTeX) and {counted(made['.svg'], 'figure')} (SVG and PDF"
     say(
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
-        f"{counted(tables, 'table')} ({what})."
+        f"{counted(made['.csv'], 'table')} ({what})."
     )
     if not for_paper:
         say_pairs(

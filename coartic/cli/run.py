@@ -224,12 +224,13 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield declaration, parameters and tasks of a method."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
+    from coartic.runs.plan import in_words
 
     applies = (task for task in builtin_tasks() if info.why_not(load_task(task)) is None)
     yield "Method", f"{info.name}: {info.title}"
     yield "Called", title_of(info.name)
     yield "Information", ", ".join(info.information)
-    yield "Parameters", ", ".join(f"{k}={v}" for k, v in info.defaults.items()) or "none"
+    yield "Parameters", in_words(info.defaults) or "none"
     yield "Tasks", ", ".join(applies) or "none of the four"
     yield "Runs", "differ by seed" if info.stochastic else "are all the same"
     yield "Cites", info.citation or "nothing"
@@ -245,6 +246,7 @@ def reproduce(
     from coartic.analysis.words import number
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
+    from coartic.runs.plan import in_words
 
     run = find_run(run_id, folder)
     cell, registered = run.cell, registry(method_file or [])
@@ -259,7 +261,7 @@ def reproduce(
         [
             ("Run", f"{run.id}: {cell.task.label}, {title_of(name)}, run {run.number}"),
             ("Seed", str(run.seed)),
-            ("Parameters", ", ".join(f"{k}={v}" for k, v in cell.parameters.items())),
+            ("Parameters", in_words(cell.parameters)),
             ("Result", result),
         ]
     )

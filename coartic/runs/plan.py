@@ -36,10 +36,12 @@ class Cell:
     def setting(self) -> str:
         """Parameters that differ from the defaults, such as ``noise_sd=0.1``; empty for none."""
         defaults = self.method.defaults
-        return ", ".join(
-            f"{name}={value}"
-            for name, value in self.parameters.items()
-            if name not in defaults or value != defaults[name]
+        return in_words(
+            {
+                name: value
+                for name, value in self.parameters.items()
+                if name not in defaults or value != defaults[name]
+            }
         )
 
     @property
@@ -137,6 +139,11 @@ def hash_of(content: Any) -> str:
     """Return the SHA-256 of plain data, of its JSON with sorted keys, as hex digits."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def in_words(parameters: Mapping[str, Any]) -> str:
+    """Return parameters as a text, such as ``noise_sd=0.1, trials=100``; empty for none."""
+    return ", ".join(f"{name}={value}" for name, value in parameters.items())
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:
