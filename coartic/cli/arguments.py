@@ -43,7 +43,7 @@ MethodFiles = Annotated[
 ]
 
 
-def within(option: str, what: str, least: float, most: float, unit: str = "N") -> Any:
+def within(option: str, what: str, least: float, most: float) -> Any:
     """Return an option for a number from ``least`` to ``most``, a whole number if ``least`` is an
     int. Reading any other value raises CoarticError."""
 
@@ -55,7 +55,7 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
             raise CoarticError(str(error)) from None
         return value
 
-    return typer.Option(option, parser=read, metavar=unit, help=what)
+    return typer.Option(option, parser=read, metavar="N", help=what)
 
 
 def value_in(text: str) -> Any:

@@ -206,91 +206,78 @@ class Run:
         return row | {"suite_seed": self.job.seed, "used": used, "details": details}
 
 
-class _RunColumn(NamedTuple):
-    """A column of view ``runs``, which has a row for each run of the plan."""
-
-    name: str
-    kind: str
-    """Type in SQL, with ``NOT NULL`` if every run has a value."""
-    source: str
-    """Attribute of :class:`Run` that table ``results`` stores; empty for a column of another
-    table."""
-    meaning: str
-    """Sentence of the documentation."""
-
-
-COLUMNS = tuple(
-    _RunColumn(*row)
-    for row in (
-        ("run_id", "TEXT NOT NULL UNIQUE", "id",
-         "hash of all that the result depends on: task, method, parameters, seed and code"),
-        ("suite", "TEXT", "", "name of the suite"),
-        ("task", "TEXT", "", "name of the task"),
-        ("method", "TEXT", "", "id of the method"),
-        ("setting", "TEXT", "", "parameters that are not the defaults"),
-        ("run", "INTEGER NOT NULL", "number", "number of the run, from 0"),
-        ("seed", "INTEGER NOT NULL", "seed", "the same for every method on a task and `run`"),
-        ("status", "TEXT NOT NULL", "outcome.status",
-         "`ok`, `infeasible`, `solver-failed`, `timeout` or `crashed`"),
-        ("reason", "TEXT NOT NULL", "outcome.reason", "why the run is not ok"),
-        ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
-        ("reward", "INTEGER", "solution.reward", "of the solution; of a learner its best trial"),
-        ("replay_reward", "INTEGER", "replay.reward",
-         "of one more trial of a learner, greedy and without noise"),
-        ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),
-        ("initial_reward", "INTEGER", "initial.reward",
-         "of a learner's first trial: the corrective process alone"),
-        ("initial_hands", "TEXT", "initial.hands", "hand of each goal in that trial"),
-        ("best_trial", "INTEGER", "best_trial", "first trial that got `reward`, from 0"),
-        ("trials", "INTEGER", "counts.trials", "physical trials, as many as `--trials` says"),
-        ("initial_trials", "INTEGER", "counts.initial_trials",
-         "trials besides, of the search for the first hands, where the [task](howto/task.md) names "
-         "a rule for them"),
-        ("movement_ticks", "INTEGER", "counts.movement_ticks", "control ticks of all these trials"),
-        ("forward_kinematics", "INTEGER", "counts.forward_kinematics",
-         "evaluations of the forward kinematics"),
-        ("jacobians", "INTEGER", "counts.jacobians", "evaluations of the Jacobian"),
-        ("corrective_iterations", "INTEGER", "counts.corrective_iterations",
-         "iterations of the corrective process"),
-        ("corrections", "INTEGER", "counts.corrections",
-         "corrective movements of all these trials"),
-        ("failed_trials", "INTEGER", "counts.failed_trials", "trials that missed a goal"),
-        ("gradients", "INTEGER", "counts.gradients", "evaluations of a solver's gradient"),
-        ("hessians", "INTEGER", "counts.hessians", "evaluations of a solver's Hessian"),
-        ("solver_iterations", "INTEGER", "counts.solver_iterations", "iterations of a solver"),
-        ("solution_corrections", "INTEGER", "solution.corrections",
-         "corrective movements of the solution"),
-        ("early_corrections", "INTEGER", "early_corrections",
-         "corrective movements in the first tenth of a learner's trials after its first trial"),
-        ("late_corrections", "INTEGER", "late_corrections",
-         "corrective movements in the last tenth"),
-        ("other_arm_travel", "REAL", "solution.other_arm_travel",
-         "joint travel of the arm that is not chosen, rad"),
-        ("build_s", "REAL", "counts.build_s", "seconds of setting up a solver's problems"),
-        ("solve_s", "REAL", "counts.solve_s", "seconds of solving, without compiling"),
-        ("wall_s", "REAL", "outcome.times.wall_s", "seconds of wall time"),
-        ("cpu_s", "REAL", "outcome.times.cpu_s", "seconds of CPU time"),
-        ("warm", "BOOLEAN", "outcome.times.warm",
-         "whether the process had run the method before"),
-        ("together", "INTEGER", "outcome.times.together",
-         "runs that one process made side by side; they share their time evenly"),
-        ("process_peak_mb", "REAL", "outcome.times.process_peak_mb",
-         "most memory of the process so far, MiB"),
-        ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
-        ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
-        ("used", "TEXT NOT NULL", "outcome.used",
-         "declared information that the method used; `a generator of its own` if a method that is "
-         "declared not to be stochastic makes a generator of random numbers"),
-        ("result", "TEXT NOT NULL", "result",
-         "hash of the outcome; runs with the same value are identical"),
-        ("information", "TEXT", "", "information that the method declares"),
-        ("parameters", "TEXT", "", "all parameters of the method, as JSON"),
-        ("commit", "TEXT", "", "commit of the checkout, with + if it was changed since"),
-        ("code", "TEXT", "", "hash of the code that the result comes from"),
-        ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
-    )
+COLUMNS = (
+    ("run_id", "TEXT NOT NULL UNIQUE", "id",
+     "hash of all that the result depends on: task, method, parameters, seed and code"),
+    ("suite", "TEXT", "", "name of the suite"),
+    ("task", "TEXT", "", "name of the task"),
+    ("method", "TEXT", "", "id of the method"),
+    ("setting", "TEXT", "", "parameters that are not the defaults"),
+    ("run", "INTEGER NOT NULL", "number", "number of the run, from 0"),
+    ("seed", "INTEGER NOT NULL", "seed", "the same for every method on a task and `run`"),
+    ("status", "TEXT NOT NULL", "outcome.status",
+     "`ok`, `infeasible`, `solver-failed`, `timeout` or `crashed`"),
+    ("reason", "TEXT NOT NULL", "outcome.reason", "why the run is not ok"),
+    ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
+    ("reward", "INTEGER", "solution.reward", "of the solution; of a learner its best trial"),
+    ("replay_reward", "INTEGER", "replay.reward",
+     "of one more trial of a learner, greedy and without noise"),
+    ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),
+    ("initial_reward", "INTEGER", "initial.reward",
+     "of a learner's first trial: the corrective process alone"),
+    ("initial_hands", "TEXT", "initial.hands", "hand of each goal in that trial"),
+    ("best_trial", "INTEGER", "best_trial", "first trial that got `reward`, from 0"),
+    ("trials", "INTEGER", "counts.trials", "physical trials, as many as `--trials` says"),
+    ("initial_trials", "INTEGER", "counts.initial_trials",
+     "trials besides, of the search for the first hands, where the [task](howto/task.md) names "
+     "a rule for them"),
+    ("movement_ticks", "INTEGER", "counts.movement_ticks", "control ticks of all these trials"),
+    ("forward_kinematics", "INTEGER", "counts.forward_kinematics",
+     "evaluations of the forward kinematics"),
+    ("jacobians", "INTEGER", "counts.jacobians", "evaluations of the Jacobian"),
+    ("corrective_iterations", "INTEGER", "counts.corrective_iterations",
+     "iterations of the corrective process"),
+    ("corrections", "INTEGER", "counts.corrections",
+     "corrective movements of all these trials"),
+    ("failed_trials", "INTEGER", "counts.failed_trials", "trials that missed a goal"),
+    ("gradients", "INTEGER", "counts.gradients", "evaluations of a solver's gradient"),
+    ("hessians", "INTEGER", "counts.hessians", "evaluations of a solver's Hessian"),
+    ("solver_iterations", "INTEGER", "counts.solver_iterations", "iterations of a solver"),
+    ("solution_corrections", "INTEGER", "solution.corrections",
+     "corrective movements of the solution"),
+    ("early_corrections", "INTEGER", "early_corrections",
+     "corrective movements in the first tenth of a learner's trials after its first trial"),
+    ("late_corrections", "INTEGER", "late_corrections",
+     "corrective movements in the last tenth"),
+    ("other_arm_travel", "REAL", "solution.other_arm_travel",
+     "joint travel of the arm that is not chosen, rad"),
+    ("build_s", "REAL", "counts.build_s", "seconds of setting up a solver's problems"),
+    ("solve_s", "REAL", "counts.solve_s", "seconds of solving, without compiling"),
+    ("wall_s", "REAL", "outcome.times.wall_s", "seconds of wall time"),
+    ("cpu_s", "REAL", "outcome.times.cpu_s", "seconds of CPU time"),
+    ("warm", "BOOLEAN", "outcome.times.warm",
+     "whether the process had run the method before"),
+    ("together", "INTEGER", "outcome.times.together",
+     "runs that one process made side by side; they share their time evenly"),
+    ("process_peak_mb", "REAL", "outcome.times.process_peak_mb",
+     "most memory of the process so far, MiB"),
+    ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
+    ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
+    ("used", "TEXT NOT NULL", "outcome.used",
+     "declared information that the method used; `a generator of its own` if a method that is "
+     "declared not to be stochastic makes a generator of random numbers"),
+    ("result", "TEXT NOT NULL", "result",
+     "hash of the outcome; runs with the same value are identical"),
+    ("information", "TEXT", "", "information that the method declares"),
+    ("parameters", "TEXT", "", "all parameters of the method, as JSON"),
+    ("commit", "TEXT", "", "commit of the checkout, with + if it was changed since"),
+    ("code", "TEXT", "", "hash of the code that the result comes from"),
+    ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
 )  # fmt: skip
-"""Columns of view ``runs``: SQL, data frames and documentation follow from this list."""
+"""Columns of view ``runs``, which has a row for each run of the plan; SQL, data frames and
+documentation follow from them. Each has its name; its type in SQL, with ``NOT NULL`` if every run
+has a value; the attribute of :class:`Run` that table ``results`` stores, empty for a column of
+another table; and a sentence of the documentation."""
 
 
 def movement_data(movement: Movement) -> list[Any]:

@@ -63,7 +63,7 @@ _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "b
 _DTYPES: dict[str, Any] = {
     **dict.fromkeys(("hand", "kind", "path"), "string"),
     **dict.fromkeys(("order", "goal", "ticks"), "Int64"),
-    **{column.name: _KINDS[column.kind.split()[0]] for column in COLUMNS},
+    **{name: _KINDS[kind.split()[0]] for name, kind, *_ in COLUMNS},
 }
 """Types of the columns of views in data frames; all have room for missing values."""
 _CELL = TypeAdapter(Cell)
@@ -86,7 +86,7 @@ def _rule(name: str, kind: str) -> str:
 _STORED = ", ".join(
     f"{name} {kind} CHECK ({_rule(name, kind)})" for name, kind, source, _ in COLUMNS if source
 )
-_IN_VIEW = ", ".join(f'"{column.name}"' for column in COLUMNS)
+_IN_VIEW = ", ".join(f'"{name}"' for name, *_ in COLUMNS)
 _SCHEMA = (
     """CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
     environment INTEGER, plan_hash TEXT)""",
