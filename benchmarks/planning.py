@@ -136,7 +136,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     without effect.
     """
     asked = {name: methods_named(name, registered) for name in request.methods}
-    asked |= {name: [name] for name in _unnamed_methods(suite, [*asked.values()], registered)}
+    asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
     of_suite = _suite_jobs(suite, registered, own, task_named, job)
@@ -170,18 +170,15 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     return _distinct_jobs([each for each in chosen if each.numbers])
 
 
-def _unnamed_methods(
-    suite: Suite, asked: Iterable[Sequence[str]], registered: Registry
-) -> list[str]:
-    """Return the ids of methods from files that are not in use: neither the suite nor a request,
-    whose ids are ``asked``, names a method of such a file."""
-    named = {
-        method
-        for block in suite.blocks
-        for name in block.methods
+def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
+    """Return the ids of methods from files that are not in use: neither the suite nor the request
+    names a method of such a file."""
+    files = {
+        registered[method].where
+        for names in (request.methods, *(block.methods for block in suite.blocks))
+        for name in names
         for method in methods_named(name, registered)
-    }.union(*asked)
-    files = {registered[method].where for method in named}
+    }
     return [
         name
         for name, info in registered.items()
@@ -290,13 +287,11 @@ def _extra_jobs(
     """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
     does not have on the tasks of the suite, and all methods on the tasks that the request
     brings."""
-    cells = [each.cell for each in jobs]
-    of_suite = {cell.method.name for cell in cells}
-    tasks = {cell.task.name: cell.task for cell in cells if cell.task.name not in own}
-    there = {(cell.task.name, cell.label) for cell in cells}
+    of_suite = {each.cell.method.name for each in jobs}
+    there = {(each.cell.task.name, each.cell.label) for each in jobs}
     new = [method for method in methods if method.name not in of_suite]
     for task, method in (
-        *itertools.product(tasks.values(), new),
+        *itertools.product(tasks_by_name(each.cell.task for each in jobs).values(), new),
         *itertools.product(own.values(), methods),
     ):
         if (task.name, method.name) not in there and method.why_not(task) is None:
