@@ -57,7 +57,7 @@ def draw(
 
 
 def animate(
-    run: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
+    run: given.RunId,
     out: Annotated[Path, given.file_or_folder("FILE", "Film to write: .gif or .mp4.")] = Path(
         "film.gif"
     ),

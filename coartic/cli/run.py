@@ -237,7 +237,7 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
 
 
 def reproduce(
-    run_id: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
+    run_id: given.RunId,
     folder: given.In = Path("results"),
     method_file: given.MethodFiles = None,
 ) -> None:
