@@ -84,12 +84,10 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
-    jobs_by_digest = {job.cell.digest: job for job in plan}
+    asked = {job.cell.digest: len(job.numbers) for job in plan}
     # Runs of a source are not performed here: their method may have other code here.
     missing = [
-        job
-        for digest, job in jobs_by_digest.items()
-        if not held.issuperset((digest, n) for n in job.numbers)
+        job for job in plan if not held.issuperset((job.cell.digest, n) for n in job.numbers)
     ]
     parts = {**plans, "this command": missing}
     _check_together(plan[0], parts)
@@ -100,23 +98,22 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
     jobs: dict[str, Job] = {}
     for job in itertools.chain(plan, *plans.values()):
         digest = job.cell.digest
-        runs = len(jobs_by_digest[digest].numbers) if digest in jobs_by_digest else 0
+        runs = asked.get(digest, 0)
         while (digest, runs) in held:
             runs += 1
         if runs:
             cell = replace(job.cell, method=methods[job.cell.method.name])
             jobs.setdefault(digest, replace(plan[0], cell=cell, numbers=range(runs)))
-    _warn_of_gaps(plan, plans, jobs)
+    _warn_of_gaps(asked, plans, jobs)
     return list(jobs.values())
 
 
 def _warn_of_gaps(
-    plan: Sequence[Job], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
+    asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of unfinished sources, and of sources that have fewer runs of a cell than the plan asks
-    for of its own cells."""
-    most = max(len(job.numbers) for job in plan)
-    digests = {job.cell.digest for job in plan}
+    for of its own cells; ``asked`` has the numbers of these by digest."""
+    most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
         for job in part:
@@ -124,7 +121,7 @@ def _warn_of_gaps(
             there = len(jobs[digest].numbers) if digest in jobs else 0
             if there < len(job.numbers):
                 lacking.append(job)
-            elif digest not in digests and method.stochastic and there < most:
+            elif digest not in asked and method.stochastic and there < most:
                 few.append(job)
         if lacking:
             words = f"{name} is not finished: it lacks runs of {_named(lacking)}"
