@@ -26,7 +26,7 @@ from coartic.internal.threads import begin_worker, end_group
 from coartic.method import Information, Method
 from coartic.runs.method_info import MethodInfo, answer, load_file, method_info, methods_in
 
-_LIMIT_S = 300.0  # longest wait for an answer: libraries can take long to import
+_ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to import
 _LONGEST_ANSWER = 2**24  # bytes of an answer
 
 
@@ -52,9 +52,9 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     def ask(method: str, question: str, *arguments: Any) -> Any:
         try:
             pipe.send_bytes(json.dumps([method, question, *arguments]).encode())
-            if not pipe.poll(_LIMIT_S):
+            if not pipe.poll(_ANSWER_S):
                 end_group(process.pid)
-                raise CoarticError(f"{shown}: gives no answer within {_LIMIT_S:g} s")
+                raise CoarticError(f"{shown}: gives no answer within {_ANSWER_S:g} s")
             said = json.loads(pipe.recv_bytes(_LONGEST_ANSWER))
         except (OSError, EOFError):
             process.join(1.0)

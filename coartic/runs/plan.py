@@ -10,10 +10,9 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field, SkipValidation
 
 from coartic.errors import CoarticError
 from coartic.model import PAPER
@@ -78,10 +77,10 @@ class Job:
     cell: Cell
     seed: int
     """Seed of the suite."""
-    numbers: SkipValidation[Sequence[int]]
+    numbers: Sequence[int]
     """Numbers of the runs, from 0 within the cell; in a plan a range. A plan of runs 50 to 99 is a
     part of the plan of runs 0 to 99, which a folder states."""
-    time_limit_s: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    time_limit_s: float | None = None
     """CPU time of all these runs together, s."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
