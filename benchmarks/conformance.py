@@ -190,7 +190,6 @@ def _laws_of_runs(
 def _laws_of_declaration(info: MethodInfo) -> list[Law]:
     """Check the declaration of a method: title and citation are there; parameters survive JSON, are
     validated and cannot be changed."""
-    empty = [name for name in ("title", "citation") if not getattr(info, name).strip()]
     parameters, config = info.complete({}), info.rules()["config"]
     again, problems = info.complete(parameters), []
     if again != parameters:
@@ -202,7 +201,7 @@ def _laws_of_declaration(info: MethodInfo) -> list[Law]:
     return [
         _law(
             "declaration",
-            (f"{name} is empty" for name in empty),
+            (f"{n} is empty" for n in ("title", "citation") if not getattr(info, n).strip()),
             f"{info.title}; information: {', '.join(info.information) or 'none'}",
         ),
         _law("parameters", problems, in_words(parameters) or "none"),

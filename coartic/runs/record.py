@@ -154,18 +154,18 @@ class Run:
     def early_corrections(self) -> int | None:
         """Corrective movements in the first tenth of a learner's trials after trial 0; None for
         other methods."""
-        return self._corrections()[1]
+        return self._corrections(1)
 
     @property
     def late_corrections(self) -> int | None:
         """Corrective movements in the last tenth of a learner's trials; None for other methods."""
-        return self._corrections()[-1]
+        return self._corrections(-1)
 
-    def _corrections(self) -> list[int | None]:
-        """Return the corrective movements of a learner in trial 0 and in each tenth of the other
-        trials; blanks for other methods."""
+    def _corrections(self, place: int) -> int | None:
+        """Return the corrective movements of a learner in trial 0 (place 0) or in a tenth of the
+        other trials (places 1 to 10)."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
-        return counts if isinstance(counts, list) and len(counts) == 11 else [None] * 11
+        return counts[place] if isinstance(counts, list) and len(counts) == 11 else None
 
     @property
     def is_downsampled(self) -> bool:
