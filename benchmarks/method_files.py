@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import atexit
 import errno
-import inspect
 import json
 import multiprocessing
 import signal
@@ -132,11 +131,9 @@ def _methods_of_module(
         yield method_info(method, origin, str(file), code)
     if not methods:
         unfinished = [
-            f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"
-            for value in vars(module).values()
-            if inspect.isclass(value) and issubclass(value, Method) and inspect.isabstract(value)
-            and value is not Method
-        ]  # fmt: skip
+            f"{method.__name__} has no {', '.join(sorted(method.__abstractmethods__))}"
+            for method in methods_in(module, abstract=True)
+        ]
         why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
         raise CoarticError(
             f"{origin}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
