@@ -59,7 +59,6 @@ def _runs_asked(value: Any) -> int | range | None:
     return value if is_range or value is None else int(value)
 
 
-_Tasks = tuple[Annotated[Any, PlainValidator(_task_or_name)], ...]
 _Files = tuple[Path, ...]
 _plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.number) else value)
 
@@ -67,7 +66,7 @@ _plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.numb
 class Request(FileData):
     """The part of a suite to run, with its numbers of runs and trials, its seed and its limits."""
 
-    tasks: _Tasks = ()
+    tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
     (Task); by default all tasks of the suite. A task that the suite does not have is run with every
     method of ``methods``, or of the suite, that applies to the task."""

@@ -63,8 +63,7 @@ def find_run(prefix: str, folder: Path) -> Run:
     for place in places:
         with open_store(place) as store:
             runs.append(store.run(run_id))
-    for place, run in zip(places, runs, strict=True):
-        if changes := compare_runs(runs[0], run):
+        if changes := compare_runs(runs[0], runs[-1]):
             where = f"{places[0]} and {place}: {changes[0]}"
             raise CoarticError(f"run {run_id} differs in {where}. Name one folder with --in.")
     return runs[0]
