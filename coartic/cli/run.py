@@ -21,7 +21,6 @@ from coartic.internal.threads import MOST_JOBS
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
-    from coartic.benchmarks.registry import Registry
     from coartic.benchmarks.suites import Suite
     from coartic.runs.method_info import MethodInfo
     from coartic.tasks.families import Family
@@ -142,13 +141,25 @@ def list_(
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
-    registered = registry(method_file or [], with_code=False)
-    if name is None:
-        return say_pairs(_overview(registered))
+    registered, families = registry(method_file or [], with_code=False), shipped_families()
+    if name is None:  # all names, to fit one screen
+        names = given.method_names(registered)
+        return say_pairs(
+            [
+                ("Tasks", ""),
+                *((f"  {task}", load_task(task).label) for task in builtin_tasks()),
+                ("Families", ", ".join(families)),
+                ("Suites", ""),
+                *((f"  {suite}", content.title) for suite, content in suites().items()),
+                ("Methods", ""),
+                *((f"  {method}", names[method]) for method in registered),
+                ("More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"),
+            ]
+        )
     (name,) = given.tasks_meant([name])
     if name.endswith(".toml"):
         check_kind(name, "suite", "task")
-    kind, families, methods = kind_of(name), shipped_families(), list[str]()
+    kind, methods = kind_of(name), list[str]()
     if kind == "suite":
         pairs = _describe_suite(name, load_suite(name))
     elif name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
@@ -161,29 +172,11 @@ def list_(
         except CoarticError as error:
             if not str(error).startswith("unknown"):
                 raise
-            names = [*suites(), *builtin_tasks(), *families, *registered]
-            raise CoarticError(unknown("task, suite, method or family", name, names)) from error
+            every = [*suites(), *builtin_tasks(), *families, *registered]
+            raise CoarticError(unknown("task, suite, method or family", name, every)) from error
         pairs = (pair for each in methods for pair in _describe_method(registered[each]))
     given.check_used(method_file, registered, methods)
     return say_pairs(pairs)
-
-
-def _overview(registered: Registry) -> Iterator[tuple[str, str]]:
-    """Yield the names of tasks, families, suites and methods, to fit one screen."""
-    from coartic import builtin_tasks, load_task
-    from coartic.benchmarks.suites import suites
-    from coartic.tasks.families import shipped_families
-
-    yield "Tasks", ""
-    yield from ((f"  {name}", load_task(name).label) for name in builtin_tasks())
-    yield "Families", ", ".join(shipped_families())
-    yield "Suites", ""
-    for name, suite in suites().items():
-        yield f"  {name}", suite.title
-    yield "Methods", ""
-    names = given.method_names(registered)
-    yield from ((f"  {name}", names[name]) for name in registered)
-    yield "More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
