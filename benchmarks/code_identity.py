@@ -82,7 +82,7 @@ def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]],
             names = tuple(alias.name for alias in node.names)
             imports.append((0, "", names))
             if "coartic" in names:
-                of_api = re.findall(r"\bcoartic\.(\w+)", content.decode())
+                of_api = re.findall(r"\bcoartic\.(\w+)", content.decode(errors="replace"))
         elif isinstance(node, ast.ImportFrom):
             names = tuple(alias.name for alias in node.names)
             imports.append((node.level, node.module or "", ("", *names)))

@@ -28,7 +28,7 @@ from coartic.internal.text import counted
 from coartic.method import METERED
 from coartic.motion.solution import goals_without_target, hint_of
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of
+from coartic.runs.plan import Job, cell_of, in_words
 from coartic.runs.record import Outcome, Run
 from coartic.tasks.task import check_task
 
@@ -76,19 +76,21 @@ def check_method(
         problem = "it applies to none of the tasks, so nothing can be checked"
         return [*laws, Law("solution", False, problem)]
     jobs = {}
-    for kind, seed, budget in (
-        *(("first", 1, None), ("again", 1, None), ("other seed", 2, None)),
-        *(("after others", 1, None), ("budget", 1, _BUDGET)),
+    for kind, seed, budget, chosen in (
+        ("first", 1, None, tasks),
+        ("again", 1, None, tasks),
+        ("other seed", 2, None, tasks),
+        ("after others", 1, None, tasks),
+        ("budget", 1, _BUDGET, tasks),
+        ("hopeless", 1, None, filter(applies, [_hopeless_task(tasks[0])])),
     ):
-        for task in tasks:
+        for task in chosen:
             cell = cell_of(task, info, parameters, trial_budget=budget)
             jobs[kind, task.name] = Job(cell, seed, (0,), _LIMIT_S)
-    for task in filter(applies, [_hopeless_task(tasks[0])]):
-        jobs["hopeless", task.name] = Job(cell_of(task, info, parameters), 1, (0,), _LIMIT_S)
     runs = dict(zip(jobs, perform_in_order([*jobs.values()], verbose=verbose), strict=True))
     last = tasks[-1].name
     runs["elsewhere", last] = next(perform_in_order([jobs["first", last]]))
-    values = ", ".join(f"{key}={value}" for key, value in parameters.items())
+    values = in_words(parameters)
     return [*laws, *_laws_of_runs(info, runs, f" (checked with {values})" if values else "")]
 
 
@@ -98,31 +100,30 @@ def _laws_of_runs(
     """Yield the laws that the runs of a method keep or break; ``runs`` holds the runs by kind and
     task, ``checked_with`` names the parameters in words."""
 
-    def of_kind(kind: str) -> Iterator[tuple[str, Outcome]]:
-        return ((task, run.outcome) for (each, task), run in runs.items() if each == kind)
+    def of_kind(kind: str) -> dict[str, Outcome]:
+        return {task: run.outcome for (each, task), run in runs.items() if each == kind}
 
     def changes(kind: str, how: str) -> Iterator[str]:
-        for task, _ in of_kind(kind):
+        for task in of_kind(kind):
             for change in compare_runs(runs["first", task], runs[kind, task]):
                 yield f"{how.format(task)}: {change}"
 
-    first = dict(of_kind("first"))
-    rewards = ", ".join(f"{task} {runs['first', task].solution.reward}" for task in first)
-    solutions = {task: runs["first", task].solution.movements for task in first}
-    alone = {task: goals_without_target(movements) for task, movements in solutions.items()}
+    first = of_kind("first")
+    solutions = {task: runs["first", task].solution for task in first}
+    rewards = ", ".join(f"{task} {solution.reward}" for task, solution in solutions.items())
     asked = "".join(
         f"\non {task}, only the corrective process moves to goals {', '.join(map(str, goals))}, "
         "which have no target: is this meant?"
-        for task, goals in alone.items()
-        if goals
+        for task, solution in solutions.items()
+        if (goals := goals_without_target(solution.movements))
     )
-    hints = ((task, hint_of(movements)) for task, movements in solutions.items())
     yield _law(
         "solution",
         chain(
             (f"on {task}: {each.status}: {each.reason}" for task, each in first.items()
              if each.reason),
-            (f"on {task}: {hint}" for task, hint in hints if hint),
+            (f"on {task}: {hint}" for task, solution in solutions.items()
+             if (hint := hint_of(solution.movements))),
         ),
         f"executed and scored on {rewards}{checked_with}{asked}",
     )  # fmt: skip
@@ -155,7 +156,7 @@ def _laws_of_runs(
         "limits",
         (
             f"a budget of {_BUDGET} trials on {task}: {each.reason or each.meter}"
-            for task, each in of_kind("budget")
+            for task, each in of_kind("budget").items()
             if each.status not in ("ok", "infeasible")
             or (each.meter and each.meter.trials > _BUDGET)
         ),
@@ -171,7 +172,7 @@ def _laws_of_runs(
     never = [f"declared but never used: {', '.join(sorted(unused))}"] if unused else []
     declared = f"declared and used: {', '.join(sorted(used)) or 'nothing'}"
     yield _law("information", [*undeclared, *never], declared)
-    hopeless = [each for _, each in of_kind("hopeless")]
+    hopeless = [*of_kind("hopeless").values()]
     yield _law(
         "failure",
         (
@@ -189,7 +190,6 @@ def _laws_of_runs(
 def _laws_of_declaration(info: MethodInfo) -> list[Law]:
     """Check the declaration of a method: title and citation are there; parameters survive JSON, are
     validated and cannot be changed."""
-    empty = [name for name in ("title", "citation") if not getattr(info, name).strip()]
     parameters, config = info.complete({}), info.rules()["config"]
     again, problems = info.complete(parameters), []
     if again != parameters:
@@ -198,14 +198,13 @@ def _laws_of_declaration(info: MethodInfo) -> list[Law]:
         problems.append("an unknown parameter is accepted; forbid extra keys")
     if config["frozen"] is not True:
         problems.append("they can be changed after validation; freeze them")
-    values = ", ".join(f"{key}={value}" for key, value in parameters.items())
     return [
         _law(
             "declaration",
-            (f"{name} is empty" for name in empty),
+            (f"{n} is empty" for n in ("title", "citation") if not getattr(info, n).strip()),
             f"{info.title}; information: {', '.join(info.information) or 'none'}",
         ),
-        _law("parameters", problems, values or "none"),
+        _law("parameters", problems, in_words(parameters) or "none"),
     ]
 
 

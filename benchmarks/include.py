@@ -24,15 +24,9 @@ from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
 from coartic.runs.plan import Job, hash_of
-from coartic.runs.record import PREFIXES, Run
+from coartic.runs.record import Run
 from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, open_store, writing
-
-_SCORED = (
-    *(f"{prefix}{name}" for prefix in PREFIXES.values() for name in ("reward", "hands")),
-    "solution_corrections",
-)
-"""Columns of table ``results`` that follow from the solutions of a run."""
 
 
 def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
@@ -90,17 +84,13 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
-    jobs_by_digest = {job.cell.digest: job for job in plan}
+    asked = {job.cell.digest: len(job.numbers) for job in plan}
     # Runs of a source are not performed here: their method may have other code here.
     missing = [
-        job
-        for digest, job in jobs_by_digest.items()
-        if not held.issuperset((digest, n) for n in job.numbers)
+        job for job in plan if not held.issuperset((job.cell.digest, n) for n in job.numbers)
     ]
     parts = {**plans, "this command": missing}
-    _check_together(
-        {name: part[0] for name, part in plans.items()} | {"this command": plan[0]}, parts
-    )
+    _check_together(plan[0], parts)
     methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
     for job in plan:  # failures are performed again where the code is here
         if methods[job.cell.method.name].code == job.cell.method.code:
@@ -108,23 +98,22 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
     jobs: dict[str, Job] = {}
     for job in itertools.chain(plan, *plans.values()):
         digest = job.cell.digest
-        runs = len(jobs_by_digest[digest].numbers) if digest in jobs_by_digest else 0
+        runs = asked.get(digest, 0)
         while (digest, runs) in held:
             runs += 1
         if runs:
             cell = replace(job.cell, method=methods[job.cell.method.name])
             jobs.setdefault(digest, replace(plan[0], cell=cell, numbers=range(runs)))
-    _warn_of_gaps(plan, plans, jobs)
+    _warn_of_gaps(asked, plans, jobs)
     return list(jobs.values())
 
 
 def _warn_of_gaps(
-    plan: Sequence[Job], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
+    asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of unfinished sources, and of sources that have fewer runs of a cell than the plan asks
-    for of its own cells."""
-    most = max(len(job.numbers) for job in plan)
-    digests = {job.cell.digest for job in plan}
+    for of its own cells; ``asked`` has the numbers of these by digest."""
+    most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
         for job in part:
@@ -132,7 +121,7 @@ def _warn_of_gaps(
             there = len(jobs[digest].numbers) if digest in jobs else 0
             if there < len(job.numbers):
                 lacking.append(job)
-            elif digest not in digests and method.stochastic and there < most:
+            elif digest not in asked and method.stochastic and there < most:
                 few.append(job)
         if lacking:
             words = f"{name} is not finished: it lacks runs of {_named(lacking)}"
@@ -152,9 +141,9 @@ def _named(jobs: Sequence[Job]) -> str:
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
-def _check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]) -> None:
-    """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin,
-    ``first`` one job of each part.
+def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
+    """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin;
+    ``first`` stands for a part without jobs.
 
     Raises CoarticError if two parts say different things about the suite, a task, a method or a
     cell.
@@ -166,7 +155,8 @@ def _check_together(first: Mapping[str, Job], parts: Mapping[str, Sequence[Job]]
         if there != value:
             raise CoarticError(f"{what} is {there} in {origin} and {value} in {where}{hint}")
 
-    for where, job in first.items():
+    for where, part in parts.items():
+        job = part[0] if part else first
         agree(where, "the suite", repr(job.suite))
         agree(where, "the seed", job.seed)
         agree(where, "the trial budget", job.cell.trial_budget)
@@ -221,8 +211,9 @@ def _check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) ->
         before, after = run.to_row(), scored.to_row()
         wrong = [
             f"{column} is {after[column]}, not {before[column]}"
-            for column in _SCORED
+            for column in before
             if before[column] != after[column]
+            and column not in ("date", "result", "other_arm_travel")
         ]
         if {run.result, scored.result} != {results[run.id]}:
             wrong.append("a joint, a tick or a trial was changed")

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import atexit
 import errno
-import inspect
 import json
 import multiprocessing
-import re
 import signal
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict
@@ -27,7 +25,7 @@ from coartic.internal.threads import begin_worker, end_group
 from coartic.method import Information, Method
 from coartic.runs.method_info import MethodInfo, answer, load_file, method_info, methods_in
 
-_LIMIT_S = 300.0  # longest wait for an answer: libraries can take long to import
+_ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to import
 _LONGEST_ANSWER = 2**24  # bytes of an answer
 
 
@@ -53,9 +51,9 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     def ask(method: str, question: str, *arguments: Any) -> Any:
         try:
             pipe.send_bytes(json.dumps([method, question, *arguments]).encode())
-            if not pipe.poll(_LIMIT_S):
+            if not pipe.poll(_ANSWER_S):
                 end_group(process.pid)
-                raise CoarticError(f"{shown}: gives no answer within {_LIMIT_S:g} s")
+                raise CoarticError(f"{shown}: gives no answer within {_ANSWER_S:g} s")
             said = json.loads(pipe.recv_bytes(_LONGEST_ANSWER))
         except (OSError, EOFError):
             process.join(1.0)
@@ -118,7 +116,7 @@ def _methods_of_module(
     """Yield the infos of a module's methods, with their code. Raises CoarticError if the module
     defines no method."""
     for method in methods:
-        check_declaration(method, origin)
+        _check_declaration(method, origin)
         try:
             code = code_of(file, tuple(file.parent / name for name in method.files))
         except OSError as error:
@@ -133,30 +131,24 @@ def _methods_of_module(
         yield method_info(method, origin, str(file), code)
     if not methods:
         unfinished = [
-            f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"
-            for value in vars(module).values()
-            if inspect.isclass(value) and issubclass(value, Method) and inspect.isabstract(value)
-            and value is not Method
-        ]  # fmt: skip
+            f"{method.__name__} has no {', '.join(sorted(method.__abstractmethods__))}"
+            for method in methods_in(module, abstract=True)
+        ]
         why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
         raise CoarticError(
             f"{origin}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
         )
 
 
-def check_declaration(method: type[Method], origin: str) -> None:
-    """Check the declaration of a method; ``origin`` is the name of its file in messages. Raises
-    CoarticError if a required attribute is missing or wrong."""
+def _check_declaration(method: type[Method], origin: str) -> None:
+    """Check the declaration of a method but for its id, which the registry checks; ``origin`` is
+    the name of its file in messages. Raises CoarticError if a required attribute is missing or
+    wrong."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)
         if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
             raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
-    if not METHOD_NAME.fullmatch(method.name):
-        raise CoarticError(
-            f"{where}: the name {method.name!r} must begin with a letter or digit and have only "
-            "letters, digits, '.', '_', '+', '/' and '-', such as 'my-search'"
-        )
     information = getattr(method, "information", None)
     if not isinstance(information, frozenset | set) or not all(
         isinstance(i, Information) for i in information
@@ -164,6 +156,3 @@ def check_declaration(method: type[Method], origin: str) -> None:
         raise CoarticError(
             f"{where}: information must be a set of Information, not {information!r}"
         )
-
-
-METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")

@@ -33,7 +33,7 @@ from coartic.internal.limits import (
 from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain_inline, sentence_error
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, trials_in
+from coartic.runs.plan import Job, cell_of, tasks_by_name, trials_in
 from coartic.tasks.families import instance_of, named_by, own_families, read_family
 from coartic.tasks.task import address_of, check_task
 
@@ -59,7 +59,6 @@ def _runs_asked(value: Any) -> int | range | None:
     return value if is_range or value is None else int(value)
 
 
-_Tasks = tuple[Annotated[Any, PlainValidator(_task_or_name)], ...]
 _Files = tuple[Path, ...]
 _plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.number) else value)
 
@@ -67,7 +66,7 @@ _plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.numb
 class Request(FileData):
     """The part of a suite to run, with its numbers of runs and trials, its seed and its limits."""
 
-    tasks: _Tasks = ()
+    tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
     (Task); by default all tasks of the suite. A task that the suite does not have is run with every
     method of ``methods``, or of the suite, that applies to the task."""
@@ -136,7 +135,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     without effect.
     """
     asked = {name: methods_named(name, registered) for name in request.methods}
-    asked |= {name: [name] for name in _unnamed_methods(suite, [*asked.values()], registered)}
+    asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
     of_suite = _suite_jobs(suite, registered, own, task_named, job)
@@ -151,7 +150,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
         ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
     methods = [registered[name] for name in ids]
     jobs += _extra_jobs(jobs, own, methods, job)
-    there = {each.cell.task.name: each.cell.task for each in jobs} | own
+    there = tasks_by_name([*(each.cell.task for each in jobs), *own.values()])
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
         words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
@@ -170,18 +169,15 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     return _distinct_jobs([each for each in chosen if each.numbers])
 
 
-def _unnamed_methods(
-    suite: Suite, asked: Iterable[Sequence[str]], registered: Registry
-) -> list[str]:
-    """Return the ids of methods from files that are not in use: neither the suite nor a request,
-    whose ids are ``asked``, names a method of such a file."""
-    named = {
-        method
-        for block in suite.blocks
-        for name in block.methods
+def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
+    """Return the ids of methods from files that are not in use: neither the suite nor the request
+    names a method of such a file."""
+    files = {
+        registered[method].where
+        for names in (request.methods, *(block.methods for block in suite.blocks))
+        for name in names
         for method in methods_named(name, registered)
-    }.union(*asked)
-    files = {registered[method].where for method in named}
+    }
     return [
         name
         for name, info in registered.items()
@@ -194,7 +190,9 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
     methods = {job.cell.method.name: job.cell.method for job in jobs}
     if request.trials and not any("trials" in each.defaults for each in methods.values()):
         raise CoarticError(f"trials has no effect: no parameter of {', '.join(methods)} is trials")
-    if request.runs not in (None, 1) and not any(each.stochastic for each in methods.values()):
+    if request.runs not in (None, 1, range(1)) and not any(
+        each.stochastic for each in methods.values()
+    ):
         raise CoarticError(
             f"runs has no effect: no run of {', '.join(methods)} depends on a seed, so one is made"
         )
@@ -213,7 +211,7 @@ def _asked_tasks(
     """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
     a function that gives a task by its name.
 
-    A request brings its task files, its tasks, and instances that the suite does not have. Raises
+    A request brings task files, tasks and instances, those that the suite does not have. Raises
     CoarticError for a task whose name belongs to another task.
     """
     for path in request.family_files:
@@ -242,6 +240,8 @@ def _asked_tasks(
             )
         names[task.name] = None
     of_suite = {name for block in suite.blocks for each in block.tasks for name in named_by(each)}
+    files = [load_task(name) for name in of_suite if name.endswith(".toml")]
+    own = {name: task for name, task in own.items() if task not in files}
     brought = (name for name in names if name not in of_suite and address_of(name))
     own |= {name: task_named(name) for name in brought}
     return names, own, task_named
@@ -286,13 +286,11 @@ def _extra_jobs(
     """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
     does not have on the tasks of the suite, and all methods on the tasks that the request
     brings."""
-    cells = [each.cell for each in jobs]
-    of_suite = {cell.method.name for cell in cells}
-    tasks = {cell.task.name: cell.task for cell in cells if cell.task.name not in own}
-    there = {(cell.task.name, cell.label) for cell in cells}
+    of_suite = {each.cell.method.name for each in jobs}
+    there = {(each.cell.task.name, each.cell.label) for each in jobs}
     new = [method for method in methods if method.name not in of_suite]
     for task, method in (
-        *itertools.product(tasks.values(), new),
+        *itertools.product(tasks_by_name(each.cell.task for each in jobs).values(), new),
         *itertools.product(own.values(), methods),
     ):
         if (task.name, method.name) not in there and method.why_not(task) is None:
@@ -326,7 +324,7 @@ def _why_nothing_runs(
 ) -> str:
     """Return a sentence that says why methods have nothing to run: on the first task of ``idle``,
     tasks that a request names and that have no job, or else on the tasks of ``jobs``."""
-    tasks = idle[:1] or list({job.cell.task.name: job.cell.task for job in jobs}.values())
+    tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)
     there_is = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "nothing there"
     why = "; ".join(filter(None, reasons)) or f"suite {suite.name!r} has {there_is}"
@@ -337,16 +335,11 @@ def _why_nothing_runs(
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
     """Return the jobs, one for each cell.
 
-    Raises CoarticError for two tasks of one name, for two numbers of runs of a cell, and for too
-    many trials.
+    Raises CoarticError for two numbers of runs of a cell, and for too many trials.
     """
-    tasks, distinct = dict[str, Task](), dict[str, Job]()
+    distinct = dict[str, Job]()
     for job in jobs:
         cell, where = job.cell, f"{job.cell.task.name} x {job.cell.label}"
-        if tasks.setdefault(cell.task.name, cell.task) != cell.task:  # names distinguish results
-            raise CoarticError(
-                f"two different tasks are called {cell.task.name!r}: give one another name"
-            )
         if trials_in(cell.parameters) > MOST_TRIALS:
             raise CoarticError(
                 f"{where}: {trials_in(cell.parameters):,} trials a run; at most {MOST_TRIALS:,} "

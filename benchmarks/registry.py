@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -27,6 +28,7 @@ from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
 
 _RESERVED = (METHOD_PREFIX, "optimum/")
 """Beginnings of ids that have a meaning in every table; they are reserved for built-in methods."""
+METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
 NAMES = ("CMA-ES", "learner", "optimum")
 """Names of built-in methods that an id of another method must not repeat."""
 
@@ -38,12 +40,14 @@ _INFOS = TypeAdapter(list[MethodInfo])
 def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> dict[str, MethodInfo]:
     """Return every known method by id; ``with_code`` as in :func:`built_in`.
 
-    Raises CoarticError for a file that cannot be loaded or holds no method, and for an id that is
-    reserved or taken.
+    Raises CoarticError for a file that cannot be loaded or holds no method, and as
+    :func:`check_id` does.
     """
     infos = dict(built_in(with_code=with_code))
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
-        add_methods(infos, _methods_of_file(path))
+        for info in _methods_of_file(path):
+            check_id(info.name, info.origin, infos)
+            infos[info.name] = info
     return infos
 
 
@@ -79,22 +83,24 @@ def current_code(where: str, name: str) -> str:
         return code_of(Path(inspect.getfile(importlib.import_module(where))))
 
 
-def add_methods(registered: dict[str, MethodInfo], infos: Iterable[MethodInfo]) -> None:
-    """Add methods to ``registered`` by id. Raises CoarticError for an id that is reserved or taken,
-    or that differs from another name in case alone."""
-    for info in infos:
-        names = (*registered, *EVERY_CONDITION, *NAMES)
-        why = ""
-        if info.name.startswith(_RESERVED):
-            ours = " or ".join(map(repr, _RESERVED))
-            why = f"is reserved: ids that begin with {ours} are this project's"
-        elif info.name in registered:
-            why = f"is already taken ({registered[info.name].origin})"
-        elif info.name.casefold() in map(str.casefold, names):
-            why = "is a name of a method here: choose another"
-        if why:
-            raise CoarticError(f"{info.origin}: method id {info.name!r} {why}")
-        registered[info.name] = info
+def check_id(name: str, origin: str, registered: Registry) -> None:
+    """Raise CoarticError for the id of a method from ``origin`` that has other characters than ids
+    have, is reserved or taken, or differs from another name in case alone."""
+    if not METHOD_NAME.fullmatch(name):
+        raise CoarticError(
+            f"{origin}: the name {name!r} must begin with a letter or digit and have only letters, "
+            "digits, '.', '_', '+', '/' and '-', such as 'my-search'"
+        )
+    why = ""
+    if name.startswith(_RESERVED):
+        ours = " or ".join(map(repr, _RESERVED))
+        why = f"is reserved: ids that begin with {ours} are this project's"
+    elif name in registered:
+        why = f"is already taken ({registered[name].origin})"
+    elif name.casefold() in map(str.casefold, (*registered, *EVERY_CONDITION, *NAMES)):
+        why = "is a name of a method here: choose another"
+    if why:
+        raise CoarticError(f"{origin}: method id {name!r} {why}")
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import zip_longest
@@ -18,7 +19,7 @@ from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.motion.solution import hint_of
 from coartic.runs.plan import Job
-from coartic.runs.record import PARTS, Run, execute_all
+from coartic.runs.record import PARTS, Run, too_long
 from coartic.runs.store import RUNS_FILE, open_store
 from coartic.trajectories import Trajectory, trajectory
 
@@ -26,8 +27,8 @@ from coartic.trajectories import Trajectory, trajectory
 def find_run(prefix: str, folder: Path) -> Run:
     """Find the run whose id begins with ``prefix`` in a results folder or any folder below it.
 
-    Raises CoarticError if there is no such run, or more than one; without such a run also for a
-    folder that cannot be read.
+    Raises CoarticError if there is no such run, or more than one, or one with different results in
+    two folders; without such a run also for a folder that cannot be read.
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-"):
         raise CoarticError(
@@ -40,25 +41,32 @@ def find_run(prefix: str, folder: Path) -> Run:
         raise CoarticError(
             f"cannot read {folder}: {error.strerror}. Name a folder with --in."
         ) from None
-    folder_of, unread = dict[str, Path](), list[CoarticError]()
+    folders_of, unread = defaultdict[str, list[Path]](list), list[CoarticError]()
     for path in sorted(folder.rglob(RUNS_FILE)):
         try:
             with open_store(path.parent) as store:
-                folder_of |= dict.fromkeys(store.ids(prefix), path.parent)
+                for run_id in store.ids(prefix):
+                    folders_of[run_id].append(path.parent)
         except CoarticError as error:
             unread.append(error)
-    if unread and not folder_of:
+    if unread and not folders_of:
         raise unread[0]
-    if not folder_of:
+    if not folders_of:
         raise CoarticError(
             f"there is no run {prefix!r} in {folder}. Name another folder with --in."
         )
-    if len(folder_of) > 1:
-        some = ", ".join(sorted(folder_of)[:4]) + (", ..." if len(folder_of) > 4 else "")
-        raise CoarticError(f"{prefix!r} is the beginning of {len(folder_of)} runs: {some}")
-    ((run_id, place),) = folder_of.items()
-    with open_store(place) as store:
-        return store.run(run_id)
+    if len(folders_of) > 1:
+        some = ", ".join(sorted(folders_of)[:4]) + (", ..." if len(folders_of) > 4 else "")
+        raise CoarticError(f"{prefix!r} is the beginning of {len(folders_of)} runs: {some}")
+    ((run_id, places),) = folders_of.items()
+    runs = list[Run]()
+    for place in places:
+        with open_store(place) as store:
+            runs.append(store.run(run_id))
+        if changes := compare_runs(runs[0], runs[-1]):
+            where = f"{places[0]} and {place}: {changes[0]}"
+            raise CoarticError(f"run {run_id} differs in {where}. Name one folder with --in.")
+    return runs[0]
 
 
 def trajectory_of(run: Run) -> Trajectory:
@@ -69,9 +77,8 @@ def trajectory_of(run: Run) -> Trajectory:
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
     task, movements = run.cell.task, run.solution.movements
     try:
-        (execution,) = execute_all(task, [movements])
-        if isinstance(execution, Exception):
-            raise execution
+        if error := too_long(task, movements):
+            raise error
         return trajectory(task, movements)
     except (SolutionError, ValueError) as error:
         raise CoarticError(f"run {run.id} cannot be shown: {error}") from None

@@ -291,7 +291,7 @@ def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         for first in range(0, len(job.numbers), size):
             yield replace(job, numbers=job.numbers[first : first + size])
 
-    share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), _LEAST_BATCH)
+    share = max(math.ceil(size_of(jobs) / workers), _LEAST_BATCH)
     parts: list[Job] = []
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters

@@ -47,15 +47,17 @@ RunCount = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
 TrialCount = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
 Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
 _Value = Annotated[_Plain, PlainValidator(_plain_value)]
-_Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
+_SOME = Field(min_length=1, max_length=MOST_CELLS)
+_Names = Annotated[tuple[str, ...], _SOME]
+_Number = Annotated[int, Field(ge=1, strict=True)]
 
 
 class Move(FileData):
     """A change that makes several tasks of a task, which differ in the place of one goal."""
 
-    goal: Annotated[int, Field(ge=1, strict=True)]
+    goal: _Number
     """Number of the goal, from 1."""
-    by: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1, max_length=MOST_CELLS)]
+    by: Annotated[tuple[tuple[Finite, Finite], ...], _SOME]
     """Displacements of the goal in x and y, length unit; each makes a task."""
 
 
@@ -71,7 +73,7 @@ class _Block(FileData):
     """Places of one goal; each place makes a task: table ``move``."""
     free_base: Annotated[bool, Field(strict=True)] = False
     """True to free the base in x and y on every task."""
-    goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
+    goals: tuple[_Number, ...] | None = None
     """Numbers of goals that tasks of the block may have; by default any."""
     runs: RunCount | None = None
     """Runs of each method on each task; by default the number of the suite."""
@@ -111,7 +113,7 @@ class Suite(FileData):
     """Trials of a run, for methods that have this parameter."""
     time_limit_s: Seconds | None = 600.0
     """CPU time of a job, s: of one run, or of runs that are performed side by side."""
-    blocks: Annotated[tuple[_Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
+    blocks: Annotated[tuple[_Block, ...], _SOME]
     """Blocks of tasks and methods: tables ``[[blocks]]``."""
 
 

@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike
 from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
-BLACK, BASE_GREY, WHITE = "#000000", "#7a7a7a", "#ffffff"
-HIT = "#009e73"  # of a goal
+_BLACK, _BASE_GREY, _WHITE = "#000000", "#7a7a7a", "#ffffff"
+_HIT = "#009e73"  # of a goal
 MARKERS: dict[Hand, dict[str, Any]] = {
     # Squares are larger than circles, so that hands at one place show both.
-    "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": WHITE},
+    "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": _WHITE},
     "right": {"marker": "o", "markersize": 2.6},
 }
 _CROWDED = 0.6  # times the robot's scale: a goal that near above another has its number
@@ -34,7 +34,7 @@ def draw_robot(
     *,
     weight: float = 1.0,
     alpha: float = 1.0,
-    colour: str = BLACK,
+    colour: str = _BLACK,
 ) -> Callable[[Array], None]:
     """Draw the base and the arms of the task's hands in configuration ``q``, shape ``(dof,)``.
 
@@ -44,7 +44,7 @@ def draw_robot(
     """
     base = Polygon(
         task.robot.base_outline(q),
-        facecolor=(BASE_GREY, 0.25 * alpha),
+        facecolor=(_BASE_GREY, 0.25 * alpha),
         edgecolor=(colour, alpha),
         linewidth=0.6 * weight,
         zorder=1.5,
@@ -71,7 +71,7 @@ def draw_robot(
 
 def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
     """Draw every goal as an open circle of its radius; return the circles, in goal order."""
-    options: Any = {"fill": False, "edgecolor": BLACK, "linewidth": 0.7 * weight, "zorder": 3}
+    options: Any = {"fill": False, "edgecolor": _BLACK, "linewidth": 0.7 * weight, "zorder": 3}
     circles = [Circle(goal, task.radius, **options) for goal in task.goals]
     for circle in circles:
         axes.add_artist(circle)
@@ -81,7 +81,7 @@ def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]
 def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
     """Fill the circles of goals that are hit and empty the others; ``hit`` has a bool for each."""
     for circle, is_hit in zip(circles, np.asarray(hit), strict=True):
-        circle.set(fill=bool(is_hit), facecolor=HIT)
+        circle.set(fill=bool(is_hit), facecolor=_HIT)
 
 
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
@@ -96,8 +96,8 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
         axes.annotate(
             str(index), (x, y + side * task.radius), (0, 1.5 * weight * side),
             textcoords="offset points", ha="center", va="top" if below else "bottom",
-            color=BLACK, zorder=4,
-            bbox={"boxstyle": "square,pad=0", "facecolor": WHITE, "alpha": 0.8, "linewidth": 0},
+            color=_BLACK, zorder=4,
+            bbox={"boxstyle": "square,pad=0", "facecolor": _WHITE, "alpha": 0.8, "linewidth": 0},
             **text,
         )  # fmt: skip
 

@@ -121,7 +121,8 @@ def columns() -> Iterator[str]:
     """Yield the table of the columns of view ``runs``."""
     from coartic.runs.record import COLUMNS
 
-    yield from table(("column", "meaning"), ((f"`{c.name}`", c.meaning) for c in COLUMNS))
+    rows = ((f"`{name}`", meaning) for name, *_, meaning in COLUMNS)
+    yield from table(("column", "meaning"), rows)
 
 
 def play() -> Iterator[str]:

@@ -8,8 +8,7 @@ import pytest
 from coartic import load_task
 from coartic.analysis.citations import STATISTICS, THE_PAPER, bibliography, references
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.benchmarks.method_files import METHOD_NAME
-from coartic.benchmarks.registry import NAMES, built_in, registry
+from coartic.benchmarks.registry import METHOD_NAME, NAMES, built_in, registry
 from coartic.runs.method_info import MethodInfo
 from tests.support.suites import BROKEN, ROOT, cell_on, edit_plan, run_and_write
 

@@ -35,6 +35,7 @@ def option(metavar: str, what: str, *names: str) -> Any:
 ResultsFolder = Annotated[
     Path, typer.Argument(parser=folder_named, metavar="FOLDER", help="Results folder.")
 ]
+RunId = Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")]
 In = Annotated[Path, file_or_folder("FOLDER", "Where to look for the run.", "--in")]
 Out = Annotated[Path | None, file_or_folder("FILE", "File to write.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
@@ -43,7 +44,7 @@ MethodFiles = Annotated[
 ]
 
 
-def within(option: str, what: str, least: float, most: float, unit: str = "N") -> Any:
+def within(option: str, what: str, least: float, most: float) -> Any:
     """Return an option for a number from ``least`` to ``most``, a whole number if ``least`` is an
     int. Reading any other value raises CoarticError."""
 
@@ -55,7 +56,7 @@ def within(option: str, what: str, least: float, most: float, unit: str = "N") -
             raise CoarticError(str(error)) from None
         return value
 
-    return typer.Option(option, parser=read, metavar=unit, help=what)
+    return typer.Option(option, parser=read, metavar="N", help=what)
 
 
 def value_in(text: str) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +30,7 @@ def draw(
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
     from coartic.internal.files import check_ending, check_output, publish, write_output
+    from coartic.runs.plan import tasks_by_name
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
@@ -38,9 +38,7 @@ def draw(
         raise CoarticError("--replace has no effect on a folder, whose pictures are written again")
     meant = given.tasks_meant(tasks or builtin_tasks())
     names = [name for text in meant for name in named_by(text)]
-    chosen = [load_task(name) for name in dict.fromkeys(names)]
-    if twice := [name for name, count in Counter(t.name for t in chosen).items() if count > 1]:
-        raise CoarticError(f"two tasks are called {twice[0]!r}: give one of them another name")
+    chosen = [*tasks_by_name(map(load_task, names)).values()]
     from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
     from coartic.analysis.sections.tasks import picture_of_tasks
 
@@ -59,7 +57,7 @@ def draw(
 
 
 def animate(
-    run: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
+    run: given.RunId,
     out: Annotated[Path, given.file_or_folder("FILE", "Film to write: .gif or .mp4.")] = Path(
         "film.gif"
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -40,14 +41,12 @@ def report(
     with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
         files, failures = write_report(study, out, for_paper=for_paper, watch=say_part)
     say_part("")
-    tables = sum(name.endswith(".csv") for name in files)
-    figures = sum(name.endswith(".svg") for name in files)
-    latex = sum(name.endswith(".tex") for name in files)
-    paper = f"CSV, {latex} as LaTeX) and {counted(figures, 'figure')} (SVG and PDF"
-    what = paper if for_paper else "CSV"
+    made, what = Counter(Path(name).suffix for name in files), "CSV"
+    if for_paper:
+        what = f"CSV, {made['.tex']} as LaTeX) and {counted(made['.svg'], 'figure')} (SVG and PDF"
     say(
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
-        f"{counted(tables, 'table')} ({what})."
+        f"{counted(made['.csv'], 'table')} ({what})."
     )
     if not for_paper:
         say_pairs(
@@ -116,12 +115,12 @@ def verify(
         "Not checked:",
         *(f"- {words}" for words in report.unchecked if not (again and "--again" in words)),
     )
-    different = bool(report.wrong)
+    count = unlike = 0
     if again:
         from coartic.benchmarks.registry import registry
         from coartic.benchmarks.reproduce import perform_some_again
 
-        registered, count, unlike = registry(method_file or []), 0, 0
+        registered = registry(method_file or [])
         with open_store(folder) as store:
             methods = [job.cell.method.name for job in store.plan()]
         given.check_used(method_file, registered, methods)
@@ -131,8 +130,7 @@ def verify(
             for difference in changes:
                 say(f"Run {run_id}, performed again: {difference}")
         say(f"{counted(count, 'run')} performed again: {unlike or 'none'} with another result.")
-        different |= bool(unlike)
-    if different:
+    if report.wrong or unlike:
         sys.exit(1)
 
 

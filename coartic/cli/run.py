@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,7 +21,6 @@ from coartic.internal.threads import MOST_JOBS
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
-    from coartic.benchmarks.registry import Registry
     from coartic.benchmarks.suites import Suite
     from coartic.runs.method_info import MethodInfo
     from coartic.tasks.families import Family
@@ -138,63 +135,48 @@ def list_(
     method_file: given.MethodFiles = None,
 ) -> None:
     """List tasks, suites and methods, or describe one of them."""
+    from coartic import builtin_tasks, load_task
     from coartic.benchmarks.registry import registry
-
-    registered, methods = registry(method_file or [], with_code=False), list[str]()
-    pairs = _overview(registered) if name is None else describe(name, registered)
-    if name is not None:
-        with suppress(CoarticError):  # no method
-            methods = given.methods_meant([name], registered)
-        given.check_used(method_file, registered, methods)
-    say_pairs(pairs)
-
-
-def _overview(registered: Registry) -> Iterator[tuple[str, str]]:
-    """Yield the names of tasks, families, suites and methods, to fit one screen."""
-    from coartic import builtin_tasks, load_task
-    from coartic.benchmarks.suites import suites
-    from coartic.tasks.families import shipped_families
-
-    yield "Tasks", ""
-    yield from ((f"  {name}", load_task(name).label) for name in builtin_tasks())
-    yield "Families", ", ".join(shipped_families())
-    yield "Suites", ""
-    for name, suite in suites().items():
-        yield f"  {name}", suite.title
-    yield "Methods", ""
-    names = given.method_names(registered)
-    yield from ((f"  {name}", names[name]) for name in registered)
-    yield "More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"
-
-
-def describe(name: str, registered: Registry) -> Iterable[tuple[str, str]]:
-    """Return the properties of a task, a suite, a family or a method, as pairs of word and text.
-
-    Raises CoarticError for any other name.
-    """
-    from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
+    registered, families = registry(method_file or [], with_code=False), shipped_families()
+    if name is None:  # all names, to fit one screen
+        names = given.method_names(registered)
+        return say_pairs(
+            [
+                ("Tasks", ""),
+                *((f"  {task}", load_task(task).label) for task in builtin_tasks()),
+                ("Families", ", ".join(families)),
+                ("Suites", ""),
+                *((f"  {suite}", content.title) for suite, content in suites().items()),
+                ("Methods", ""),
+                *((f"  {method}", names[method]) for method in registered),
+                ("More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"),
+            ]
+        )
     (name,) = given.tasks_meant([name])
     if name.endswith(".toml"):
         check_kind(name, "suite", "task")
-    kind, families = kind_of(name), shipped_families()
+    kind, methods = kind_of(name), list[str]()
     if kind == "suite":
-        return _describe_suite(name, load_suite(name))
-    if name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
-        return _describe_task(name, load_task(name))
-    if kind == "shipped family":
-        return _describe_family(families.get(name) or families[f"{name}/v1"])
-    try:
-        ids = given.methods_meant([name], registered)
-    except CoarticError as error:
-        if not str(error).startswith("unknown"):
-            raise
-        names = [*suites(), *builtin_tasks(), *families, *registered]
-        raise CoarticError(unknown("task, suite, method or family", name, names)) from error
-    return itertools.chain(*(_describe_method(registered[id_]) for id_ in ids))
+        pairs = _describe_suite(name, load_suite(name))
+    elif name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
+        pairs = _describe_task(name, load_task(name))
+    elif kind == "shipped family":
+        pairs = _describe_family(families.get(name) or families[f"{name}/v1"])
+    else:
+        try:
+            methods = given.methods_meant([name], registered)
+        except CoarticError as error:
+            if not str(error).startswith("unknown"):
+                raise
+            every = [*suites(), *builtin_tasks(), *families, *registered]
+            raise CoarticError(unknown("task, suite, method or family", name, every)) from error
+        pairs = (pair for each in methods for pair in _describe_method(registered[each]))
+    given.check_used(method_file, registered, methods)
+    return say_pairs(pairs)
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
@@ -235,19 +217,20 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield declaration, parameters and tasks of a method."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
+    from coartic.runs.plan import in_words
 
     applies = (task for task in builtin_tasks() if info.why_not(load_task(task)) is None)
     yield "Method", f"{info.name}: {info.title}"
     yield "Called", title_of(info.name)
     yield "Information", ", ".join(info.information)
-    yield "Parameters", ", ".join(f"{k}={v}" for k, v in info.defaults.items()) or "none"
+    yield "Parameters", in_words(info.defaults) or "none"
     yield "Tasks", ", ".join(applies) or "none of the four"
     yield "Runs", "differ by seed" if info.stochastic else "are all the same"
     yield "Cites", info.citation or "nothing"
 
 
 def reproduce(
-    run_id: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
+    run_id: given.RunId,
     folder: given.In = Path("results"),
     method_file: given.MethodFiles = None,
 ) -> None:
@@ -256,6 +239,7 @@ def reproduce(
     from coartic.analysis.words import number
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
+    from coartic.runs.plan import in_words
 
     run = find_run(run_id, folder)
     cell, registered = run.cell, registry(method_file or [])
@@ -270,7 +254,7 @@ def reproduce(
         [
             ("Run", f"{run.id}: {cell.task.label}, {title_of(name)}, run {run.number}"),
             ("Seed", str(run.seed)),
-            ("Parameters", ", ".join(f"{k}={v}" for k, v in cell.parameters.items())),
+            ("Parameters", in_words(cell.parameters)),
             ("Result", result),
         ]
     )
@@ -346,17 +330,13 @@ def new(
 ) -> None:
     """Write a working method, to be changed into your own."""
     from coartic.benchmarks import template
-    from coartic.benchmarks.method_files import check_declaration
-    from coartic.benchmarks.registry import add_methods, registry
+    from coartic.benchmarks.registry import check_id, registry
     from coartic.internal.files import write_output
-    from coartic.runs.method_info import method_info
 
     path = Path(given.file_name(name)) if out is None else out
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
-    mine = type(name, (template.Mine,), {"name": name})
-    check_declaration(mine, "coartic new")
-    add_methods(registry(with_code=False), [method_info(mine, "coartic new", "", "")])
+    check_id(name, "coartic new", registry(with_code=False))
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     file = quote(str(path))

@@ -165,14 +165,15 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
     raise CoarticError(f"{where} defines no method {name!r}")
 
 
-def methods_in(module: ModuleType) -> list[type[Method]]:
-    """Return the methods that a module itself defines, without abstract classes."""
+def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
+    """Return the methods that a module itself defines; with ``abstract`` its abstract ones, and
+    without all others."""
     return [
         value
         for value in vars(module).values()
         if inspect.isclass(value)
         and issubclass(value, Method)
-        and not inspect.isabstract(value)
+        and inspect.isabstract(value) == abstract
         and value.__module__ == module.__name__
     ]
 

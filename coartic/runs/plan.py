@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field, SkipValidation
 
+from coartic.errors import CoarticError
 from coartic.model import PAPER
 from coartic.runs.method_info import MethodInfo
 from coartic.tasks.task import Task
@@ -35,10 +35,12 @@ class Cell:
     def setting(self) -> str:
         """Parameters that differ from the defaults, such as ``noise_sd=0.1``; empty for none."""
         defaults = self.method.defaults
-        return ", ".join(
-            f"{name}={value}"
-            for name, value in self.parameters.items()
-            if name not in defaults or value != defaults[name]
+        return in_words(
+            {
+                name: value
+                for name, value in self.parameters.items()
+                if name not in defaults or value != defaults[name]
+            }
         )
 
     @property
@@ -75,10 +77,10 @@ class Job:
     cell: Cell
     seed: int
     """Seed of the suite."""
-    numbers: SkipValidation[Sequence[int]]
+    numbers: Sequence[int]
     """Numbers of the runs, from 0 within the cell; in a plan a range. A plan of runs 50 to 99 is a
     part of the plan of runs 0 to 99, which a folder states."""
-    time_limit_s: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    time_limit_s: float | None = None
     """CPU time of all these runs together, s."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
@@ -112,6 +114,16 @@ def cell_of(
     return Cell(task, method, method.complete(parameters), trial_budget)
 
 
+def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
+    """Return tasks by name. Raises CoarticError for two different tasks of one name: names
+    distinguish results."""
+    named = dict[str, Task]()
+    for task in tasks:
+        if named.setdefault(task.name, task) != task:
+            raise CoarticError(f"two tasks are called {task.name!r}: give one of them another name")
+    return named
+
+
 def run_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of a run, from the suite's seed, the task's name and the run's number alone.
 
@@ -126,6 +138,11 @@ def hash_of(content: Any) -> str:
     """Return the SHA-256 of plain data, of its JSON with sorted keys, as hex digits."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def in_words(parameters: Mapping[str, Any]) -> str:
+    """Return parameters as a text, such as ``noise_sd=0.1, trials=100``; empty for none."""
+    return ", ".join(f"{name}={value}" for name, value in parameters.items())
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from operator import attrgetter
 from types import SimpleNamespace
@@ -22,7 +22,6 @@ from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.motion.trial import compiled_task
-from coartic.robot import Array
 from coartic.runs.plan import Cell, Job
 from coartic.tasks.task import Task
 
@@ -155,18 +154,18 @@ class Run:
     def early_corrections(self) -> int | None:
         """Corrective movements in the first tenth of a learner's trials after trial 0; None for
         other methods."""
-        return self._corrections()[1]
+        return self._corrections(1)
 
     @property
     def late_corrections(self) -> int | None:
         """Corrective movements in the last tenth of a learner's trials; None for other methods."""
-        return self._corrections()[-1]
+        return self._corrections(-1)
 
-    def _corrections(self) -> list[int | None]:
-        """Return the corrective movements of a learner in trial 0 and in each tenth of the other
-        trials; blanks for other methods."""
+    def _corrections(self, place: int) -> int | None:
+        """Return the corrective movements of a learner in trial 0 (place 0) or in a tenth of the
+        other trials (places 1 to 10)."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
-        return counts if isinstance(counts, list) and len(counts) == 11 else [None] * 11
+        return counts[place] if isinstance(counts, list) and len(counts) == 11 else None
 
     @property
     def is_downsampled(self) -> bool:
@@ -206,132 +205,79 @@ class Run:
         used = ", ".join(self.outcome.used)
         return row | {"suite_seed": self.job.seed, "used": used, "details": details}
 
-    @classmethod
-    def from_row(
-        cls,
-        row: Mapping[str, Any],
-        cell: Cell,
-        environment: dict[str, Any],
-        movements: Mapping[str, tuple[Movement, ...]],
-        rewards: list[int | None],
-    ) -> Run:
-        """Return a run from its row of table ``results``, its movements by part, and the rewards of
-        its trials.
 
-        Raises ValueError if the id of the row belongs to another run.
-        """
-        meter = {name: row[name] for name in vars(Meter())}
-        outcome = Outcome(
-            row["status"],
-            row["reason"],
-            details=json.loads(row["details"]),
-            used=tuple(filter(None, row["used"].split(", "))),
-            meter=None if row["trials"] is None else Meter(**meter),
-            rewards=rewards,
-            times=Times(**{each.name: row[each.name] for each in fields(Times)}),
-            environment=environment,
-        )
-        scores = {
-            part: Score(row[f"{prefix}reward"], row[f"{prefix}hands"], movements[part])
-            for part, prefix in PREFIXES.items()
-            if movements[part]
-        }
-        if "solution" in scores:
-            scores["solution"] = scores["solution"]._replace(
-                corrections=row["solution_corrections"], other_arm_travel=row["other_arm_travel"]
-            )
-        job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
-        run = cls(job, outcome, scores, row["date"])
-        if (run.id, run.seed) != (row["run_id"], row["seed"]):
-            raise ValueError(f"run {row['run_id']} is not the run that its id says")
-        return run
-
-
-class _RunColumn(NamedTuple):
-    """A column of view ``runs``, which has a row for each run of the plan."""
-
-    name: str
-    kind: str
-    """Type in SQL, with ``NOT NULL`` if every run has a value."""
-    source: str
-    """Attribute of :class:`Run` that table ``results`` stores; empty for a column of another
-    table."""
-    meaning: str
-    """Sentence of the documentation."""
-
-
-COLUMNS = tuple(
-    _RunColumn(*row)
-    for row in (
-        ("run_id", "TEXT NOT NULL UNIQUE", "id",
-         "hash of all that the result depends on: task, method, parameters, seed and code"),
-        ("suite", "TEXT", "", "name of the suite"),
-        ("task", "TEXT", "", "name of the task"),
-        ("method", "TEXT", "", "id of the method"),
-        ("setting", "TEXT", "", "parameters that are not the defaults"),
-        ("run", "INTEGER NOT NULL", "number", "number of the run, from 0"),
-        ("seed", "INTEGER NOT NULL", "seed", "the same for every method on a task and `run`"),
-        ("status", "TEXT NOT NULL", "outcome.status",
-         "`ok`, `infeasible`, `solver-failed`, `timeout` or `crashed`"),
-        ("reason", "TEXT NOT NULL", "outcome.reason", "why the run is not ok"),
-        ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
-        ("reward", "INTEGER", "solution.reward", "of the solution; of a learner its best trial"),
-        ("replay_reward", "INTEGER", "replay.reward",
-         "of one more trial of a learner, greedy and without noise"),
-        ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),
-        ("initial_reward", "INTEGER", "initial.reward",
-         "of a learner's first trial: the corrective process alone"),
-        ("initial_hands", "TEXT", "initial.hands", "hand of each goal in that trial"),
-        ("best_trial", "INTEGER", "best_trial", "first trial that got `reward`, from 0"),
-        ("trials", "INTEGER", "counts.trials", "physical trials, as many as `--trials` says"),
-        ("initial_trials", "INTEGER", "counts.initial_trials",
-         "trials besides, of the search for the first hands, where the [task](howto/task.md) names "
-         "a rule for them"),
-        ("movement_ticks", "INTEGER", "counts.movement_ticks", "control ticks of all these trials"),
-        ("forward_kinematics", "INTEGER", "counts.forward_kinematics",
-         "evaluations of the forward kinematics"),
-        ("jacobians", "INTEGER", "counts.jacobians", "evaluations of the Jacobian"),
-        ("corrective_iterations", "INTEGER", "counts.corrective_iterations",
-         "iterations of the corrective process"),
-        ("corrections", "INTEGER", "counts.corrections",
-         "corrective movements of all these trials"),
-        ("failed_trials", "INTEGER", "counts.failed_trials", "trials that missed a goal"),
-        ("gradients", "INTEGER", "counts.gradients", "evaluations of a solver's gradient"),
-        ("hessians", "INTEGER", "counts.hessians", "evaluations of a solver's Hessian"),
-        ("solver_iterations", "INTEGER", "counts.solver_iterations", "iterations of a solver"),
-        ("solution_corrections", "INTEGER", "solution.corrections",
-         "corrective movements of the solution"),
-        ("early_corrections", "INTEGER", "early_corrections",
-         "corrective movements in the first tenth of a learner's trials after its first trial"),
-        ("late_corrections", "INTEGER", "late_corrections",
-         "corrective movements in the last tenth"),
-        ("other_arm_travel", "REAL", "solution.other_arm_travel",
-         "joint travel of the arm that is not chosen, rad"),
-        ("build_s", "REAL", "counts.build_s", "seconds of setting up a solver's problems"),
-        ("solve_s", "REAL", "counts.solve_s", "seconds of solving, without compiling"),
-        ("wall_s", "REAL", "outcome.times.wall_s", "seconds of wall time"),
-        ("cpu_s", "REAL", "outcome.times.cpu_s", "seconds of CPU time"),
-        ("warm", "BOOLEAN", "outcome.times.warm",
-         "whether the process had run the method before"),
-        ("together", "INTEGER", "outcome.times.together",
-         "runs that one process made side by side; they share their time evenly"),
-        ("process_peak_mb", "REAL", "outcome.times.process_peak_mb",
-         "most memory of the process so far, MiB"),
-        ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
-        ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
-        ("used", "TEXT NOT NULL", "outcome.used",
-         "declared information that the method used; `a generator of its own` if a method that is "
-         "declared not to be stochastic makes a generator of random numbers"),
-        ("result", "TEXT NOT NULL", "result",
-         "hash of the outcome; runs with the same value are identical"),
-        ("information", "TEXT", "", "information that the method declares"),
-        ("parameters", "TEXT", "", "all parameters of the method, as JSON"),
-        ("commit", "TEXT", "", "commit of the checkout, with + if it was changed since"),
-        ("code", "TEXT", "", "hash of the code that the result comes from"),
-        ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
-    )
+COLUMNS = (
+    ("run_id", "TEXT NOT NULL UNIQUE", "id",
+     "hash of all that the result depends on: task, method, parameters, seed and code"),
+    ("suite", "TEXT", "", "name of the suite"),
+    ("task", "TEXT", "", "name of the task"),
+    ("method", "TEXT", "", "id of the method"),
+    ("setting", "TEXT", "", "parameters that are not the defaults"),
+    ("run", "INTEGER NOT NULL", "number", "number of the run, from 0"),
+    ("seed", "INTEGER NOT NULL", "seed", "the same for every method on a task and `run`"),
+    ("status", "TEXT NOT NULL", "outcome.status",
+     "`ok`, `infeasible`, `solver-failed`, `timeout` or `crashed`"),
+    ("reason", "TEXT NOT NULL", "outcome.reason", "why the run is not ok"),
+    ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
+    ("reward", "INTEGER", "solution.reward", "of the solution; of a learner its best trial"),
+    ("replay_reward", "INTEGER", "replay.reward",
+     "of one more trial of a learner, greedy and without noise"),
+    ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),
+    ("initial_reward", "INTEGER", "initial.reward",
+     "of a learner's first trial: the corrective process alone"),
+    ("initial_hands", "TEXT", "initial.hands", "hand of each goal in that trial"),
+    ("best_trial", "INTEGER", "best_trial", "first trial that got `reward`, from 0"),
+    ("trials", "INTEGER", "counts.trials", "physical trials, as many as `--trials` says"),
+    ("initial_trials", "INTEGER", "counts.initial_trials",
+     "trials besides, of the search for the first hands, where the [task](howto/task.md) names "
+     "a rule for them"),
+    ("movement_ticks", "INTEGER", "counts.movement_ticks", "control ticks of all these trials"),
+    ("forward_kinematics", "INTEGER", "counts.forward_kinematics",
+     "evaluations of the forward kinematics"),
+    ("jacobians", "INTEGER", "counts.jacobians", "evaluations of the Jacobian"),
+    ("corrective_iterations", "INTEGER", "counts.corrective_iterations",
+     "iterations of the corrective process"),
+    ("corrections", "INTEGER", "counts.corrections",
+     "corrective movements of all these trials"),
+    ("failed_trials", "INTEGER", "counts.failed_trials", "trials that missed a goal"),
+    ("gradients", "INTEGER", "counts.gradients", "evaluations of a solver's gradient"),
+    ("hessians", "INTEGER", "counts.hessians", "evaluations of a solver's Hessian"),
+    ("solver_iterations", "INTEGER", "counts.solver_iterations", "iterations of a solver"),
+    ("solution_corrections", "INTEGER", "solution.corrections",
+     "corrective movements of the solution"),
+    ("early_corrections", "INTEGER", "early_corrections",
+     "corrective movements in the first tenth of a learner's trials after its first trial"),
+    ("late_corrections", "INTEGER", "late_corrections",
+     "corrective movements in the last tenth"),
+    ("other_arm_travel", "REAL", "solution.other_arm_travel",
+     "joint travel of the arm that is not chosen, rad"),
+    ("build_s", "REAL", "counts.build_s", "seconds of setting up a solver's problems"),
+    ("solve_s", "REAL", "counts.solve_s", "seconds of solving, without compiling"),
+    ("wall_s", "REAL", "outcome.times.wall_s", "seconds of wall time"),
+    ("cpu_s", "REAL", "outcome.times.cpu_s", "seconds of CPU time"),
+    ("warm", "BOOLEAN", "outcome.times.warm",
+     "whether the process had run the method before"),
+    ("together", "INTEGER", "outcome.times.together",
+     "runs that one process made side by side; they share their time evenly"),
+    ("process_peak_mb", "REAL", "outcome.times.process_peak_mb",
+     "most memory of the process so far, MiB"),
+    ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
+    ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
+    ("used", "TEXT NOT NULL", "outcome.used",
+     "declared information that the method used; `a generator of its own` if a method that is "
+     "declared not to be stochastic makes a generator of random numbers"),
+    ("result", "TEXT NOT NULL", "result",
+     "hash of the outcome; runs with the same value are identical"),
+    ("information", "TEXT", "", "information that the method declares"),
+    ("parameters", "TEXT", "", "all parameters of the method, as JSON"),
+    ("commit", "TEXT", "", "commit of the checkout, with + if it was changed since"),
+    ("code", "TEXT", "", "hash of the code that the result comes from"),
+    ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
 )  # fmt: skip
-"""Columns of view ``runs``: SQL, data frames and documentation follow from this list."""
+"""Columns of view ``runs``, which has a row for each run of the plan; SQL, data frames and
+documentation follow from them. Each has its name; its type in SQL, with ``NOT NULL`` if every run
+has a value; the attribute of :class:`Run` that table ``results`` stores, empty for a column of
+another table; and a sentence of the documentation."""
 
 
 def movement_data(movement: Movement) -> list[Any]:
@@ -363,7 +309,7 @@ def movement_from(data: Sequence[Any]) -> Movement:
 
 
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
-    """Return the rewards of trials as bytes, which :func:`rewards_from` reads.
+    """Return the rewards of trials as bytes.
 
     The numbers are the best reward, then for each trial by how much it is worse, plus 1; 0 stands
     for None. All lowest bytes of the numbers come first, then all next bytes: so they pack best.
@@ -372,14 +318,6 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)
     numbers = np.append(best, np.where(np.isnan(values), 0.0, best - values + 1.0))
     return numbers.astype(np.int64).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
-
-
-def rewards_from(content: bytes) -> Array:
-    """Return the rewards of trials from :func:`reward_bytes`, shape ``(trials,)``; NaN stands for
-    None. Raises ValueError for other bytes."""
-    numbers = np.frombuffer(content, np.uint8).reshape(4, -1).T.copy().view("<u4").ravel()
-    best = numbers[:1].view("<i4")
-    return np.where(numbers[1:] == 0, np.nan, best + 1.0 - numbers[1:])
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:

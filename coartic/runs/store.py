@@ -32,19 +32,22 @@ from coartic.internal.files import make_folder
 from coartic.internal.limits import MOST_TRIALS
 from coartic.internal.text import one_line, plain
 from coartic.internal.validation import explain_inline
+from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
-    PARTS,
+    PREFIXES,
+    Outcome,
     Run,
+    Score,
     Status,
+    Times,
     movement_data,
     movement_from,
     reward_bytes,
-    rewards_from,
 )
 from coartic.tasks.task import parse_task
 
@@ -60,7 +63,7 @@ _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "b
 _DTYPES: dict[str, Any] = {
     **dict.fromkeys(("hand", "kind", "path"), "string"),
     **dict.fromkeys(("order", "goal", "ticks"), "Int64"),
-    **{column.name: _KINDS[column.kind.split()[0]] for column in COLUMNS},
+    **{name: _KINDS[kind.split()[0]] for name, kind, *_ in COLUMNS},
 }
 """Types of the columns of views in data frames; all have room for missing values."""
 _CELL = TypeAdapter(Cell)
@@ -83,7 +86,7 @@ def _rule(name: str, kind: str) -> str:
 _STORED = ", ".join(
     f"{name} {kind} CHECK ({_rule(name, kind)})" for name, kind, source, _ in COLUMNS if source
 )
-_IN_VIEW = ", ".join(f'"{column.name}"' for column in COLUMNS)
+_IN_VIEW = ", ".join(f'"{name}"' for name, *_ in COLUMNS)
 _SCHEMA = (
     """CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
     environment INTEGER, plan_hash TEXT)""",
@@ -179,9 +182,7 @@ class Store:
         """Return the plan of the folder, the jobs of its last suite. Raises CoarticError if no plan
         is stored yet."""
         with explain_errors(self.folder):
-            suite = self._one("SELECT * FROM suite")
-            if suite is None:
-                raise CoarticError("it is not finished; repeat the `coartic run` command")
+            suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
                 raise ValueError("the plan is not as it was written")
             return [
@@ -197,11 +198,9 @@ class Store:
 
     def made_with(self) -> dict[str, Any]:
         """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``,
-        by name."""
+        by name. Raises CoarticError if no plan is stored yet."""
         with explain_errors(self.folder):
-            row = self._one(
-                "SELECT content, command, date FROM suite JOIN environments ON id = environment"
-            )
+            row = self._suite()
             how = {"command": json.loads(row["command"]), "date": row["date"]}
             return dict(json.loads(row["content"]) | how)
 
@@ -268,7 +267,8 @@ class Store:
                     ) from None
 
     def run(self, run_id: str) -> Run:
-        """Return a run by its id. Raises CoarticError if the folder has no such run."""
+        """Return a run by its id. Raises CoarticError if the folder has no such run, or if the id
+        belongs to another run."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
@@ -276,19 +276,38 @@ class Store:
             cell = self._read_cell(self._one("SELECT * FROM cells WHERE id = ?", row["cell"]))
             environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
             blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
-            parts: dict[str, list[Movement]] = {part: [] for part in PARTS}
+            rewards = _unpack(blob[0], row["trials"]) if blob else np.empty(0)
+            meter = {name: row[name] for name in vars(Meter())}
+            parts: dict[str, list[Movement]] = {part: [] for part in PREFIXES}
             query = """SELECT part, goal, hand, kind, ticks, path FROM movements
                 WHERE result_id = ? ORDER BY "order\""""
             for part, *data in self._db.execute(query, (row["id"],)):
                 parts[part].append(movement_from(data))
-            rewards = _unpack(blob[0], row["trials"]) if blob else np.empty(0)
-            return Run.from_row(
-                row,
-                cell,
-                json.loads(environment["content"]),
-                {part: tuple(movements) for part, movements in parts.items()},
-                [None if np.isnan(reward) else int(reward) for reward in rewards.tolist()],
+            outcome = Outcome(
+                row["status"],
+                row["reason"],
+                details=json.loads(row["details"]),
+                used=tuple(filter(None, row["used"].split(", "))),
+                meter=None if row["trials"] is None else Meter(**meter),
+                rewards=[None if np.isnan(reward) else int(reward) for reward in rewards.tolist()],
+                times=Times(**{name: row[name] for name in vars(Times())}),
+                environment=json.loads(environment["content"]),
             )
+            scores = {
+                part: Score(row[f"{prefix}reward"], row[f"{prefix}hands"], tuple(parts[part]))
+                for part, prefix in PREFIXES.items()
+                if parts[part]
+            }
+            if "solution" in scores:
+                scores["solution"] = scores["solution"]._replace(
+                    corrections=row["solution_corrections"],
+                    other_arm_travel=row["other_arm_travel"],
+                )
+            job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
+            run = Run(job, outcome, scores, row["date"])
+            if (run.id, run.seed) != (run_id, row["seed"]):
+                raise ValueError(f"run {run_id} is not the run that its id says")
+            return run
 
     def runs(self) -> pd.DataFrame:
         """Return view ``runs`` as a data frame, with nullable types."""
@@ -299,7 +318,7 @@ class Store:
         return self._frame("solutions")
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of a part (:data:`PARTS`) of runs that are ok, by run id.
+        """Return the movements of a part (:data:`PREFIXES`) of runs that are ok, by run id.
 
         Of each cell only the first ``most`` of these runs count.
         """
@@ -325,6 +344,14 @@ class Store:
                 yield run_id, _unpack(blob, trials)
 
     # Rows.
+
+    def _suite(self) -> Any:
+        """Return the row of the last suite, with its environment. Raises CoarticError if there is
+        none."""
+        row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
+        if row is None:
+            raise CoarticError("it is not finished; repeat the `coartic run` command")
+        return row
 
     def _write_run(self, run: Run) -> None:
         """Write a run into the tables, in place of an earlier run with its id."""
@@ -511,7 +538,7 @@ def writing(folder: Path) -> Iterator[Store]:
     with _lock(folder):
         with explain_errors(folder):
             _check_files(folder)
-            opened = _connect(str(folder / RUNS_FILE), WAIT_S)
+            opened = _connect((folder / RUNS_FILE).absolute().as_uri(), WAIT_S)
         with closing(opened) as connection:
             with explain_errors(folder):
                 is_there = _has_tables(connection)  # raises before anything is written
@@ -560,10 +587,8 @@ def _lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
 
 
 def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """Return a connection to a path or a ``file:`` address that waits ``timeout_s`` for a lock."""
-    connection = sqlite3.connect(
-        where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
-    )
+    """Return a connection to a ``file:`` address that waits ``timeout_s`` for a lock."""
+    connection = sqlite3.connect(where, timeout=timeout_s, isolation_level=None, uri=True)
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")
     connection.execute("PRAGMA cell_size_check = ON")
@@ -691,8 +716,9 @@ def _why_not_opened(path: Path) -> str:
 
 
 def _unpack(blob: bytes, trials: int | None) -> Array:
-    """Return the rewards of the trials of a run from table ``learning``, shape ``(trials,)``; NaN
-    stands for a trial that failed or whose reward is not kept.
+    """Return the rewards of the trials of a run from table ``learning``, which holds them packed
+    (:func:`reward_bytes`), shape ``(trials,)``; NaN stands for a trial that failed or whose reward
+    is not kept.
 
     Raises ValueError for damaged rewards, and for more rewards than trials.
     """
@@ -701,6 +727,8 @@ def _unpack(blob: bytes, trials: int | None) -> Array:
         content = zlib.decompressobj().decompress(blob, size + 1)
         if len(content) > size:
             raise ValueError
-        return rewards_from(content)
+        numbers = np.frombuffer(content, np.uint8).reshape(4, -1).T.copy().view("<u4").ravel()
+        best = numbers[:1].view("<i4")
+        return np.where(numbers[1:] == 0, np.nan, best + 1.0 - numbers[1:])
     except (zlib.error, ValueError, TypeError):
         raise ValueError(f"the rewards of {trials} trials are damaged") from None
