@@ -303,7 +303,7 @@ class Study:
         - ``information``: use of the reward, one of three groups;
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
-        - ``headline``: True if the method represents its algorithm;
+        - ``headline``: True if the method, with whatever setting, represents its algorithm;
         - ``under``: label of the method of a setting or ablation, if this method ran; or empty;
         - ``look``: colour and dash in figures.
         """

@@ -66,6 +66,15 @@ def test_a_setting_without_its_method_is_drawn():
     ]
     drawn = FIGURES["ranking"](planted(rows)).data.method
     assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
+    failed = [
+        {**row, "status": "infeasible", "reward": None}
+        if row["method"] == "cma-es/bandit" and not row["setting"] else row
+        for row in rows if row["task"] == TWO or row["setting"] or row["method"] != "cma-es/bandit"
+    ]  # fmt: skip
+    trials = {row["run_id"]: np.array([-900.0, row["reward"]]) for row in failed if row["reward"]}
+    study = planted(failed, rewards=lambda: iter(trials.items()))
+    for name in ("runtimes", "learning-curves"):
+        assert {*FIGURES[name](study).data.method} == {*drawn}
 
 
 def test_the_sentence_of_the_ranking_is_of_methods_on_the_common_tasks():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -11,6 +12,7 @@ import pandas as pd
 from coartic.analysis import standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import EC1, LEARNERS
 from coartic.analysis.sections.costs import improvements
 from coartic.analysis.study import Study, one_by_one, solved
@@ -108,19 +110,19 @@ def learning_curves(study: Study) -> pd.DataFrame:
     ``method`` (label), ``runs`` (number of runs), ``trial`` (from 1), ``best`` (mean over runs, NaN
     until all have a solution), and quartiles of the runs, ``best_low`` and ``best_high``.
     """
-    shown, methods = list[tuple[str, str]](), study.methods
-    drawn = methods.index[methods.headline & (methods.base.isin(CURVES) | ~methods.built_in)]
-    for task in one_by_one(study):
-        keys = [(task, label) for label in drawn if (task, label) in study.cells]
-        labels = [label for _, label in keys if len(solved(study.cells[task, label]))]
-        two_armed = {*LEARNERS} & {*labels} - {EC1}
-        shown += [(task, label) for label in labels if not (two_armed and label == EC1)]
-    learned, curves = improvements(study), [pd.DataFrame()]
-    for task, label in shown:
-        good = solved(study.cells[task, label])
-        runs = good[good.run_id.isin(learned)]
-        if runs.empty:
+    learned, cells, curves = improvements(study), {}, [pd.DataFrame()]
+    for (task, label), every in study.cells.items():
+        runs = solved(every)
+        runs = runs[runs.run_id.isin(learned)]
+        if task in one_by_one(study) and len(runs):
+            cells[task, label] = runs
+    rows = study.methods[study.methods.index.isin([label for _, label in cells])]
+    drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
+    for task, label in itertools.product(one_by_one(study), drawn):
+        two_armed = any((task, learner) in cells for learner in LEARNERS[1:])
+        if (task, label) not in cells or (two_armed and label == EC1):
             continue
+        runs = cells[task, label]
         length = int(runs.trials.min())
         at = np.unique(np.round(np.geomspace(1, length, 120)).astype(np.int64))
         # Until every run has a solution (NaN before) there is no mean of them.

@@ -12,7 +12,7 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.frames import ranking
-from coartic.analysis.method_frame import GROUPS
+from coartic.analysis.method_frame import GROUPS, without_settings
 from coartic.analysis.methods import most_exploring
 from coartic.analysis.sections.costs import improvements
 from coartic.analysis.standings import (
@@ -160,7 +160,7 @@ def ranked(study: Study) -> list[str]:
 def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of every method, a mean over tasks, with its name."""
     rows, tasks = board(study), common_tasks(study)
-    rows = rows[~rows.under.isin(rows.index)].reset_index(names="method")
+    rows = without_settings(rows).reset_index(names="method")
     if not len(rows):
         return None
     shown = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
