@@ -65,7 +65,7 @@ UNITS = {
 @checked_arguments
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the runs with a solution, status ``ok``; the frame itself if all runs have one."""
-    have_one = runs.status == "ok"
+    have_one = runs.status.to_numpy() == "ok"
     return runs if have_one.all() else runs[have_one]
 
 

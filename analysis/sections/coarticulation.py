@@ -123,10 +123,10 @@ def list_signatures(study: Study) -> Rows:
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
-        good = solved(study.cells.get((name, label), study.runs[:0]))
-        if not len(good):
+        cell = study.cells.get((name, label))
+        if cell is None or not len(good := solved(cell)):
             continue
-        rows: dict[str, Row] = {}
+        rows, of_cell = dict[str, Row](), row_of_cell(study, cell)
         best = study.optima.get(name)
         possible = best.reward - study.corrective_best[name] if best else math.nan
         for signature in SIGNATURES:
@@ -148,7 +148,7 @@ def list_signatures(study: Study) -> Rows:
                 row |= mean(gained).columns("gain")
             row |= mean(gained / possible).columns("share") if possible > 0 else {}
             key = " ".join(filter(None, (name, label, hands)))
-            yield key, row_of_cell(study, study.cells[name, label]) | row
+            yield key, of_cell | row
 
 
 AGAINST_GAIN = {

@@ -44,9 +44,9 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
     higher reward than all trials before, and these rewards, ticks; shape ``(n,)`` each."""
     by_run = {}
     for run_id, rewards in study.rewards():
-        best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards))
-        steps = np.flatnonzero(best > np.concatenate([[-np.inf], best[:-1]]))
-        by_run[run_id] = (steps + 1).astype(np.float64), best[steps]
+        best = np.fmax.accumulate(np.append(-np.inf, rewards))  # without NaN
+        trials = 1 + np.flatnonzero(best[1:] > best[:-1])
+        by_run[run_id] = trials.astype(np.float64), best[trials]
     return by_run
 
 

@@ -34,8 +34,9 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 def list_learning(study: Study) -> Rows:
     """List the best reward after each number of trials in :data:`BUDGETS` (mean over runs), for
     methods whose runs on a task all made trials, 100 at least, and have a solution."""
+    learned = improvements(study)
     for (task, label), every in study.cells.items():
-        runs = [improvements(study)[run] for run in every.run_id if run in improvements(study)]
+        runs = [learned[run] for run in every.run_id if run in learned]
         if task not in one_by_one(study) or study.methods.is_search[label]:
             continue
         if not len(every) == len(runs) == len(solved(every)):

@@ -77,8 +77,10 @@ def after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     """Return a copy of runs with the best ``reward`` of the first ``trials`` trials of each, NaN if
     none succeeded; runs without trials keep their reward. Column ``gap`` stays as it is."""
 
+    learned = improvements(study)
+
     def best(run_id: str, reward: float) -> float:
-        numbers, rewards = improvements(study).get(run_id, ([], []))
+        numbers, rewards = learned.get(run_id, ([], []))
         made = int(np.searchsorted(numbers, trials, side="right"))
         return float(rewards[made - 1]) if made else math.nan if len(numbers) else reward
 

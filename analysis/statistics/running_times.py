@@ -99,9 +99,5 @@ def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     for tasks with ``sizes`` runs. The array is cached: do not change it."""
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MOST_RUNS_DRAWN // sum(sizes), 200))
-    drawn = [np.empty((resamples, size), dtype=np.uint8) for size in sizes]
-    for of_task, size in zip(drawn, sizes, strict=True):
-        even = np.full(size, 1 / size)
-        for row in of_task:
-            row[:] = rng.multinomial(size, even)
-    return np.hstack(drawn)
+    drawn = (rng.multinomial(size, np.full(size, 1 / size), resamples) for size in sizes)
+    return np.hstack([of_task.astype(np.uint8) for of_task in drawn])
