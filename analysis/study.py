@@ -51,13 +51,11 @@ CellKey = tuple[str, str]
 
 UNITS = {
     **dict.fromkeys(["reward", "replay_reward", "initial_reward", "best_known"], "ticks"),
-    "movement_ticks": "ticks",
     **dict.fromkeys(["build_s", "solve_s", "wall_s", "cpu_s", "time_limit_s"], "s"),
-    **{
-        "gap": "share of the best known reward",
-        "other_arm_travel": "rad",
-        "process_peak_mb": "MiB",
-    },
+    "movement_ticks": "ticks",
+    "gap": "share of the best known reward",
+    "other_arm_travel": "rad",
+    "process_peak_mb": "MiB",
 }
 """Units of columns of :attr:`Study.runs`, also in its ``attrs["units"]``."""
 

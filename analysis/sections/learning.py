@@ -14,7 +14,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import EC1, LEARNERS
-from coartic.analysis.sections.costs import improvements
+from coartic.analysis.sections.costs import best_after, improvements
 from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Rows, row_of_cell, table
 from coartic.analysis.words import marked
@@ -45,8 +45,7 @@ def list_learning(study: Study) -> Rows:
             continue
         row = row_of_cell(study, every) | {"corrective_best": study.corrective_best[task]}
         for budget in (each for each in BUDGETS if each <= every.trials.min()):
-            best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
-            row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan
+            row[f"after_{budget}"] = np.mean([best_after(run, budget) for run in runs])
         yield f"{task} {label}", row
 
 
@@ -127,8 +126,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
         length = int(runs.trials.min())
         at = np.unique(np.round(np.geomspace(1, length, 120)).astype(np.int64))
         # Until every run has a solution (NaN before) there is no mean of them.
-        steps = [learned[run_id] for run_id in map(str, runs.run_id)]
-        best = np.array([np.append(np.nan, b)[np.searchsorted(t, at, "right")] for t, b in steps])
+        best = np.array([best_after(learned[run_id], at) for run_id in runs.run_id])
         if np.isnan(best).any(axis=0).all():
             continue
         low, high = np.quantile(best, [0.25, 0.75], axis=0)

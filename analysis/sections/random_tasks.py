@@ -12,7 +12,7 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.method_frame import without_settings
-from coartic.analysis.standings import compared, solved_tasks
+from coartic.analysis.standings import compared, solved_tasks, together
 from coartic.analysis.statistics.instances import Scores, other_tasks
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, run_ids, table
@@ -34,19 +34,21 @@ def on_instances(study: Study) -> pd.DataFrame:
     """Return the runs of compared methods on those instances of families on which the method
     solved every run, with the label of the row of the method in column ``method``, by ``place``,
     the number of the instance from 0."""
-    parts = [runs[runs.task.isin(solved_tasks(study, method))].assign(method=method)
-             for method, runs in compared(study).items()]  # fmt: skip
-    every = pd.concat([*parts, study.runs[:0]], ignore_index=True)
+    parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
+             for method, runs in compared(study).items()}  # fmt: skip
+    every = together(study, parts)
     names = itertools.chain.from_iterable(_instances(study).values())
     place = every.task.map({name: number for number, name in enumerate(names)})
     return every[place.notna()].assign(place=place).sort_values("place", kind="stable")
 
 
-def _by_family(runs: pd.DataFrame) -> Scores:
-    """Return the gaps of the runs on each instance, by family; runs as of :func:`on_instances`."""
+def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
+    """Return the gaps of a method's runs on each instance, by family, of the families whose every
+    instance is among the runs, as of :func:`on_instances`."""
     return {
         str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
         for family, of_family in runs.groupby("family", sort=False)
+        if of_family.place.nunique() == len(_instances(study)[str(family)])
     }
 
 
@@ -62,22 +64,18 @@ def list_family_gaps(study: Study) -> Rows:
     ``instances``: on how many it solved every run, and ``missing``: how many others there are, of
     families with two arms, or of all families on which it ran if they have one arm.
     """
-    every, rows = on_instances(study), list[tuple[str, Row]]()
-    sizes = {family: len(names) for family, names in _instances(study).items()}
-    two_armed = {family for family, names in _instances(study).items()
-                 if len(study.tasks[names[0]].hands) > 1}  # fmt: skip
+    every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
+    two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}
     for method, of_method in compared(study).items():
         runs, ran = every[every.method == method], {*of_method.family.dropna()}
-        scores = _by_family(runs)
-        over = two_armed if two_armed & ran else ran
-        solved = sum(len(scores.get(family, ())) for family in over)
-        missing = sum(sizes[family] for family in over) - solved
+        scores, over = _by_family(study, runs), two_armed if two_armed & ran else ran
+        solved = runs[runs.family.isin(over)].place.nunique()
+        missing = sum(len(families[family]) for family in over) - solved
         row: Row = {"method": method, "instances": solved, "missing": missing, "gap": math.nan}
-        scores = {family: part for family, part in scores.items() if len(part) == sizes[family]}
         if two_armed and two_armed <= scores.keys():
             of_two_arms = {family: scores[family] for family in scores if family in two_armed}
             row |= other_tasks(of_two_arms).columns("gap")
-        row |= {f"in {family}": math.nan for family in sizes}
+        row |= {f"in {family}": math.nan for family in families}
         for family, part in scores.items():
             row |= other_tasks({family: part}).columns(f"in {family}")
         if ran:
@@ -101,9 +99,8 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         return None
     parts = []
     for (method, family), part in runs.groupby(["method", "family"], sort=False):
-        scores = _by_family(part)
-        solved_all = len(scores[str(family)]) == len(_instances(study)[str(family)])
-        mean = (other_tasks(scores) if solved_all else Estimate(math.nan)).columns("mean")
+        scores = _by_family(study, part)
+        mean = (other_tasks(scores) if scores else Estimate(math.nan)).columns("mean")
         dots = part.groupby("task", sort=False).gap.mean().reset_index()
         dots = dots.assign(method=str(method), family=str(family), **mean, instances=len(dots))
         parts.append(dots)

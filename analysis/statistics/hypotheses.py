@@ -36,7 +36,7 @@ from coartic.internal.limits import MOST_RUNS, real_array
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
-_MOST_KEPT = 2_000_000  # places in resamples that are kept at once
+_MOST_PLACES = 2_000_000  # places in resamples that are kept at once
 _Count = Annotated[int, 0, MOST_RUNS]
 _Share = Annotated[float, 0.0, 1.0]
 
@@ -82,7 +82,7 @@ def bootstrap_test(
         return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
     observed = difference / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
     sums, variances = np.zeros(resamples), np.zeros(resamples)
-    batches = (_drawn_once if sum(n) * resamples <= _MOST_KEPT else _drawn)(n, resamples)
+    batches = (_kept_places if sum(n) * resamples <= _MOST_PLACES else _places)(n, resamples)
     for sample, part, places in batches:
         drawn = shifted[sample][places]
         means = drawn.mean(axis=0, keepdims=True)
@@ -101,7 +101,7 @@ def bootstrap_test(
     return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
 
 
-def _drawn(
+def _places(
     sizes: tuple[int, ...], resamples: int
 ) -> Iterator[tuple[int, slice, NDArray[np.int64]]]:
     """Yield the number of a sample, a slice of the resamples, and the places of the values that
@@ -114,11 +114,11 @@ def _drawn(
 
 
 @lru_cache(maxsize=16)  # most samples have as many values as another
-def _drawn_once(
+def _kept_places(
     sizes: tuple[int, ...], resamples: int
 ) -> list[tuple[int, slice, NDArray[np.int64]]]:
-    """Return all of :func:`_drawn`, kept for further samples of these sizes: do not change it."""
-    return [*_drawn(sizes, resamples)]
+    """Return all of :func:`_places`, kept for further samples of these sizes: do not change it."""
+    return [*_places(sizes, resamples)]
 
 
 @checked_arguments
