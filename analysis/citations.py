@@ -70,16 +70,16 @@ def bibliography(
             reasons.setdefault(key, []).append(name)
     for key in STATISTICS if analysis else ():
         reasons.setdefault(key, []).append("the analysis")
-    entries = [f"{comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
+    entries = [f"{_comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
     slug = slugs(others)
     for name in others:
         if citation := " ".join(methods[name].citation.split()):
             title = latex(" ".join(methods[name].title.split()) or name)
             declared = _misc(f"method-{slug[name]}", title=title, note=latex(citation))
-            entries.append(f"{comment(f'{name} cites: {citation}')}\n{declared}")
+            entries.append(f"{_comment(f'{name} cites: {citation}')}\n{declared}")
         else:
             words = f"{name}: it declares no citation; ask its authors what to cite"
-            entries.append(comment(words))
+            entries.append(_comment(words))
     return "\n\n".join(entries) + "\n"
 
 
@@ -89,6 +89,6 @@ def _misc(key: str, **fields: str) -> str:
     return "\n".join([f"@misc{{{key},", *lines, "}"])
 
 
-def comment(text: str) -> str:
+def _comment(text: str) -> str:
     """Return a line that BibTeX skips: between entries BibTeX reads nothing but an @."""
     return f"% {one_line(text)}".replace("@", "(at)")

@@ -86,9 +86,10 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float], str]:
     labels = dict[tuple[str, float], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
-        hands = {*solved(study.cells.get((task, label), study.runs[:0])).hands}
-        every = {""} if of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
-        if hands and len(every) == 1:
+        cell = study.cells.get((task, label))
+        hands = {*solved(cell).hands} if cell is not None else set()
+        every = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
+        if len(every) == 1:
             labels.setdefault((every.pop(), _most_trials(study, task, label)), label)
     return labels
 

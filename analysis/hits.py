@@ -17,11 +17,11 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, foreign_file
 from coartic.motion.movement import LARGEST_ENTRY
 
-LARGEST_ANGLE = 20.0
+_LARGEST_ANGLE = 20.0
 """Largest angle, rad; a larger one is taken for degrees and refused."""
-AMBIGUOUS = 2.5
+_AMBIGUOUS = 2.5
 """Turn of a joint between hits, rad, from which its direction is in doubt if angles are wrapped."""
-MOST_TRIALS = 100_000
+_LARGEST_TRIAL = 100_000
 """Largest number of a trial."""
 
 
@@ -146,8 +146,8 @@ def checked_hits(
     is_blank = frame.subject.isna() | (frame.subject.astype(str).str.strip() == "")
     refuse(is_blank, "subject", "needed is a name")
     refuse(~frame.hand.isin(task.hands), "hand", f"needed is {' or '.join(task.hands)}")
-    is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, MOST_TRIALS)
-    refuse(~is_whole, "trial", f"needed is a whole number from 1 to {MOST_TRIALS}")
+    is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, _LARGEST_TRIAL)
+    refuse(~is_whole, "trial", f"needed is a whole number from 1 to {_LARGEST_TRIAL}")
     last = len(task.goals)
     refuse(~frame.goal.isin(range(1, last + 1)), "goal", f"needed is a number from 1 to {last}")
     if not timed:
@@ -164,11 +164,11 @@ def checked_hits(
         refuse(frame[name].abs() > LARGEST_ENTRY, name, far)
     for name in joints[2:]:
         wanted = "angles are in rad: convert degrees with numpy.radians"
-        refuse(frame[name].abs() > LARGEST_ANGLE, name, wanted)
+        refuse(frame[name].abs() > _LARGEST_ANGLE, name, wanted)
     keys = frame.trial * (last + 1) + frame.goal
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
     frame, names = frame.iloc[order].reset_index(drop=True), [names[n] for n in order]
-    if not hint(frame, task, source):
+    if not _hint(frame, task, source):
         _unwrap(frame, task, source, names)
     return frame
 
@@ -177,7 +177,7 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
     """Unwrap the angles of sorted hits in place, hit by hit, each trial from the task's start on.
 
     Warns if angles change. Raises CoarticError if the joint of a subject is wrapped and turns by
-    more than :data:`AMBIGUOUS` between hits: then its direction is in doubt.
+    more than :data:`_AMBIGUOUS` between hits: then its direction is in doubt.
     """
     joints = [*task.robot.joint_names][2:]
     angles = frame[joints].to_numpy(np.float64)
@@ -193,7 +193,7 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
     spread = at_goal.transform("max") - at_goal.transform("min")
     wrapped = pd.DataFrame((added != 0) | (spread.to_numpy() > np.pi))
     doubtful = wrapped.groupby(frame.subject, sort=False).transform("any").to_numpy()
-    doubtful = doubtful & (np.abs(steps) > AMBIGUOUS)
+    doubtful = doubtful & (np.abs(steps) > _AMBIGUOUS)
     for row, joint in np.argwhere(doubtful)[:1]:
         step = steps[row, joint]
         raise CoarticError(
@@ -211,7 +211,7 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
         frame[joints] = plain.to_numpy()
 
 
-def hint(frame: pd.DataFrame, task: Task, source: str) -> bool:
+def _hint(frame: pd.DataFrame, task: Task, source: str) -> bool:
     """Warn if ticks rise from goal to goal in every trial, and if the hand is more than two radii
     from its goal in the median hit. Return True for the second: such angles are not unwrapped."""
     off = np.zeros(len(frame))

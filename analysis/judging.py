@@ -18,7 +18,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
-from coartic.analysis.words import capital, estimate, p_value
+from coartic.analysis.words import capital, interval, p_value
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.internal.arguments import checked_arguments
@@ -133,7 +133,8 @@ def mean_beyond(
     sign = 1.0 if side == "greater" else -1.0
     test, without = _tests_over_tasks(sign * there, sign * bound)
     opposite = max(_tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
-    evidence = f"{sentence.format(estimate(mean(there), 2))} ({counted(len(there), 'task')})"
+    found = interval(mean(there).columns("mean"), "mean", 2)
+    evidence = f"{sentence.format(found)} ({counted(len(there), 'task')})"
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
 

@@ -71,7 +71,7 @@ def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.Dat
             "information": _group_of(of_method),
             "built_in": info.is_ours,
             "stochastic": info.stochastic,
-            "headline": not under and (facts is None or facts.headline),
+            "headline": facts is None or facts.headline,
             "under": under,
             "look": tuple(facts.look) if facts and not setting else (),
         }
@@ -143,14 +143,22 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
         yield label, row["look"] or next(free if row["built_in"] else theirs)
 
 
+def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return those of some rows of :attr:`.Study.methods` that are no settings or ablations of a
+    method among them."""
+    return rows[~rows.under.isin(rows.index)]
+
+
 def headline_methods(rows: pd.DataFrame) -> list[str]:
     """Return the labels of the methods that represent their algorithms, of some rows of
     :attr:`.Study.methods`; all labels if no method does.
 
-    A row that joins conditions of the learner takes the place of the single conditions; of several
-    such rows only the last counts, with the condition that explores most.
+    A setting counts where its method has no row. A row that joins conditions of the learner takes
+    the place of the single conditions; of several such rows only the last counts, with the
+    condition that explores most.
     """
-    kept = rows[rows.headline]
+    kept = without_settings(rows)
+    kept = kept[kept.headline]
     joined = kept[kept.parts.map(len) > 1].groupby("algorithm").tail(1)
     kept = kept[~kept.algorithm.isin(joined.algorithm) | kept.index.isin(joined.index)]
     return [*(kept if len(kept) else rows).index]

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from coartic import Task
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
 
@@ -54,22 +53,12 @@ _WORDS = {
 """Words for parameters, before their values."""
 
 
-def most_exploring(task: Task) -> str:
-    """Return the id of the learner under the condition that explores most on a task."""
-    return EC4 if len(task.hands) > 1 else EC1
-
-
 def title_of(method: str, setting: str = "") -> str:
     """Return the name of a method, given by id, with its setting in words: ``learner EC4``, ``hill
     climbing``, ``CMA-ES (other arm still)``. The name of a method from a file is its id."""
     name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else one_line(method)
-    return f"{name} ({_setting_in_words(setting)})" if setting else name
-
-
-def _setting_in_words(setting: str) -> str:
-    """Write the parameters of a setting, ``noise_sd=0.1``, for people: ``σ 0.1``."""
+    if not setting:
+        return name
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
-    words = [
-        _WORDS[key] + value if key in _WORDS else key + is_ + value for key, is_, value in pairs
-    ]
-    return ", ".join(words).replace("_", " ")
+    words = (_WORDS.get(key, key + equals) + value for key, equals, value in pairs)
+    return f"{name} ({', '.join(words).replace('_', ' ')})"

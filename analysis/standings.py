@@ -6,7 +6,7 @@ which solve another problem.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import pandas as pd
 
@@ -31,11 +31,17 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs of every method but searches for the optimum, by the label of the method's
     row in :attr:`.Study.methods`. Runs on tasks without a best known reward, and runs that lock
     the base, are left out, and so are methods without other runs."""
-    runs = study.runs[study.runs.best_known.notna()]
+    return by_row(study, study.runs[study.runs.best_known.notna()])
+
+
+def by_row(study: Study, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Return runs of a study by the label of the row in :attr:`.Study.methods`, in the order of
+    these rows, without searches for the optimum."""
+    runs = runs.copy(deep=False)
     runs.attrs = {}  # which pandas copies with every selection
-    by_row = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
+    by_label = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
     rows = study.methods.index[~study.methods.is_search]
-    return {method: by_row[method] for method in rows if method in by_row}
+    return {method: by_label[method] for method in rows if method in by_label}
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
@@ -48,6 +54,11 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
     runs = runs[runs.task.isin(tasks)]
     complete = {*runs.task} == tasks and {*runs.label} == {*study.methods.parts[method]}
     return runs if complete else runs[:0]
+
+
+def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return the task and the label of each cell of some runs."""
+    return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
 @cached
@@ -68,12 +79,18 @@ def common_tasks(study: Study) -> tuple[str, ...]:
     return tuple(task for task in study.tasks if task in widest)
 
 
-def common_runs(study: Study) -> pd.DataFrame:
-    """Return the runs of the methods that ran on all :func:`common_tasks`, on these tasks, with the
-    label of the row of :attr:`.Study.methods` in column ``method`` and an empty ``setting``."""
-    tasks = common_tasks(study)
-    parts = [runs_on(study, method, tasks).assign(method=method) for method in compared(study)]
+def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Return runs of rows of :attr:`.Study.methods`, given by label, as one frame, with the label
+    in column ``method`` and an empty ``setting``."""
+    parts = [runs.assign(method=method) for method, runs in by_method.items()]
     return pd.concat([*parts, study.runs[:0]], ignore_index=True).assign(setting="")
+
+
+def common_runs(study: Study) -> pd.DataFrame:
+    """Return the runs of the methods that ran on all :func:`common_tasks`, on these tasks, as of
+    :func:`together`."""
+    tasks = common_tasks(study)
+    return together(study, {method: runs_on(study, method, tasks) for method in compared(study)})
 
 
 @cached
@@ -90,7 +107,7 @@ def board(study: Study) -> pd.DataFrame:
     for method, every in compared(study).items():
         on_solved = every[every.task.isin(solved_tasks(study, method))]
         if len(on_solved) and method not in there and not methods.built_in[method]:
-            parts.append(ranking(on_solved.assign(method=method, setting="")))
+            parts.append(ranking(together(study, {method: on_solved})))
     rows = pd.concat(parts) if parts else pd.DataFrame(columns=["gap", "share", "runs"])
     return rows[rows.gap.notna()].sort_values("gap", kind="stable").join(methods)
 

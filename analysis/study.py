@@ -51,13 +51,11 @@ CellKey = tuple[str, str]
 
 UNITS = {
     **dict.fromkeys(["reward", "replay_reward", "initial_reward", "best_known"], "ticks"),
-    "movement_ticks": "ticks",
     **dict.fromkeys(["build_s", "solve_s", "wall_s", "cpu_s", "time_limit_s"], "s"),
-    **{
-        "gap": "share of the best known reward",
-        "other_arm_travel": "rad",
-        "process_peak_mb": "MiB",
-    },
+    "movement_ticks": "ticks",
+    "gap": "share of the best known reward",
+    "other_arm_travel": "rad",
+    "process_peak_mb": "MiB",
 }
 """Units of columns of :attr:`Study.runs`, also in its ``attrs["units"]``."""
 
@@ -65,7 +63,7 @@ UNITS = {
 @checked_arguments
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the runs with a solution, status ``ok``; the frame itself if all runs have one."""
-    have_one = runs.status == "ok"
+    have_one = runs.status.to_numpy() == "ok"
     return runs if have_one.all() else runs[have_one]
 
 
@@ -303,7 +301,7 @@ class Study:
         - ``information``: use of the reward, one of three groups;
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
-        - ``headline``: True if the method represents its algorithm;
+        - ``headline``: True if the method, with whatever setting, represents its algorithm;
         - ``under``: label of the method of a setting or ablation, if this method ran; or empty;
         - ``look``: colour and dash in figures.
         """

@@ -15,7 +15,6 @@ from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
     from coartic import Task
-    from coartic.estimates import Estimate
 
 _LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
 _Digits = Annotated[int, 0, 30]
@@ -93,11 +92,6 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-def estimate(value: Estimate, digits: int | None = None) -> str:
-    """Write an estimate with its interval, ``2.1 [1.3, 2.9]``; ``digits`` as in :func:`number`."""
-    return f"{number(value.value, digits)} {in_brackets(value.low, value.high, digits)}".strip()
-
-
 @checked_arguments
 def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
     """Write a number of a table with its interval.
@@ -164,6 +158,11 @@ def tally(counts: Mapping[Any, int]) -> str:
     """Write counts by name, ``LRLR 17, RRLR 3``, the largest first; a dash without counts."""
     ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{name} {count}" for name, count in ordered) or NONE
+
+
+def commonest(reasons: Iterable[str]) -> list[str]:
+    """Write the three commonest reasons with their numbers, ``12 × no hit``."""
+    return [f"{count} × {reason}" for reason, count in Counter(reasons).most_common(3)]
 
 
 def listed(words: Iterable[str]) -> str:

@@ -64,3 +64,5 @@ def test_given_tasks_are_strata():
     error = math.sqrt(sum(of_task.var() / 20 for of_task in runs)) / 4
     assert mean.high - mean.low == pytest.approx(2 * 1.96 * error, rel=0.1)
     assert task_mean([[1.0] * 4, [5.0] * 40]).value == 3.0  # each counts the same
+    with pytest.raises(ValueError, match="needed is a sample at least"):
+        task_mean([])

@@ -54,12 +54,22 @@ def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
 
 
 def test_a_setting_without_its_method_is_drawn():
-    study = planted(
-        behind([TWO, THREE], "cma-es/bandit", 10, 11, None),
-        behind([TWO, THREE], "cma-es/bandit", 20, 21, 22, setting="sigma=0.1"),
-        behind([TWO, THREE], "hill-climbing", 15, 14, 13),
-    )
-    assert [*FIGURES["ranking"](study).data.method] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
+    rows = [
+        *behind([TWO, THREE], "cma-es/bandit", 10, 11, None),
+        *behind([TWO, THREE], "cma-es/bandit", 20, 21, 22, setting="sigma=0.1"),
+        *behind([TWO, THREE], "hill-climbing", 15, 14, 13),
+    ]
+    drawn = FIGURES["ranking"](planted(rows)).data.method
+    assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
+    failed = [
+        {**row, "status": "infeasible", "reward": None}
+        if row["method"] == "cma-es/bandit" and not row["setting"] else row
+        for row in rows if row["task"] == TWO or row["setting"] or row["method"] != "cma-es/bandit"
+    ]  # fmt: skip
+    trials = {row["run_id"]: np.array([-900.0, row["reward"]]) for row in failed if row["reward"]}
+    study = planted(failed, rewards=lambda: iter(trials.items()))
+    for name in ("runtimes", "learning-curves"):
+        assert {*FIGURES[name](study).data.method} == {*drawn}
 
 
 def test_the_sentence_of_the_ranking_is_of_methods_on_the_common_tasks():

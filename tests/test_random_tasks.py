@@ -1,5 +1,6 @@
 """What holds over instances of families: gaps, contrasts and signatures, on planted rewards."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -12,7 +13,7 @@ from coartic.analysis.standings import reference
 from coartic.analysis.study import one_by_one
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
-from tests.support.made_up import made, runs_of, study_of
+from tests.support.made_up import MadeUp, made, runs_of, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 FEW = (*ONE, "two-armed/v1", "long/v1")
@@ -86,6 +87,18 @@ def test_gaps_have_intervals_in_each_family():
         value, low, high = (row[f"in {family}{ending}"] for ending in ("", "_low", "_high"))
         assert value == pytest.approx((40 + 3.5) / 500)
         assert 40 / 500 < low < value < high < 47 / 500
+
+
+def test_a_method_that_failed_on_an_instance_has_no_gap_in_its_family():
+    study = rewarded(RISING, families=TWO)
+    study.runs.loc[(study.runs.task == "long/v1/i002") & (study.runs.label == EC4), "reward"] = None
+    again = MadeUp(study, optima=study.optima)
+    table = pd.DataFrame(dict(random_tasks.list_family_gaps.rows(again))).T
+    row = table.loc[EC4]
+    assert (row.instances, row.missing) == (len(TWO) * COUNT - 1, 1)
+    assert np.isnan([row["gap"], row["in long/v1"]]).all()
+    assert row["in aligned/v1"] == pytest.approx(40 / 500)
+    assert table.missing[[EC2, EC3]].tolist() == [0, 0]
 
 
 @pytest.mark.parametrize(

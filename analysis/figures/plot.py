@@ -15,6 +15,7 @@ from typing import Any
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib import style as styles
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from coartic import Task
@@ -130,9 +131,21 @@ def picture(drawing: Figure, ending: str) -> bytes:
     """
     if ending not in FORMATS:
         raise CoarticError(f"a picture ends in {', '.join(FORMATS)}; not in {brief_value(ending)}")
-    stream, dated = io.BytesIO(), {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}
-    with rc_context(style.RC), environment(_NO_DATE):
-        drawing.savefig(stream, format=ending[1:], dpi=300, metadata={dated[ending]: None})
+    dated = {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}[ending]
+    return _saved(drawing, style.RC, format=ending[1:], dpi=300, metadata={dated: None})
+
+
+def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
+    """Return a figure as the bytes of a file, with settings of Matplotlib and arguments of
+    ``Figure.savefig``, which would draw the whole figure once more to place its parts."""
+    stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
+    with rc_context(settings), environment(_NO_DATE):
+        if layout is not None:
+            FigureCanvasSVG(drawing)  # its fonts are measured
+            layout.execute(drawing)
+            drawing.set(layout_engine=None, dpi=dpi)
+        drawing.savefig(stream, **how)
+    drawing.set_layout_engine(layout)
     return stream.getvalue()
 
 
@@ -150,11 +163,10 @@ def for_page(plot: Plot) -> str:
         cut = re.sub(r"(\.\d)\d+", r"\1", attribute[0])
         return re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut) if cut.startswith("d=") else cut
 
-    stream = io.StringIO()
     none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-    with rc_context({**style.RC, "svg.fonttype": "none"}), environment(_NO_DATE):
-        plot.figure.savefig(stream, format="svg", transparent=True, metadata=none)
-    text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, stream.getvalue())
+    settings = {**style.RC, "svg.fonttype": "none"}
+    text = _saved(plot.figure, settings, format="svg", transparent=True, metadata=none).decode()
+    text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, text)
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
     text = re.sub(rf' id="{style.TIP}([^"]*)">', r"><title>\1</title>", text)
     text = re.sub(r' id="[\w.]+_\d+"', "", text)  # of elements that nothing refers to

@@ -18,7 +18,16 @@ from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.standings import common_tasks, reference
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import is_setting
-from coartic.analysis.words import NO_BREAK, interval, listed, marked, number, p_value, tally
+from coartic.analysis.words import (
+    NO_BREAK,
+    commonest,
+    interval,
+    listed,
+    marked,
+    number,
+    p_value,
+    tally,
+)
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
@@ -59,11 +68,9 @@ def attempt(
 
 def finding(study: Study, section: Section) -> list[str]:
     """Return the lines of a section's sentence, filled in; none without sentence or rows for it."""
-    frame = section.tables[0](study)
-    label = frame.method if "method" in frame else frame.index.to_series()
-    rows = frame.assign(title=label.map(study.methods.title))[~is_setting(frame)]
-    if not section.sentence or not len(rows):
+    if not section.sentence or not len(frame := section.tables[0](study)):
         return []
+    rows = frame.assign(title=frame.method.map(study.methods.title))[~is_setting(frame)]
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "counts": lambda each: tally(Counter(each))}
     environment.globals |= {
@@ -77,8 +84,7 @@ def finding(study: Study, section: Section) -> list[str]:
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
     """Return the first two rows of a table, and the rows of the paper's learner (EC1, EC4) and of
     random search, each row a dict."""
-    label = rows.method if "method" in rows else rows.index.to_series()
-    kept = label.isin([*label[:2], joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH])
+    kept = rows.method.isin([*rows.method[:2], joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH])
     return rows[kept].to_dict("records")
 
 
@@ -92,13 +98,12 @@ def limits(study: Study) -> dict[str, Any]:
     fewest = min((len(of) for (_, label), of in study.cells.items() if papers[label]), default=RUNS)
     tasks = list(one_by_one(study).values())
     optima = [(task, study.optima.get(task.name)) for task in tasks]
-    reasons = Counter(map(str, failed.reason.fillna(""))).most_common(3)
-    others = len(failed) - sum(count for _, count in reasons)
+    reasons = failed.reason.fillna("")
+    others = len(failed) - sum(reasons.value_counts()[:3])
     return {
         "runs": len(runs),
         "failed": len(failed),
-        "reasons": [f"{count} × {reason}" for reason, count in reasons]
-        + [f"{others} for other reasons"] * bool(others),
+        "reasons": commonest(reasons) + [f"{others} for other reasons"] * bool(others),
         "reconstructed": [task.label for task in tasks if task.reconstructed],
         "trials": sorted(trials) if trials != {TRIALS} else [],
         "few": fewest if fewest < RUNS else 0,

@@ -65,7 +65,7 @@ def write_report(
         if head and f'-results" content="{home}"' not in html.unescape(head):
             raise CoarticError(f"{folder} holds the report of other results: choose another folder")
     failures: dict[str, str] = {}
-    files = {"report.html": page(study, home, failures, watch).encode()}
+    files = {"report.html": _page(study, home, failures, watch).encode()}
     names = {table.id: section.title for section in SECTIONS for table in section.tables}
     for name, table in TABLES.items():
         made = about.attempt(
@@ -136,7 +136,7 @@ def stamp(runs: pd.DataFrame) -> str:
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
-def page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str], object]) -> str:
+def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str], object]) -> str:
     """Return the page in HTML, which needs no other file and no network.
 
     ``home`` is the path from the page's folder to the results. ``failures`` gets the errors of

@@ -13,7 +13,7 @@ from typing import Any
 from coartic.analysis.control import contexts_of_control
 from coartic.analysis.sections.coarticulation import shared_goal
 from coartic.analysis.sections.own import own_methods
-from coartic.analysis.standings import compared
+from coartic.analysis.standings import cells_of, compared
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, solved, typical_run
 from coartic.analysis.table import SHORT_ID
 from coartic.play.page import player_figure, preset_of
@@ -25,7 +25,8 @@ def player(study: Study) -> str:
 
     The figure has a preset for each task, with the run nearest the median reward of each method
     that moves straight. The first preset is the goal that two tasks share, if two tasks do, with
-    the standardised posture difference of random search there.
+    the standardised posture difference of random search there. The method shown first is the method
+    from a file with the smallest gap, or else the method at the shared goal, or the first one.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
@@ -48,32 +49,26 @@ def player(study: Study) -> str:
     presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]
     if not presets:
         return ""
-    begin = _first_shown(study, presets, first)
+    ids = [[run["id"] for run in preset["runs"]] for preset in presets]
+    own = (
+        {"preset": number, "who": method}
+        for method in own_methods(study)
+        for number, there in enumerate(ids)
+        if method in there
+    )
     where = {name: presets.index(preset) for name, preset in alone.items()}
     return player_figure(
         presets,
         page=None,
         folder=quote(str(study.folder)),
-        first=begin,
+        first=next(own, {"who": first if first in ids[0] else ids[0][0]}),
         cells=[
             (method, f"on {task}", {"preset": where[task], "who": label})
             for method, runs in compared(study).items()
-            for task, label in runs[["task", "label"]].drop_duplicates().to_numpy()
+            for task, label in cells_of(runs)
             if task in where and label in {run["id"] for run in alone[task]["runs"]}
         ],
     )
-
-
-def _first_shown(study: Study, presets: list[dict[str, Any]], preferred: str) -> dict[str, Any]:
-    """Return the label of the method shown first (``who``): the method from a file with the
-    smallest gap, with the number of its ``preset``, from 0; or else the ``preferred`` method if the
-    first preset has it, or else the first method there."""
-    ids = [[run["id"] for run in preset["runs"]] for preset in presets]
-    for method in own_methods(study):
-        for number, played in enumerate(ids):
-            if method in played:
-                return {"preset": number, "who": method}
-    return {"who": preferred if preferred in ids[0] else ids[0][0]}
 
 
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
@@ -99,8 +94,8 @@ def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
 
     Empty if the cell has no solution, or a solution that follows a path.
     """
-    good = solved(study.cells.get(key, study.runs[:0]))[:MOST_EXECUTED]
-    if not len(good):
+    cell = study.cells.get(key)
+    if cell is None or not len(good := solved(cell)[:MOST_EXECUTED]):
         return {}
     run, stored = typical_run(good), study.movements("solution")
     if any(movement.kind == "path" for each in good.run_id for movement in stored[each]):

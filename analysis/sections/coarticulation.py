@@ -17,12 +17,12 @@ from matplotlib.patheffects import withStroke
 from coartic.analysis.control import contexts_of_control, selects, with_control
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.method_frame import headline_methods, with_joined_learners
+from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.standings import common_tasks
+from coartic.analysis.standings import by_row, common_tasks
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
@@ -89,7 +89,7 @@ def list_contexts(study: Study) -> Rows:
                 "distance": shared.posture_difference,
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
-                **(control := beside_control(study, shared)),
+                **(control := _beside_control(study, shared)),
                 "verdict": verdict_of(study, shared, control, adjusted),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
@@ -123,10 +123,10 @@ def list_signatures(study: Study) -> Rows:
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
-        good = solved(study.cells.get((name, label), study.runs[:0]))
-        if not len(good):
+        cell = study.cells.get((name, label))
+        if cell is None or not len(good := solved(cell)):
             continue
-        rows: dict[str, Row] = {}
+        rows, of_cell = dict[str, Row](), row_of_cell(study, cell)
         best = study.optima.get(name)
         possible = best.reward - study.corrective_best[name] if best else math.nan
         for signature in SIGNATURES:
@@ -148,7 +148,7 @@ def list_signatures(study: Study) -> Rows:
                 row |= mean(gained).columns("gain")
             row |= mean(gained / possible).columns("share") if possible > 0 else {}
             key = " ".join(filter(None, (name, label, hands)))
-            yield key, row_of_cell(study, study.cells[name, label]) | row
+            yield key, of_cell | row
 
 
 AGAINST_GAIN = {
@@ -171,11 +171,9 @@ def _against_gain(study: Study) -> pd.DataFrame:
     signatures = {name: study.signature(name) for name in AGAINST_GAIN}
     runs = solved(study.runs.assign(gain=gain, **signatures))
     columns, tasks, rows = ["gain", *AGAINST_GAIN], common_tasks(study), []
-    by_method = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
-    for method in study.methods.index[~study.methods.is_search]:
-        of_method = by_method.get(method, runs[:0])
+    for method, of_method in by_row(study, runs).items():
         of_tasks = of_method.groupby("task")[columns].mean().reindex([*tasks])
-        if len(of_method) and tasks and of_tasks.gain.notna().all():
+        if tasks and of_tasks.gain.notna().all():
             name, _, setting = method.partition(" ")
             others = [part for part in setting.split(", ") if not part.startswith("trials=")]
             row: Row = {"method": method, "base": f"{name} {', '.join(others)}".strip()}
@@ -223,7 +221,7 @@ def verdict_of(
     """Return in words whether the posture at a shared goal depends on the next goal.
 
     For stochastic methods by the permutation test; methods that select their solution from trials
-    are compared with random search, too. ``control`` is the result of :func:`beside_control` for
+    are compared with random search, too. ``control`` is the result of :func:`_beside_control` for
     ``shared``; None: computed here. ``p`` is the p-value corrected for all shared goals of the
     method; NaN: that of ``shared`` alone.
     """
@@ -237,14 +235,14 @@ def verdict_of(
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"
-    control = beside_control(study, shared) if control is None else control
+    control = _beside_control(study, shared) if control is None else control
     beyond = control.get("p_random_search", math.nan)
     if math.isnan(beyond):
         return "undecided: too few runs of random search"
     return "different postures" if beyond < LEVEL else "no more than random search"
 
 
-def beside_control(study: Study, shared: TwoContexts) -> Row:
+def _beside_control(study: Study, shared: TwoContexts) -> Row:
     """Return the posture difference of random search in the same two contexts (``control``), the
     number of its runs (``control_runs``), and the p-value of the test that the method's difference
     exceeds it (``p_random_search``); empty without such a control."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -44,10 +45,17 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
     higher reward than all trials before, and these rewards, ticks; shape ``(n,)`` each."""
     by_run = {}
     for run_id, rewards in study.rewards():
-        best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards))
-        steps = np.flatnonzero(best > np.concatenate([[-np.inf], best[:-1]]))
-        by_run[run_id] = (steps + 1).astype(np.float64), best[steps]
+        best = np.fmax.accumulate(np.append(-np.inf, rewards))  # without NaN
+        trials = 1 + np.flatnonzero(best[1:] > best[:-1])
+        by_run[run_id] = trials.astype(np.float64), best[trials]
     return by_run
+
+
+def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
+    """Return the best reward after numbers of trials, shape as of ``trials``, for a run of
+    :func:`improvements`; NaN before its first reward."""
+    numbers, rewards = steps
+    return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
 
 
 @cached
@@ -130,8 +138,7 @@ def _times_on_tasks(
     study: Study, runs: pd.DataFrame, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> list[Array]:
     """Return :func:`times_of` for each task on which some runs of a method were made."""
-    pairs = runs[["task", "label"]].drop_duplicates().to_numpy()
-    return [times_of(study, task, label, spend, shares) for task, label in pairs]
+    return [times_of(study, *cell, spend, shares) for cell in standings.cells_of(runs)]
 
 
 def half_of_targets(study: Study, runs: pd.DataFrame) -> Estimate:
@@ -218,10 +225,10 @@ def list_runtimes(study: Study) -> Rows:
             if all(map(len, times[spend])):
                 row |= running_times.budget_for(times[spend], share).columns(name)
         if study.methods.information[method] == BY_TRIAL:
-            pairs = standings.compared(study)[method][["task", "label"]].drop_duplicates()
-            for task, label in pairs[pairs.task.isin(spans(study).keys())].to_numpy():
-                half = times_of(study, task, label, "trials", (0.5,))
-                row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
+            for task, label in standings.cells_of(standings.compared(study)[method]):
+                if task in spans(study):
+                    half = times_of(study, task, label, "trials", (0.5,))
+                    row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
         yield method, row | run_ids(runs)
 
 

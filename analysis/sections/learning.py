@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -11,8 +12,9 @@ import pandas as pd
 from coartic.analysis import standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import EC1, LEARNERS
-from coartic.analysis.sections.costs import improvements
+from coartic.analysis.sections.costs import best_after, improvements
 from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Rows, row_of_cell, table
 from coartic.analysis.words import marked
@@ -32,8 +34,9 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 def list_learning(study: Study) -> Rows:
     """List the best reward after each number of trials in :data:`BUDGETS` (mean over runs), for
     methods whose runs on a task all made trials, 100 at least, and have a solution."""
+    learned = improvements(study)
     for (task, label), every in study.cells.items():
-        runs = [improvements(study)[run] for run in every.run_id if run in improvements(study)]
+        runs = [learned[run] for run in every.run_id if run in learned]
         if task not in one_by_one(study) or study.methods.is_search[label]:
             continue
         if not len(every) == len(runs) == len(solved(every)):
@@ -42,8 +45,7 @@ def list_learning(study: Study) -> Rows:
             continue
         row = row_of_cell(study, every) | {"corrective_best": study.corrective_best[task]}
         for budget in (each for each in BUDGETS if each <= every.trials.min()):
-            best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
-            row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan
+            row[f"after_{budget}"] = np.mean([best_after(run, budget) for run in runs])
         yield f"{task} {label}", row
 
 
@@ -108,24 +110,23 @@ def learning_curves(study: Study) -> pd.DataFrame:
     ``method`` (label), ``runs`` (number of runs), ``trial`` (from 1), ``best`` (mean over runs, NaN
     until all have a solution), and quartiles of the runs, ``best_low`` and ``best_high``.
     """
-    shown, methods = list[tuple[str, str]](), study.methods
-    drawn = methods.index[methods.headline & (methods.base.isin(CURVES) | ~methods.built_in)]
-    for task in one_by_one(study):
-        keys = [(task, label) for label in drawn if (task, label) in study.cells]
-        labels = [label for _, label in keys if len(solved(study.cells[task, label]))]
-        two_armed = {*LEARNERS} & {*labels} - {EC1}
-        shown += [(task, label) for label in labels if not (two_armed and label == EC1)]
-    learned, curves = improvements(study), [pd.DataFrame()]
-    for task, label in shown:
-        good = solved(study.cells[task, label])
-        runs = good[good.run_id.isin(learned)]
-        if runs.empty:
+    learned, cells, curves = improvements(study), {}, [pd.DataFrame()]
+    for (task, label), every in study.cells.items():
+        runs = solved(every)
+        runs = runs[runs.run_id.isin(learned)]
+        if task in one_by_one(study) and len(runs):
+            cells[task, label] = runs
+    rows = study.methods[study.methods.index.isin([label for _, label in cells])]
+    drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
+    for task, label in itertools.product(one_by_one(study), drawn):
+        two_armed = any((task, learner) in cells for learner in LEARNERS[1:])
+        if (task, label) not in cells or (two_armed and label == EC1):
             continue
+        runs = cells[task, label]
         length = int(runs.trials.min())
         at = np.unique(np.round(np.geomspace(1, length, 120)).astype(np.int64))
         # Until every run has a solution (NaN before) there is no mean of them.
-        steps = [learned[run_id] for run_id in map(str, runs.run_id)]
-        best = np.array([np.append(np.nan, b)[np.searchsorted(t, at, "right")] for t, b in steps])
+        best = np.array([best_after(learned[run_id], at) for run_id in runs.run_id])
         if np.isnan(best).any(axis=0).all():
             continue
         low, high = np.quantile(best, [0.25, 0.75], axis=0)

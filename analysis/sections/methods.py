@@ -8,7 +8,7 @@ from collections import Counter
 from coartic.analysis.sections.costs import solve_times
 from coartic.analysis.study import Study, one_by_one, solved, typical_run
 from coartic.analysis.table import SHORT_ID, Row, Rows, row_of_cell, run_ids, table
-from coartic.analysis.words import marked, tally
+from coartic.analysis.words import commonest, marked, tally
 
 
 @table(
@@ -51,8 +51,7 @@ def list_failed(study: Study) -> Rows:
     for (task, label), runs in study.cells.items():
         if (task, label) in by_cell:
             failed = by_cell[task, label]
-            reasons = Counter(map(str, failed.reason.fillna(""))).most_common(3)
             row: Row = {"task": marked(study.tasks[task]), "method": label}
             row |= {"failed": len(failed), "runs": len(runs), **run_ids(failed)}
-            row["reasons"] = "; ".join(f"{count} × {reason}" for reason, count in reasons)
+            row["reasons"] = "; ".join(commonest(failed.reason.fillna("")))
             yield f"{task} {label}", row

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 
@@ -9,7 +11,7 @@ from coartic.analysis.frames import ranking
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.sections.costs import half_of_targets
 from coartic.analysis.sections.ranking import SCORE_COLUMNS
-from coartic.analysis.standings import board, compared, runs_on, solved_tasks
+from coartic.analysis.standings import board, compared, runs_on, solved_tasks, together
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.estimates import FEWER_RESAMPLES, Estimate, mean_of_means
@@ -41,8 +43,7 @@ def list_own(study: Study) -> Rows:
     for own in own_methods(study):
         tasks = solved_tasks(study, own)
         parts = {name: runs_on(study, name, tasks) for name in compared(study)}
-        there = [runs.assign(method=name) for name, runs in parts.items() if len(runs)]
-        scores = ranking(pd.concat(there).assign(setting=""))
+        scores = ranking(together(study, parts))
         rows = study.methods.loc[scores.index[scores.gap.notna()]]
         built_in = rows[rows.built_in & (rows.under == "")]
         same_use = built_in[built_in.information == study.methods.information[own]]
@@ -60,31 +61,29 @@ def list_own(study: Study) -> Rows:
             if study.methods.information[name] == BY_TRIAL:
                 row |= half_of_targets(study, runs).columns("trials_to_half")
             if name != own:
-                exact = {label: not study.methods.stochastic[label] for label in (name, own)}
-                apart = difference_of_gaps(runs, exact[name], parts[own], exact[own])
-                row |= apart.columns("difference")
+                row |= _difference_of_gaps(study, parts, name, own).columns("difference")
             yield f"{own} {name}", row | run_ids(runs)
 
 
-def difference_of_gaps(
-    first: pd.DataFrame, first_is_exact: bool, second: pd.DataFrame, second_is_exact: bool
+def _difference_of_gaps(
+    study: Study, parts: Mapping[str, pd.DataFrame], first: str, second: str
 ) -> Estimate:
-    """Return the mean gap of the first runs less the mean gap of the second runs, each a mean over
-    the tasks of these runs.
+    """Return the mean gap of the ``first`` method less that of the ``second``, each a mean over the
+    tasks of its runs in ``parts``, which are the same tasks.
 
-    Tasks are not matched: give both the same tasks. ``first_is_exact`` and ``second_is_exact`` are
-    True for deterministic methods, whose gaps are taken as exact. The interval is for other runs on
-    these tasks; two exact gaps have no interval.
+    Tasks are not matched. Gaps of deterministic methods are taken as exact. The interval is for
+    other runs on these tasks; two exact gaps have no interval.
     """
     exact, weights, drawn = 0.0, list[float](), list[Array]()
-    for sign, runs, is_exact in ((1, first, first_is_exact), (-1, second, second_is_exact)):
-        for _, of_task in runs.groupby("task"):
-            weight, gaps = sign / runs.task.nunique(), of_task.gap.to_numpy(np.float64)
-            if is_exact:
-                exact += weight * gaps.mean()
-            else:
+    for sign, method in ((1, first), (-1, second)):
+        tasks = parts[method].groupby("task").gap
+        for _, of_task in tasks:
+            weight, gaps = sign / len(tasks), of_task.to_numpy(np.float64)
+            if study.methods.stochastic[method]:
                 weights.append(weight)
                 drawn.append(gaps)
+            else:
+                exact += weight * gaps.mean()
     if not drawn:
         return Estimate(exact)
     sampled = mean_of_means(drawn, weights, FEWER_RESAMPLES)

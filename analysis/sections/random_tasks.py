@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -10,55 +11,75 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.standings import compared
+from coartic.analysis.method_frame import without_settings
+from coartic.analysis.standings import compared, solved_tasks, together
 from coartic.analysis.statistics.instances import Scores, other_tasks
-from coartic.analysis.study import Study, cached, solved
+from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, run_ids, table
+from coartic.estimates import Estimate
+
+
+@cached
+def _instances(study: Study) -> dict[str, list[str]]:
+    """Return the names of the instances with a best known reward, by family."""
+    families: dict[str, list[str]] = {}
+    for name in study.optima:
+        if (family := study.tasks[name].family) is not None:
+            families.setdefault(family, []).append(name)
+    return families
 
 
 @cached
 def on_instances(study: Study) -> pd.DataFrame:
-    """Return the solved runs of compared methods on instances of families, with the label of the
-    row of the method in column ``method``, by ``place``, the number of the instance from 0."""
-    parts = [solved(runs).assign(method=method) for method, runs in compared(study).items()]
-    every = pd.concat([*parts, study.runs[:0]], ignore_index=True)
-    instances = [name for name in study.optima if study.tasks[name].family is not None]
-    place = every.task.map({name: number for number, name in enumerate(instances)})
+    """Return the runs of compared methods on those instances of families on which the method
+    solved every run, with the label of the row of the method in column ``method``, by ``place``,
+    the number of the instance from 0."""
+    parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
+             for method, runs in compared(study).items()}  # fmt: skip
+    every = together(study, parts)
+    names = itertools.chain.from_iterable(_instances(study).values())
+    place = every.task.map({name: number for number, name in enumerate(names)})
     return every[place.notna()].assign(place=place).sort_values("place", kind="stable")
 
 
-def _by_family(runs: pd.DataFrame) -> Scores:
-    """Return the gaps of the runs on each instance, by family; runs as of :func:`on_instances`."""
+def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
+    """Return the gaps of a method's runs on each instance, by family, of the families whose every
+    instance is among the runs, as of :func:`on_instances`."""
     return {
         str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
         for family, of_family in runs.groupby("family", sort=False)
+        if of_family.place.nunique() == len(_instances(study)[str(family)])
     }
 
 
 @table(
     "Gap to the best known reward, in per cent of it: mean over instances",
-    "method; instances; gap[]: gap (%) .1; in [*]: {} (%) .1",
+    "method; instances; missing; gap[]: gap (%) .1; in [*]: {} (%) .1",
 )
 def list_family_gaps(study: Study) -> Rows:
     """List gaps to the best known reward over families with two arms, and in each family, with
-    intervals about other tasks."""
-    every, rows = on_instances(study), list[tuple[str, Row]]()
-    families = every.family.unique()
-    two_armed = {*every.family[every.arms > 1]}
-    for method in compared(study):
-        runs = every[every.method == method]
-        if not len(runs):
-            continue
-        of_two_arms = runs[runs.family.isin(two_armed)]
-        counted = of_two_arms if len(of_two_arms) else runs  # the gap is a mean over these
-        row: Row = {"method": method, "instances": counted.task.nunique(), "gap": math.nan}
-        scores = _by_family(runs)
+    intervals about other tasks.
+
+    A method with a failed run on an instance of a family has no gap there, as in the ranking.
+    ``instances``: on how many it solved every run, and ``missing``: how many others there are, of
+    families with two arms, or of all families on which it ran if they have one arm.
+    """
+    every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
+    two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}
+    for method, of_method in compared(study).items():
+        runs, ran = every[every.method == method], {*of_method.family.dropna()}
+        scores, over = _by_family(study, runs), two_armed if two_armed & ran else ran
+        solved = runs[runs.family.isin(over)].place.nunique()
+        missing = sum(len(families[family]) for family in over) - solved
+        row: Row = {"method": method, "instances": solved, "missing": missing, "gap": math.nan}
         if two_armed and two_armed <= scores.keys():
-            row |= other_tasks(_by_family(of_two_arms)).columns("gap")
+            of_two_arms = {family: scores[family] for family in scores if family in two_armed}
+            row |= other_tasks(of_two_arms).columns("gap")
         row |= {f"in {family}": math.nan for family in families}
         for family, part in scores.items():
             row |= other_tasks({family: part}).columns(f"in {family}")
-        rows.append((method, row | run_ids(runs)))
+        if ran:
+            rows.append((method, row | run_ids(runs)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
 
@@ -67,18 +88,19 @@ def list_family_gaps(study: Study) -> Rows:
     "Dots: instances (mean over runs), on an axis that is linear up to 2 % and logarithmic beyond; "
     "gaps above 100 % stand at the right end. Diamonds: mean over instances with its "
     f"{style.COVERAGE} interval about other tasks of the family (bootstrap over instances and "
-    "runs).",
+    "runs), for methods that solved every run.",
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Draw gaps to the best known rewards of instances, by method and family."""
-    runs, single = on_instances(study), study.methods.parts.map(len) == 1
-    methods = study.methods[~study.methods.under.isin(runs.method) & single]
+    runs, rows = on_instances(study), study.methods
+    methods = without_settings(rows[rows.index.isin(runs.method) & (rows.parts.map(len) == 1)])
     runs = runs[runs.method.isin(methods.index)]
     if not len(runs):
         return None
     parts = []
     for (method, family), part in runs.groupby(["method", "family"], sort=False):
-        mean = other_tasks(_by_family(part)).columns("mean")
+        scores = _by_family(study, part)
+        mean = (other_tasks(scores) if scores else Estimate(math.nan)).columns("mean")
         dots = part.groupby("task", sort=False).gap.mean().reset_index()
         dots = dots.assign(method=str(method), family=str(family), **mean, instances=len(dots))
         parts.append(dots)
@@ -115,6 +137,6 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         label.set_fontweight("normal" if methods.built_in[method] else "bold")
     panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
-    first = data.drop_duplicates(["method", "family"])
+    first = data.drop_duplicates(["method", "family"]).dropna(subset="mean")
     means = spoken(study, first, "{title}, {family}: {mean:.1%}")
     return drawing, data, f"Gaps of instances by method and family. {means}.", ()

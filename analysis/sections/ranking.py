@@ -12,11 +12,12 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.frames import ranking
-from coartic.analysis.method_frame import GROUPS
-from coartic.analysis.methods import most_exploring
-from coartic.analysis.sections.costs import improvements
+from coartic.analysis.method_frame import GROUPS, without_settings
+from coartic.analysis.methods import EC1, EC4
+from coartic.analysis.sections.costs import best_after, improvements
 from coartic.analysis.standings import (
     board,
+    cells_of,
     common_runs,
     common_tasks,
     compared,
@@ -33,9 +34,9 @@ from coartic.internal.text import counted
 
 SCORE_COLUMNS = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
 """Columns of :func:`.ranking` that are in the table for all tasks and for parts of them."""
-LONGEST = 44
+_LONGEST_NAME = 44
 """Most letters of a name in the figure."""
-EARLY = 1_000
+_EARLY = 1_000
 """Number of trials after which the ranking has a further gap, ``gap_early``."""
 
 
@@ -56,7 +57,7 @@ def list_against_learner(study: Study) -> Rows:
         cells, tests = [], []
         for name, task in one_by_one(study).items():
             runs = study.cells.get((name, str(label)))
-            learner = study.cells.get((name, most_exploring(task)))
+            learner = study.cells.get((name, EC4 if len(task.hands) > 1 else EC1))
             if runs is None or learner is None or runs is learner:
                 continue
             rewards, learned = (
@@ -73,17 +74,15 @@ def list_against_learner(study: Study) -> Rows:
             yield f"{name} {label}", row | {"p_holm": adjusted, "least_p": test.least_p}
 
 
-def after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
+def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     """Return a copy of runs with the best ``reward`` of the first ``trials`` trials of each, NaN if
     none succeeded; runs without trials keep their reward. Column ``gap`` stays as it is."""
-
-    def best(run_id: str, reward: float) -> float:
-        numbers, rewards = improvements(study).get(run_id, ([], []))
-        made = int(np.searchsorted(numbers, trials, side="right"))
-        return float(rewards[made - 1]) if made else math.nan if len(numbers) else reward
-
+    learned, best = improvements(study), list[float]()
     rewards = runs.reward.to_numpy(np.float64, na_value=math.nan)
-    return runs.assign(reward=[*map(best, runs.run_id, rewards)])
+    for run_id, reward in zip(runs.run_id, rewards, strict=True):
+        steps = learned.get(run_id)
+        best.append(float(best_after(steps, trials)) if steps and len(steps[0]) else reward)
+    return runs.assign(reward=best)
 
 
 @table(
@@ -102,13 +101,13 @@ def list_ranking(study: Study) -> Rows:
     a run costs.
     """
     tested, runs = list_against_learner(study), common_runs(study)
-    wide = board(study).reindex(columns=[*SCORE_COLUMNS, "tasks", "missing", "without_gain"])
+    wide = board(study).reindex(columns=[*SCORE_COLUMNS, "tasks", "without_gain"])
     if len(runs):
-        wide["gap_early"] = ranking(after(study, runs, EARLY)).gap
+        wide["gap_early"] = ranking(_after(study, runs, _EARLY)).gap
     wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
     over: dict[Any, Any] = wide.to_dict("index")
     single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
-    for method in ranked(study):
+    for method in _ranked(study):
         of_method = compared(study)[method]
         gaps = {task: solved(runs).gap.mean() for task, runs in of_method.groupby("task")}
         row: Row = {"method": method, "information": study.methods.information[method]}
@@ -117,8 +116,7 @@ def list_ranking(study: Study) -> Rows:
         row |= over.get(method, {})
         on = {*solved_tasks(study, method)}
         row |= {"missing": sum(task not in on for task in common_tasks(study))}
-        pairs = {f"{task} {label}" for task, label in of_method[["task", "label"]].to_numpy()}
-        tests = tested[tested.index.isin(pairs)]
+        tests = tested[tested.index.isin([" ".join(cell) for cell in cells_of(of_method)])]
         # With Holm's correction over its tasks: could any of its tests have distinguished them?
         if tests.least_p.count() * tests.least_p.min() < LEVEL:
             sure = tests[tests.p_holm < LEVEL]
@@ -127,7 +125,7 @@ def list_ranking(study: Study) -> Rows:
         yield method, row | run_ids(of_method)
 
 
-def ranked(study: Study) -> list[str]:
+def _ranked(study: Study) -> list[str]:
     """Return the labels of the methods of the ranking: methods from files, then built-in ones.
 
     In both groups the smallest mean gap is first, and methods without a gap follow in the
@@ -160,7 +158,7 @@ def ranked(study: Study) -> list[str]:
 def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of every method, a mean over tasks, with its name."""
     rows, tasks = board(study), common_tasks(study)
-    rows = rows[~rows.under.isin(rows.index)].reset_index(names="method")
+    rows = without_settings(rows).reset_index(names="method")
     if not len(rows):
         return None
     shown = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
@@ -219,7 +217,7 @@ def name_in_figure(study: Study, line: Any) -> str:
     """Return the name left of a line of the figure, shortened if it is long. ``line`` is a heading,
     or a row of a table with the label ``method``."""
     name = line if isinstance(line, str) else shown_name(study, line["method"])
-    longest = LONGEST // 2 if style.is_narrow() else LONGEST
+    longest = _LONGEST_NAME // 2 if style.is_narrow() else _LONGEST_NAME
     if len(name) > longest:  # its end may say on how many tasks
         name = f"{name[: longest // 2]}…{name[1 - longest // 2 :]}"
     return name

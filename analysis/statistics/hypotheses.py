@@ -12,11 +12,13 @@ A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, c
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from coartic.estimates import (
     IN_CACHE,
@@ -34,6 +36,7 @@ from coartic.internal.limits import MOST_RUNS, real_array
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
+_MOST_PLACES = 2_000_000  # places in resamples that are kept at once
 _Count = Annotated[int, 0, MOST_RUNS]
 _Share = Annotated[float, 0.0, 1.0]
 
@@ -78,14 +81,13 @@ def bootstrap_test(
         p = least if as_asked else 1.0
         return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
     observed = difference / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
-    rng = np.random.default_rng(SEED)
     sums, variances = np.zeros(resamples), np.zeros(resamples)
-    for values, sign in zip(shifted, (1, -1), strict=False):
-        for part in slices(resamples, max(1, IN_CACHE // len(values))):
-            drawn = values[rng.integers(len(values), size=(part.stop - part.start, len(values)))]
-            means = drawn.mean(axis=1, keepdims=True)
-            sums[part] += sign * means[:, 0]
-            variances[part] += drawn.var(axis=1, ddof=1, mean=means) / len(values)
+    batches = (_kept_places if sum(n) * resamples <= _MOST_PLACES else _places)(n, resamples)
+    for sample, part, places in batches:
+        drawn = shifted[sample][places]
+        means = drawn.mean(axis=0, keepdims=True)
+        sums[part] += (1, -1)[sample] * means[0]
+        variances[part] += drawn.var(axis=0, ddof=1, mean=means) / n[sample]
     # Rounding is neither spread nor difference: resamples of equal values, equal means.
     sums[np.abs(sums) < NEGLIGIBLE * size] = 0.0
     variances[variances < (NEGLIGIBLE * size) ** 2] = 0.0
@@ -97,6 +99,26 @@ def bootstrap_test(
     extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
     p = float(1 + extreme.sum()) / (1 + resamples)
     return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
+
+
+def _places(
+    sizes: tuple[int, ...], resamples: int
+) -> Iterator[tuple[int, slice, NDArray[np.int64]]]:
+    """Yield the number of a sample, a slice of the resamples, and the places of the values that
+    these draw from the sample, shape ``(size, resamples)``. Equal arguments give equal places."""
+    rng = np.random.default_rng(SEED)
+    for sample, size in enumerate(sizes):
+        for part in slices(resamples, max(1, IN_CACHE // size)):
+            places = rng.integers(size, size=(part.stop - part.start, size))
+            yield sample, part, np.ascontiguousarray(places.T)
+
+
+@lru_cache(maxsize=16)  # most samples have as many values as another
+def _kept_places(
+    sizes: tuple[int, ...], resamples: int
+) -> list[tuple[int, slice, NDArray[np.int64]]]:
+    """Return all of :func:`_places`, kept for further samples of these sizes: do not change it."""
+    return [*_places(sizes, resamples)]
 
 
 @checked_arguments

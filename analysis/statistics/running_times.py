@@ -22,7 +22,7 @@ RunningTimes = Sequence[Array]
 ``(runs, targets)``; infinite for a target that the run does not reach."""
 
 
-def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
+def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
     """Return the finite running times in ascending order, the weight of each, and the number of its
     run, from 0 through all tasks.
 
@@ -42,7 +42,7 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
     An infinite budget and a share of 0 if no target is reached.
     """
-    values, weights, _ = pairs(times)
+    values, weights, _ = _pairs(times)
     if not len(values):
         return np.array([math.inf]), np.zeros(1)
     last = np.append(values[1:] != values[:-1], True)
@@ -51,7 +51,7 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 def share_reached(times: RunningTimes) -> float:
     """Return the share of pairs of run and target that are reached at all; tasks weigh the same."""
-    return float(pairs(times)[1].sum())
+    return float(_pairs(times)[1].sum())
 
 
 def budget_for(times: RunningTimes, share: float) -> Estimate:
@@ -61,7 +61,7 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     The percentile interval is of the bootstrap over runs within tasks, without widening, as budgets
     can be infinite. No interval if a task has too few runs.
     """
-    values, weights, runs = pairs(times)
+    values, weights, runs = _pairs(times)
 
     def budgets(counts: NDArray[np.uint8]) -> Array:
         reached = np.cumsum(weights * counts[:, runs], axis=1)
@@ -71,7 +71,7 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     value = float(budgets(np.ones((1, sum(sizes)), dtype=np.uint8))[0])
     if min(sizes) < FEWEST:
         return Estimate(value)
-    drawn, at_once = draws(sizes), 1 + IN_CACHE // (1 + len(values))
+    drawn, at_once = _draws(sizes), 1 + IN_CACHE // (1 + len(values))
     resampled = [budgets(drawn[part]) for part in slices(len(drawn), at_once)]
     low, high = np.quantile(np.concatenate(resampled), TAILS, method="inverted_cdf")
     return Estimate(value, float(low), float(high))
@@ -89,19 +89,15 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
     weights = np.repeat([1 / size / len(times) for size in sizes], sizes)
     reached = [np.searchsorted(np.sort(run), budgets, "right") / len(run)
                for of_task in times for run in of_task]  # fmt: skip
-    low, high = np.quantile((draws(sizes) * weights) @ np.array(reached), TAILS, axis=0)
+    low, high = np.quantile((_draws(sizes) * weights) @ np.array(reached), TAILS, axis=0)
     return low, high
 
 
 @lru_cache(maxsize=4)  # methods mostly have as many runs as another
-def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
+def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     """Return the number of times that each resample draws each run, shape ``(resamples, runs)``,
     for tasks with ``sizes`` runs. The array is cached: do not change it."""
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MOST_RUNS_DRAWN // sum(sizes), 200))
-    drawn = [np.empty((resamples, size), dtype=np.uint8) for size in sizes]
-    for of_task, size in zip(drawn, sizes, strict=True):
-        even = np.full(size, 1 / size)
-        for row in of_task:
-            row[:] = rng.multinomial(size, even)
-    return np.hstack(drawn)
+    drawn = (rng.multinomial(size, np.full(size, 1 / size), resamples) for size in sizes)
+    return np.hstack([of_task.astype(np.uint8) for of_task in drawn])
