@@ -41,10 +41,18 @@ def moves(task, seed):
             break
 
 
+def with_shares(shifts, after):
+    """Add ``share_N`` of the final shift that is there after N trials, and ``log_half``, the
+    logarithm (base 10) of the trials until the share is a half, to columns ``dot_N`` and
+    ``square``. ``after`` has the numbers of trials."""
+    shares = {f"share_{n}": shifts[f"dot_{n}"] / shifts.square for n in after}
+    half = [trials_to_half(curve, after) for curve in np.array([*shares.values()]).T]
+    return shifts.assign(**shares, log_half=half)
+
+
 def trials_to_half(shares, after):
-    """Return the logarithm, base 10, of the trials until a share of the final shift is a half,
-    interpolated. ``shares``: after each number of trials in ``after``. NaN if the last share is
-    below a half."""
+    """Return the logarithm, base 10, of the trials until a share is a half, interpolated; NaN if
+    the last share is below a half."""
     if not shares[-1] >= HALF:
         return np.nan
     k = int((shares >= HALF).argmax())
