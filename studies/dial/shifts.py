@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from settings import DIAL, FAMILIES, PAPER, PLANNER, SETTINGS, TIMES, TRIALS, base_of
 
-from coartic import execute, learn, load_task
+from coartic import learn, load_task
 from coartic.analysis import all_of, judge, mean_beyond, means
 
 ANNOUNCED = runpy.run_path(str(Path(__file__).parents[1] / "tell-apart" / "announced.py"))
@@ -33,16 +33,13 @@ def run_shifts(name):
     cases = [(g, other) for g, distance, other in moved if distance == 0.5]
     for setting in SHIFTED:
         condition = replace(base_of(task), **SETTINGS[setting])
-
-        def postures(changed, seed, trials, start, condition=condition):
-            run = learn(changed, condition, seed=seed, trials=trials, start=start)
-            return execute(changed, run.solution).configurations
-
-        practised = learn(task, condition, seed=10 * seed, trials=TRIALS).solution
-        before = execute(task, practised).configurations
-        went_on = postures(task, 10 * seed + 1, TRIALS, practised)
+        practised = learn(task, condition, seed=10 * seed, trials=TRIALS)
+        more = {"condition": condition, "seed": 10 * seed + 1, "start": practised.solution}
+        before = practised.execute().configurations
+        went_on = learn(task, trials=TRIALS, **more).execute().configurations
         for g, other in cases:
-            after = [postures(other, 10 * seed + 1, n, practised)[g] for n in SHIFT_AFTER]
+            runs = [learn(other, trials=n, **more) for n in SHIFT_AFTER]
+            after = [run.execute().configurations[g] for run in runs]
             shifts = np.array(after) - before[g]
             same = (went_on[g] - before[g]) @ shifts[-1]
             rows.append([name, setting, g, same, shifts[-1] @ shifts[-1], *(shifts @ shifts[-1])])

@@ -1,21 +1,8 @@
 """The paper's claims with two verdicts, by their tests corrected together.
 
-A claim *replicates* if our runs show what the paper measured: compared with the corrective process
-alone, or with the runs before learning. It is *more than selection* if the learner shows more than
-random search, which is the learner without its memory. The verdicts:
-
-- *Supported*: the runs show the claim, and the largest p-value of its tests, which must all hold
-  (intersection-union test), is below 5 % after Holm's correction; tests over random tasks also
-  without the task that favours the claim most.
-- *Not supported*: the runs do not show the claim, and the opposite of one of its tests is
-  significant (smallest p-value of the opposites times their number, below 5 % after Holm's
-  correction).
-- *Depends on the goals*: our goals support the claim, but at most half of the sets of goals
-  consistent with the paper's text do (``sets.csv``).
-- *Undecided*: none of these, or the folder lacks the runs.
-
-Exact counts, and values without spread over runs, need no test. A claim that a folder cannot test
-counts in its group all the same, so that verdicts do not change with the other runs of a folder.
+``docs/statistics.md`` explains the verdicts; *depends on the goals* rests on ``sets.csv``. Exact
+counts, and values without spread over runs, need no test. A claim that a folder cannot test counts
+in its group all the same, so that verdicts do not change with the other runs of a folder.
 """
 
 import tomllib
