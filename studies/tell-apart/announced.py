@@ -12,19 +12,13 @@ DISTANCES = [0.25, 0.5, 1.0]
 HALF = 0.5
 
 
-def changed(task, goals):
-    """The task with other goals. Raises CoarticError or MethodError where they cannot be hit."""
-    other = parse_task(task.model_dump() | {"goals": goals, "name": "changed"}, "a changed task")
-    objective(other)  # or it says that no hands hit them all
-    return other
-
-
 def moves(task, seed):
     """Yield, for each goal but the last and each distance, the goal (from 0), the distance, and the
     task with the goal after it moved by this distance. The direction is random, the same for all
     distances; the moved goal stays apart from its neighbours. A goal for which no direction is
     found is left out."""
     rng, goals = np.random.default_rng([68, seed]), task.goal_array
+    content = task.model_dump() | {"name": "changed"}
     for g in range(len(goals) - 1):
         neighbours = np.delete(goals, g + 1, axis=0)[max(g - 1, 0) : g + 2]
         for _ in range(100):
@@ -33,8 +27,10 @@ def moves(task, seed):
             if np.linalg.norm(places[:, None] - neighbours, axis=2).min() < 4 * task.radius:
                 continue
             try:
-                tasks = [changed(task, [*goals[: g + 1], place, *goals[g + 2 :]])
-                         for place in places]  # fmt: skip
+                tasks = [parse_task(content | {"goals": [*goals[: g + 1], place, *goals[g + 2 :]]},
+                                    "a changed task") for place in places]  # fmt: skip
+                for other in tasks:
+                    objective(other)  # or it says that no hands hit them all
             except (CoarticError, MethodError):
                 continue
             yield from zip([g] * len(tasks), DISTANCES, tasks, strict=True)
