@@ -10,7 +10,6 @@ from coartic.baselines.receding_horizon import RecedingHorizon
 
 AFTER = [1, 10, 30, 100, 300, 1000, 10000]
 """Trials after the change at which the solution is looked at; the last is all of practice."""
-HANDS = {"L": "left", "R": "right"}
 EFFORT = {"nodes": 80, "graphs": 1, "chains": 6, "starts": 6}
 PLANNERS = {
     "planner, all goals": lambda task: plan(
@@ -34,16 +33,17 @@ def informed_next(before, task, done, g, movements):
     ``task`` has moved. The corrective process finds from the posture how the robot would hit the
     next goal, before and after the change. Half of the difference is added to the posture, which
     the process then brings back to its goal."""
-    q, (hand, following) = done.configurations[g], [HANDS[x] for x in done.hands[g : g + 2]]
+    q, hands = done.configurations[g], {movement.goal: movement.hand for movement in movements}
+    hand, following = hands[g + 1], hands[g + 2]
 
     def process(q, hand, goal):
         return correct(task.robot, q, hand, goal, locked_base=task.locked_base).q
 
     shift = process(q, following, task.goals[g + 1]) - process(q, following, before.goals[g + 1])
     back = process(q + shift / 2, hand, task.goals[g]) - process(q, hand, task.goals[g])
-    first = next(n for n, movement in enumerate(movements) if movement.goal == g + 1)
     informed = Movement(g + 1, hand, "learned", q + back)
-    return [*movements[:first], informed, *(m for m in movements[first:] if m.goal != g + 1)]
+    later = [movement for movement in movements if movement.goal > g + 1]
+    return [*(movement for movement in movements if movement.goal <= g), informed, *later]
 
 
 def change_goals(task, seed):
