@@ -3,8 +3,9 @@
     python studies/dial/protocols.py results/dial
 
 writes ``runs.csv``, a row for each run of the learner, ``others.csv``, a row for each run of
-another method, and ``shifts.csv``, a row for each goal before a goal that is moved. A task is done
-at a time; what is done is not done again. It takes about an hour on two cores.
+another method, ``shifts.csv``, a row for each goal before a goal that is moved, and ``named.csv``,
+a row for each named setting on a task of the paper. A task is done at a time; what is done is not
+done again. It takes about an hour on two cores.
 """
 
 import csv
@@ -14,10 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from settings import AFTER, FAMILIES, FEW, LONG, RUNS, SETTINGS, TRIALS, base_of
+from settings import AFTER, FAMILIES, FEW, LONG, NAMED, RUNS, SETTINGS, TRIALS, base_of
 from shifts import SHIFT_COLUMNS, SHIFT_TASKS, run_shifts
 
-from coartic import MethodError, corrective_trial, execute, learn_many, load_task, objective
+from coartic import MethodError, execute, learn_many, load_task, objective
 from coartic.baselines.cma_es import CMAES
 from coartic.baselines.posture_based import TwoGoals
 from coartic.baselines.trajectory_optimisation import PathLength
@@ -27,8 +28,10 @@ TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 INSTANCES = [f"{family}/v1/i{number:03d}" for number in range(40) for family in FAMILIES]
 COLUMNS = [
     "task", "family", "setting", "run", "corrective_best", "best_known",
-    *(f"reward_{trials}" for trials in AFTER), "quarter", "half", "first", "hands",
+    *(f"reward_{trials}" for trials in AFTER), "quarter", "half",
 ]  # fmt: skip
+NAMED_RUNS = 20
+NAMED_COLUMNS = ["row", "task", "setting", "runs", *(f"after_{trials}" for trials in AFTER[1:])]
 MISSED = -(10**9)
 """Reward of a trial that misses a goal: less than any other."""
 OTHERS = {
@@ -48,17 +51,12 @@ def run_task(name):
         condition = replace(base_of(task), **fields)
         trials = TRIALS if setting in LONG else FEW
         runs = learn_many(task, condition, seeds=range(RUNS), trials=trials, jobs=1)
-        for number, run in enumerate(runs):
-            done, first = run.execute(), np.nan
-            alone = corrective_trial(task, done.hands)
-            if alone.completed:
-                first = done.ticks_by_goal()[0] - alone.ticks_by_goal()[0]
-            rewards = run.rewards.filled(MISSED)
-            rows.append(row_of(task, setting, number, rewards, first, done.hands))
+        rows += [row_of(task, setting, number, run.rewards.filled(MISSED))
+                 for number, run in enumerate(runs)]  # fmt: skip
     return rows
 
 
-def row_of(task, setting, number, rewards, first, hands):
+def row_of(task, setting, number, rewards):
     """Return a row of :data:`COLUMNS`.
 
     ``quarter`` and ``half``: trials until the best reward so far is this share of the way from the
@@ -71,7 +69,7 @@ def row_of(task, setting, number, rewards, first, hands):
     reached[reached > trials] = np.inf if trials == TRIALS else np.nan
     after = [int(best[n - 1]) if n <= trials else "" for n in AFTER]
     family = task.name.partition("/")[0]
-    return [task.name, family, setting, number, start, best_known, *after, *reached, first, hands]
+    return [task.name, family, setting, number, start, best_known, *after, *reached]
 
 
 def span_of(task):
@@ -91,13 +89,23 @@ def run_others(name):
         for number in range(runs):
             try:
                 result, session = run_method(method(), task, number)
-                done = execute(task, result.solution)
-                rewards, hands = session.rewards or [done.reward], done.hands
+                rewards = session.rewards or [execute(task, result.solution).reward]
             except MethodError:
-                rewards, hands = [span_of(task)[0]], ""
+                rewards = [span_of(task)[0]]
             every = np.full(TRIALS, MISSED)
             every[: len(rewards)] = [MISSED if reward is None else reward for reward in rewards]
-            rows.append(row_of(task, setting, number, every, np.nan, hands))
+            rows.append(row_of(task, setting, number, every))
+    return rows
+
+
+def run_named(name):
+    """Run the named settings on a task; rows of :data:`NAMED_COLUMNS`, of mean best rewards."""
+    task, rows = load_task(name), []
+    for setting, fields in NAMED.items():
+        condition = replace(base_of(task), **fields)
+        runs = learn_many(task, condition, seeds=range(NAMED_RUNS), trials=TRIALS, jobs=1)
+        best = [np.fmax.accumulate(run.rewards)[np.array(AFTER[1:]) - 1] for run in runs]
+        rows.append([f"{name} {setting}", name, setting, NAMED_RUNS, *np.mean(best, axis=0)])
     return rows
 
 
@@ -105,6 +113,7 @@ PARTS = {
     "runs": (run_task, COLUMNS, (*TASKS, *INSTANCES)),
     "others": (run_others, COLUMNS, (*TASKS, *(name for name in INSTANCES if name[-3:] < "010"))),
     "shifts": (run_shifts, SHIFT_COLUMNS, SHIFT_TASKS),
+    "named": (run_named, NAMED_COLUMNS, TASKS),
 }
 """Files, the function that makes the rows of a task, their columns, and the tasks."""
 

@@ -31,6 +31,15 @@ FEW = 1_000
 LONG = (*DIAL, PLANNER, "1 0", "1 0.05 start", "hands", "drawn", "all")
 """Settings with all trials: the dial itself, and what claims ask of the end."""
 
+LESS_NOISE = {"noise_sd": 0.01, "epsilon": 0.4}
+NAMED = {
+    "paper": {},
+    "informed": {"drift": 1.0},
+    "drift 1, noise 0.01, epsilon 0.4": {"drift": 1.0, **LESS_NOISE},
+    "no drift, noise 0.01, epsilon 0.4": LESS_NOISE,
+}
+"""Named settings, which are measured on the paper's tasks: fields as in :data:`SETTINGS`."""
+
 
 def base_of(task):
     """Return the paper's condition that explores most of what the robot has: EC1 or EC4."""

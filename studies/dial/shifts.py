@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from settings import DIAL, FAMILIES, PAPER, PLANNER, SETTINGS, TIMES, TRIALS, base_of
 
-from coartic import execute, learn, load_task
+from coartic import learn, load_task
 from coartic.analysis import all_of, judge, mean_beyond, means
 
 ANNOUNCED = runpy.run_path(str(Path(__file__).parents[1] / "tell-apart" / "announced.py"))
-"""Functions of study tell-apart: which goal moves, and the trials to half of a shift."""
+"""Functions of study tell-apart: which goal moves, and shares of a shift."""
 SHIFTED = (PAPER, *DIAL[2:], PLANNER)
 """Settings that practise, hear of a goal that has moved, and practise again."""
 SHIFT_TASKS = [f"{family}/v1/i{number:03d}" for number in range(30) for family in FAMILIES[:2]]
@@ -33,16 +33,13 @@ def run_shifts(name):
     cases = [(g, other) for g, distance, other in moved if distance == 0.5]
     for setting in SHIFTED:
         condition = replace(base_of(task), **SETTINGS[setting])
-
-        def postures(changed, seed, trials, start, condition=condition):
-            run = learn(changed, condition, seed=seed, trials=trials, start=start)
-            return execute(changed, run.solution).configurations
-
-        practised = learn(task, condition, seed=10 * seed, trials=TRIALS).solution
-        before = execute(task, practised).configurations
-        went_on = postures(task, 10 * seed + 1, TRIALS, practised)
+        practised = learn(task, condition, seed=10 * seed, trials=TRIALS)
+        more = {"condition": condition, "seed": 10 * seed + 1, "start": practised.solution}
+        before = practised.execute().configurations
+        went_on = learn(task, trials=TRIALS, **more).execute().configurations
         for g, other in cases:
-            after = [postures(other, 10 * seed + 1, n, practised)[g] for n in SHIFT_AFTER]
+            runs = [learn(other, trials=n, **more) for n in SHIFT_AFTER]
+            after = [run.execute().configurations[g] for run in runs]
             shifts = np.array(after) - before[g]
             same = (went_on[g] - before[g]) @ shifts[-1]
             rows.append([name, setting, g, same, shifts[-1] @ shifts[-1], *(shifts @ shifts[-1])])
@@ -52,26 +49,21 @@ def run_shifts(name):
 def measure_shifts(raw):
     """Measure shares of the shift after the change, a row for each task and setting.
 
-    ``share_N`` of the final shift that is there after N trials: sums over goals of products of
-    shifts, over sums of squares. ``log_half``: trials to half of it, interpolated, as a power of
-    ten. ``unchanged``: the share that as much practice without a change brings.
+    ``share_N`` and ``log_half`` as of study tell-apart, of sums over goals. ``unchanged``: the
+    share that as much practice without a change brings.
     """
     sums = raw.groupby(["setting", "task"], sort=False).sum(numeric_only=True).reset_index()
     sums["family"] = sums.task.str.partition("/")[0]
-    shares = (sums[[f"dot_{n}" for n in SHIFT_AFTER]].div(sums.square, axis=0)).to_numpy()
-    half = [ANNOUNCED["trials_to_half"](curve, SHIFT_AFTER) for curve in shares]
-    named = {f"share_{n}": shares[:, k] for k, n in enumerate(SHIFT_AFTER)}
-    return sums.assign(**named, log_half=half, unchanged=sums.same / sums.square)
+    return ANNOUNCED["with_shares"](sums, SHIFT_AFTER).assign(unchanged=sums.same / sums.square)
 
 
 def tabulate_shifts(shifts):
-    """Tabulate shares of the shift by family and setting, and quartiles of the trials to half."""
+    """Tabulate shares of the shift by family and setting, and medians of the trials to half."""
     numbers = [*(f"share_{n}" for n in SHIFT_AFTER), "unchanged"]
     table = means(shifts, ["family", "setting"], numbers).rename(columns={"rows": "tasks"})
     trials = (10**shifts.log_half).groupby([shifts.family, shifts.setting], sort=False)
-    for share in (0.25, 0.5, 0.75):
-        column = trials.quantile(share).rename(f"half_{share:g}")
-        table = table.merge(column, left_on=["family", "setting"], right_index=True)
+    medians = trials.median().rename("half_0.5")
+    table = table.merge(medians, left_on=["family", "setting"], right_index=True)
     table.index = (table.family + " " + table.setting).rename("row")
     return table
 

@@ -31,15 +31,14 @@ def measure_runs(raw):
     zero = raw.corrective_best
     possible = (raw.best_known - zero).where(raw.best_known > zero)
     gains = {f"gain_{n}": 100 * (raw[f"reward_{n}"] - zero) / possible for n in AFTER}
-    gaps = {f"gap_{n}": 100 * (raw[f"reward_{n}"] / raw.best_known - 1) for n in AFTER}
     logs = {f"log_{name}": np.log10(raw[name].clip(upper=TRIALS).where(possible.notna()))
             for name in ("quarter", "half")}  # fmt: skip
-    return raw.assign(**gains, **gaps, **logs)
+    return raw.assign(**gains, **logs)
 
 
 def tabulate(runs):
-    """Tabulate gains and gaps: means over random tasks (tasks count alike), over the first ten of
-    each family, or over the runs on a task of the paper; medians and quartiles of trials."""
+    """Tabulate gains: means over random tasks (tasks count alike), over the first ten of each
+    family, or over the runs on a task of the paper; medians of trials."""
     drawn = runs[runs.family.isin(FAMILIES)]
     first = drawn[drawn.task.str[-3:] < "010"]
     every = pd.concat([
@@ -47,7 +46,7 @@ def tabulate(runs):
         runs.assign(group=runs.family),
     ])  # fmt: skip
     unit = every.run.where(~every.family.isin(FAMILIES), 0)
-    numbers = [*(f"gain_{n}" for n in AFTER), *(f"gap_{n}" for n in AFTER), "first"]
+    numbers = [f"gain_{n}" for n in AFTER]
     by = ["group", "setting", "task", unit]
     units = every.groupby(by, sort=False)[numbers].mean().reset_index()
     table = means(units, ["group", "setting"], numbers)
@@ -55,10 +54,9 @@ def tabulate(runs):
     # Runs that did not come there, in all trials or in the thousand of a setting, are the slowest.
     slow = every[every.gain_30.notna()].fillna({"quarter": np.inf, "half": np.inf})
     trials = slow.groupby(["group", "setting"], sort=False)[["quarter", "half"]]
-    for share in (0.25, 0.5, 0.75):
-        # the order statistic, as half of the runs may not come there
-        column = trials.quantile(share, interpolation="higher").add_suffix(f"_{share:g}")
-        table = table.merge(column, left_on=["group", "setting"], right_index=True)
+    # the order statistic, as half of the runs may not come there
+    medians = trials.quantile(0.5, interpolation="higher").add_suffix("_0.5")
+    table = table.merge(medians, left_on=["group", "setting"], right_index=True)
     return table.rename(columns={"rows": "units"})
 
 
@@ -193,15 +191,14 @@ def draw(table):
 
 def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
-    runs, others = (pd.read_csv(Path(folder) / f"{name}.csv") for name in ("runs", "others"))
+    runs, others, shifts, named = (pd.read_csv(Path(folder) / f"{name}.csv")
+                                   for name in ("runs", "others", "shifts", "named"))  # fmt: skip
     is_first = ~others.family.isin(FAMILIES) | (others.task.str[-3:] < "010")
     runs = measure_runs(pd.concat([runs, others[is_first]], ignore_index=True))
-    shifts = measure_shifts(pd.read_csv(Path(folder) / "shifts.csv"))
-    by_task = runs.groupby(["task", "setting"], sort=False)
-    numbers = [f"{name}_{n}" for name in ("reward", "gain") for n in AFTER]
+    shifts = measure_shifts(shifts)
     return {
         "results": tabulate(runs),
-        "by_task": by_task[numbers].mean().join(by_task.size().rename("n")),
+        "named": named.sort_values("task", kind="stable").set_index("row"),
         "claims": judge_claims(runs),
         "shifts": tabulate_shifts(shifts),
         "shift_claims": judge_shifts(shifts),

@@ -96,7 +96,7 @@ def tabulate_posture_difference(study, runs):
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def judge_claims(study, runs):
+def judge_claims(runs):
     """The claims, as they were registered before the random tasks were run."""
     drawn = runs[runs.family.notna()]
     nearer, first, saved = (
@@ -204,12 +204,7 @@ def draw(table):
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     runs = measure_runs(study)
-    by_task = runs.groupby(["task", "kind"], sort=False)[["reward", "replay_reward", *MEASURES]]
-    return {
-        "results": tabulate(study, runs),
-        "claims": judge_claims(study, runs),
-        "by_task": by_task.mean().join(by_task.size().rename("n")),
-    }
+    return {"results": tabulate(study, runs), "claims": judge_claims(runs)}
 
 
 if __name__ == "__main__":

@@ -47,10 +47,8 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
     None if no hit shows anything. ``fitted``: σ, ε and κ of the model; ``noise``: SD of motor
     noise; ``plan`` as of :func:`models.plan_for`."""
     sigma, _, kappa = fitted
-    rule = {"walk": "walk", "memoryless": "memoryless", "planner": "memoryless"}.get(model, "best")
     drifts = DRIFTS if model == "drawn" else (kappa,)
-    evidence = evidence_in(task, condition, trials, rule, plan if model == "planner" else None,
-                           kappas=drifts)  # fmt: skip
+    evidence = evidence_in(task, condition, trials, model, plan, kappas=drifts)
     if not len(evidence.trial):
         return None
     number = np.unique(evidence.trial, return_inverse=True)[1]

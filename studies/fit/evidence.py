@@ -130,10 +130,12 @@ def prior_of(elsewhere):
     return np.log(np.where(elsewhere, ELSEWHERE, 1 - ELSEWHERE)).sum()
 
 
-def evidence_in(task, condition, trials, rule, plan=None, simulated=None, kappas=None):
-    """Return the evidence on models with a rule of :func:`tables_before` in the trials of a
-    subject, at drifts ``kappas``; ``plan`` replaces tables where it has the hand, ``simulated`` as
-    of :func:`landings`."""
+def evidence_in(task, condition, trials, model, plan=None, simulated=None, kappas=None):
+    """Return the evidence on a model in the trials of a subject, at drifts ``kappas``; the
+    planner's ``plan`` replaces tables where it has the hand, ``simulated`` as of
+    :func:`landings`."""
+    rule = {"informed": "best", "drawn": "best", "planner": "memoryless"}.get(model, model)
+    plan = plan if model == "planner" else None
     rows = tables_before(task, condition, trials, rule)
     q = starts(task, trials, rows)
     follows = (rows.hand == (plan[0][rows.goal] if plan else rows.greedy)).to_numpy()

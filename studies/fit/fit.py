@@ -24,14 +24,15 @@ from sentences import CLEAR, LEARNERS, MODELS, sentence
 
 from coartic import CONDITIONS, CoarticError, load_task
 from coartic.analysis import read_hits
+from coartic.estimates import Estimate
 
 SIMULATED = 8
 """Number of simulations from which the bias of an estimate is found."""
 
 
 def interval(log_likelihood, best, step, low, high):
-    """Return both ends of the 95 % profile interval around ``best``, the maximum of
-    ``log_likelihood``, within bounds; ends are sought in increments of ``step``."""
+    """Return ``best``, the maximum of ``log_likelihood``, and the ends of the 95 % profile interval
+    around it, within bounds, shape ``(3,)``; ends are sought in increments of ``step``."""
     drop = stats.chi2.ppf(0.95, 1) / 2
     least = log_likelihood(best) - drop
     ends = []
@@ -43,7 +44,7 @@ def interval(log_likelihood, best, step, low, high):
             inner = end - sign * step if sign * (end - best) > step else best
             end = optimize.brentq(lambda x: log_likelihood(x) - least, inner, end, xtol=1e-4)
         ends.append(end)
-    return ends
+    return np.array([best, *ends])
 
 
 def maximum(function, low, high):
@@ -71,14 +72,15 @@ def bias(task, condition, trials, log_sigma, kappa):
     It is the mean error of estimates from hits simulated with the tables of the subject.
     """
     simulated = np.exp(log_sigma), kappa, SIMULATED
-    evidence = evidence_in(task, condition, trials, "best", None, simulated)
+    evidence = evidence_in(task, condition, trials, "informed", simulated=simulated)
     each = [most_likely(evidence._replace(nodes=nodes), 0.0)[0] for nodes in evidence.nodes]
     return np.mean(each, axis=0) - [log_sigma, kappa]
 
 
-def with_intervals(evidence, noise, log_sigma, kappa):
+def with_intervals(evidence, noise, log_sigma, kappa, off):
     """Return ``sigma`` and ``kappa`` with the ends ``_low`` and ``_high`` of their 95 % profile
-    intervals, a dictionary; ``noise``: SD of motor noise."""
+    intervals, a dictionary; ``noise``: SD of motor noise; ``off``: what :func:`bias` returns, which
+    is taken off."""
 
     def value(log_sigma, kappa):
         return evidence.log_likelihood(np.exp(log_sigma), kappa, noise)
@@ -89,24 +91,20 @@ def with_intervals(evidence, noise, log_sigma, kappa):
     def of_kappa(x):
         return maximum(lambda y: value(y, x), log_sigma - 1, log_sigma + 1)[1]
 
-    sigmas = np.exp([log_sigma, *interval(of_sigma, log_sigma, 0.2, -12.0, 3.0)])
-    kappas = kappa, *interval(of_kappa, kappa, 0.1, -2.0, 4.0)
-    ends = ("", "_low", "_high")
-    numbers = {f"sigma{end}": each for end, each in zip(ends, sigmas, strict=True)}
-    return numbers | {f"kappa{end}": each for end, each in zip(ends, kappas, strict=True)}
+    sigmas = np.exp(interval(of_sigma, log_sigma, 0.2, -12.0, 3.0)) / np.exp(off[0])
+    kappas = interval(of_kappa, kappa, 0.1, -2.0, 4.0) - off[1]
+    return Estimate(*sigmas).columns("sigma") | Estimate(*kappas).columns("kappa")
 
 
-def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True):
-    """Fit all models to the trials of a subject; a dictionary of numbers, and ``misfit`` in words.
-    ``sigma``, ``epsilon`` and ``kappa`` are of *keep the best, informed*; ``bic_`` of each model.
-    With ``intervals``, σ and κ have intervals, and their bias is taken off. ``noise`` as of
-    :func:`fit`."""
-    row, plan, fitted = {}, plan or plan_for(task), {}
+def fit_subject(task, condition, trials, *, noise, plan, intervals=True):
+    """Fit all models to the trials of a subject; a dictionary of numbers, ``misfit`` in words, and
+    ``model`` and ``others`` as of :func:`judge`. ``sigma``, ``epsilon`` and ``kappa`` are of *keep
+    the best, informed*; ``bic_`` of each model. With ``intervals``, σ and κ have intervals, and
+    their bias is taken off. ``noise`` as of :func:`fit`, ``plan`` of :func:`models.plan_for`."""
+    row, fitted = {}, {}
     for model in MODELS:
         if model not in LEARNERS[1:]:  # which have the same tables
-            rule = "memoryless" if model == "planner" else model
-            planned = plan if model == "planner" else None
-            evidence = evidence_in(task, condition, trials, rule, planned)
+            evidence = evidence_in(task, condition, trials, model, plan)
         count = int(evidence.sizes.sum()) + len(evidence.follows)
         free, total, epsilon, kappa = 1, 0.0, 0.0, 0.0
         if len(condition.hands) > 1:
@@ -117,15 +115,11 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
             free += 1
             row |= {"sigma": np.exp(log_sigma), "kappa": kappa}
             if intervals:
-                row |= with_intervals(evidence, noise, log_sigma, kappa)
                 off = bias(task, condition, trials, log_sigma, kappa)
-                for end in ("", "_low", "_high"):
-                    row[f"sigma{end}"] /= np.exp(off[0])
-                    row[f"kappa{end}"] -= off[1]
+                row |= with_intervals(evidence, noise, log_sigma, kappa, off)
             if len(condition.hands) > 1:
-                row["epsilon"] = epsilon
-                ends = interval(evidence.hands, epsilon, 0.1, 0.0, 1.0)
-                row["epsilon_low"], row["epsilon_high"] = ends
+                epsilons = interval(evidence.hands, epsilon, 0.1, 0.0, 1.0)
+                row |= Estimate(*epsilons).columns("epsilon")
         else:
             middle = np.log(evidence.rough_sigma(0.0))
 
@@ -147,7 +141,8 @@ def fit_subject(task, condition, trials, *, noise=0.0, plan=None, intervals=True
             ratios = each
             break
     row |= {f"check_{name}": value for name, value in ratios.items()}
-    return row | {"misfit": "; ".join(misfits(ratios))}
+    words = {"misfit": "; ".join(misfits(ratios)), "model": model, "others": " ".join(others)}
+    return row | words
 
 
 def judge(row):
@@ -163,9 +158,8 @@ def fit(frame, task, *, condition=None, noise=0.0):
 
     ``frame``: rows of :func:`coartic.analysis.read_hits`; ``noise``: SD of the motor noise in
     recorded postures, length unit and rad. Returns a row for each subject that can be fitted, with
-    numbers of :func:`fit_subject`, ``trials``, ``lost`` trials, ``missing`` hits of the others,
-    ``improved``, the number of trials after the first that were better than all before, and
-    ``model`` and ``others`` (:func:`judge`).
+    what :func:`fit_subject` finds, ``trials``, ``lost`` trials, ``missing`` hits of the others, and
+    ``improved``, the number of trials after the first that were better than all before.
     """
     condition, rows = condition or condition_for(task), []
     refuse_without_null_space(task, condition)
@@ -184,9 +178,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
         if why := why_not(task, condition, trials):
             warnings.warn(f"subject {subject} is left out: {why}", stacklevel=2)
             continue
-        row |= fit_subject(task, condition, trials, noise=noise, plan=plan)
-        model, others = judge(row)
-        rows.append({**row, "model": model, "others": " ".join(others)})
+        rows.append(row | fit_subject(task, condition, trials, noise=noise, plan=plan))
     return pd.DataFrame(rows)
 
 

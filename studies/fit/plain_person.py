@@ -57,12 +57,10 @@ def practise(averages, trials, rng):
     for trial in range(1, trials + 1):
         q, hits, total = list(START), [], 0
         for goal, stored in zip(GOALS, kept, strict=True):
-            ticks = 0
+            target = [q[0] + 0.3, q[1] - 0.3, q[2] - 0.6]
             if stored:
                 target = [angle + rng.gauss(0, EXPLORATION) for angle in stored]
-                q, ticks = move(q, target, goal, True)
-            else:
-                q, ticks = move(q, [q[0] + 0.3, q[1] - 0.3, q[2] - 0.6], goal, True)
+            q, ticks = move(q, target, goal, True)
             if math.dist(places(q)[-1], goal) > RADIUS:
                 q, more = move(q, correct(q, goal), goal, False)
                 ticks += more
@@ -70,11 +68,10 @@ def practise(averages, trials, rng):
             hits.append((ticks, q))
         if total < best:
             best = total
-            mixed = [
+            kept = [
                 [(a + b) / 2 if averages else b for a, b in zip(old or new, new, strict=True)]
                 for old, (_, new) in zip(kept, hits, strict=True)
             ]
-            kept = mixed
         for goal, (ticks, q) in enumerate(hits, 1):
             yield trial, goal, ticks / 100, [angle + rng.gauss(0, MOTOR) for angle in q]
 

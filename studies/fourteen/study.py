@@ -105,12 +105,6 @@ def tabulate_others(study):
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def tabulate_gains(study, plans):
-    """Tabulate the gain of each further goal ahead on each task, as a share of a mean movement."""
-    rows = (plans.task + " h=" + plans.horizon.astype(str)).rename("row")
-    return plans.set_index(rows)[["family", "task", "horizon", "ticks", "gain"]]
-
-
 def at(plans, families, h, column):
     """A column of the plans with h goals ahead, in per cent, by task."""
     rows = plans[plans.family.isin(families) & (plans.horizon == h)]
@@ -253,9 +247,10 @@ def draw(table):
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     plans, repeats = measure_plans(study), measure_repeats(study)
+    rows = (plans.task + " h=" + plans.horizon.astype(str)).rename("row")
     return {
         "results": tabulate(study, plans),
-        "gains": tabulate_gains(study, plans),
+        "gains": plans.set_index(rows)[["family", "task", "horizon", "ticks", "gain"]],
         "repeats": repeats,
         "fourth": tabulate_fourth(repeats),
         "claims": judge_claims(study, plans, repeats),

@@ -1,21 +1,8 @@
 """The paper's claims with two verdicts, by their tests corrected together.
 
-A claim *replicates* if our runs show what the paper measured: compared with the corrective process
-alone, or with the runs before learning. It is *more than selection* if the learner shows more than
-random search, which is the learner without its memory. The verdicts:
-
-- *Supported*: the runs show the claim, and the largest p-value of its tests, which must all hold
-  (intersection-union test), is below 5 % after Holm's correction; tests over random tasks also
-  without the task that favours the claim most.
-- *Not supported*: the runs do not show the claim, and the opposite of one of its tests is
-  significant (smallest p-value of the opposites times their number, below 5 % after Holm's
-  correction).
-- *Depends on the goals*: our goals support the claim, but at most half of the sets of goals
-  consistent with the paper's text do (``sets.csv``).
-- *Undecided*: none of these, or the folder lacks the runs.
-
-Exact counts, and values without spread over runs, need no test. A claim that a folder cannot test
-counts in its group all the same, so that verdicts do not change with the other runs of a folder.
+``docs/statistics.md`` explains the verdicts; *depends on the goals* rests on ``sets.csv``. Exact
+counts, and values without spread over runs, need no test. A claim that a folder cannot test counts
+in its group all the same, so that verdicts do not change with the other runs of a folder.
 """
 
 import tomllib
@@ -60,8 +47,8 @@ def judge_claims(study, names):
     judged, read = judge_rules(study, names, RULES, claims.test)
     compared = [name for name in names if name in BEYOND]
     beyond, read_beyond = judge_rules(study, compared, BEYOND, claims.test_beyond)
-    few = pd.Series([*map(few_sets_support, names)], names)
-    goals = few & (judged.verdict == "supported")
+    few = SETS.claim[2 * SETS.supported <= SETS.members]  # support it, on some task
+    goals = judged.index.isin(few) & (judged.verdict == "supported")
     renamed = {"verdict": "more_than_selection", "evidence": "evidence_beyond",
                "test": "test_beyond", "p_holm": "p_beyond",
                "opposite_p_holm": "opposite_p_beyond"}  # fmt: skip
@@ -98,12 +85,6 @@ def judge_rules(study, names, rules, tests):
 
 SETS = pd.read_csv(HERE / "sets.csv")
 """Number of sets of goals, consistent with the paper's text, that support and refute a claim."""
-
-
-def few_sets_support(name):
-    """Return whether at most half of the sets of goals support a claim, on some task."""
-    of_claim = SETS[SETS.claim == name]
-    return bool((2 * of_claim.supported <= of_claim.members).any())
 
 
 def sets_in_words(name):

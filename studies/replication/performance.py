@@ -86,21 +86,11 @@ def shortest_reach(task, q, hand, goal, near):
     """
     joints, centre = movable(task, hand), np.array(task.goals[goal - 1])
 
-    def moved(change):
-        result = q.copy()
-        result[joints] += change
-        return result
-
-    def miss(change):
-        return np.asarray(task.robot.forward_kinematics(moved(change), hand) - centre)
-
     def inside(change):
-        off = miss(change)
+        reached = q.copy()
+        reached[joints] += change
+        off = np.asarray(task.robot.forward_kinematics(reached, hand) - centre)
         return float(task.radius**2 - off @ off)
-
-    def inside_gradient(change):
-        jacobian = task.robot.jacobian(moved(change), hand)[:, joints]
-        return np.asarray(-2 * miss(change) @ jacobian)
 
     first = (near - q)[joints]
     rng = np.random.default_rng(SEED)
@@ -111,7 +101,7 @@ def shortest_reach(task, q, hand, goal, near):
             start,
             jac=True,
             method="SLSQP",
-            constraints=[{"type": "ineq", "fun": inside, "jac": inside_gradient}],
+            constraints=[{"type": "ineq", "fun": inside}],
             options={"ftol": 1e-12, "maxiter": 300},
         )
         if inside(reach.x) >= -1e-8:

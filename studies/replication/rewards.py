@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pandas as pd
-from published import RUNS, TRIALS, published_alone, published_cell
+from published import RUNS, TRIALS, Summary, published_alone, published_cell
 from reader import LEARNER
 from scipy.special import stdtrit
 
@@ -14,12 +14,6 @@ from coartic.estimates import RESAMPLES, SEED, TAILS, Estimate, standard_deviati
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
 COLOURS = {"equivalent": figures.PALETTE[0], "different": figures.PALETTE[3]}
-COLUMNS = [
-    *("task", "condition", "hands", "published", "published_sd", "published_runs", "pooled"),
-    *("several", "ours", "ours_sd", "runs", "of_runs", "difference", "difference_low"),
-    *("difference_high", "margin", "verdict", "p_sd", "p_se", "published_initial", "ours_initial"),
-    "run_ids",
-]
 MARKS = {"equivalent": "o", "different": "D", "undecided": "s"}
 
 
@@ -41,45 +35,46 @@ def compare_rewards(study):
         if published is None:
             continue
         complete = sum(each.published_runs or 0 for of, each in published.items() if of) == RUNS
+        unpublished = Summary(math.nan, published_runs=0 if complete else None)
         several = len(published) > 1 or len(set(hands)) > 1
         initial = published_alone(task, "initial hands")
         ours = map(str, hands.value_counts().index) if several else ()
         for name in dict.fromkeys(["", *published, *ours]):
             with_hands = runs[hands == name] if name else runs
-            rewards, summary = with_hands.reward.to_numpy(np.float64), published.get(name)
+            rewards = with_hands.reward.to_numpy(np.float64)
+            summary = published.get(name, unpublished)
+            is_compared, difference = len(rewards) > 0 and name in published, Estimate(math.nan)
+            if is_compared:
+                difference = difference_to_published(rewards, *summary[:3])
             row = {
                 "task": study.tasks[task].label + " †" * bool(study.tasks[task].reconstructed),
                 "condition": condition,
                 "hands": name,
-                "published_runs": 0 if complete else None,
-                "pooled": False,
-                "runs": len(rewards),
-                "of_runs": len(runs),
+                "published": summary.mean,
+                "published_sd": summary.sd,
+                "published_runs": summary.published_runs,
+                "pooled": summary.derived,
+                "several": len(published) > 2,  # with that of the whole cell
                 "ours": rewards.mean() if len(rewards) else math.nan,
                 "ours_sd": standard_deviation(rewards),
+                "runs": len(rewards),
+                "of_runs": len(runs),
+                **difference.columns("difference"),
+                "margin": MARGIN * abs(summary.mean),
+                "verdict": None,
+                "p_sd": math.nan,
+                "p_se": math.nan,
                 "published_initial": initial and initial.mean,
                 "ours_initial": runs.initial_reward.dropna().mean(),
-                "several": len(published) > 2,  # with that of the whole cell
                 "run_ids": " ".join(with_hands.run_id),
             }
-            if summary:
-                row |= {
-                    "published": summary.mean,
-                    "published_sd": summary.sd,
-                    "published_runs": summary.published_runs,
-                    "pooled": summary.derived,
-                    "margin": MARGIN * abs(summary.mean),
-                }
-            if summary and len(rewards):
-                difference = difference_to_published(rewards, *summary[:3])
-                row |= difference.columns("difference")
-                if summary.sd is not None and not summary.derived:
-                    row["p_sd"] = spread_p(rewards, summary.sd, summary.runs)
-                    row["p_se"] = spread_p(rewards, summary.sd, summary.runs, of_mean=True)
-                if (runs.trials == TRIALS).all():
-                    row["verdict"] = equivalence(difference, row["margin"])
+            if is_compared and summary.sd is not None and not summary.derived:
+                row["p_sd"] = spread_p(rewards, summary.sd, summary.runs)
+                row["p_se"] = spread_p(rewards, summary.sd, summary.runs, of_mean=True)
+            if is_compared and (runs.trials == TRIALS).all():
+                row["verdict"] = equivalence(difference, row["margin"])
             rows[" ".join(filter(None, (task, condition, name)))] = row
-    return pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS).rename_axis("row")
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
 
 def difference_to_published(ours, published, sd, runs):

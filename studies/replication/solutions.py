@@ -4,10 +4,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.patches import Circle
 from published import published_cell
-from reader import LEARNER, MissingError, Reader
+from reader import LEARNER, Reader
 
 from coartic import load_task
 from coartic.analysis import figures
+from coartic.analysis.study import MOST_EXECUTED, solved, typical_run
 
 TALLEST = 8.8
 """Height of a page that leaves room for a caption, inches."""
@@ -22,24 +23,15 @@ def measure_solutions(study):
     """
     rows = []
     for name, task in study.tasks.items():
-        cells = {
-            label.removeprefix(LEARNER): label
-            for on, label in sorted(study.cells)
-            if on == name
-            and published_cell(name, label.removeprefix(LEARNER))
-            and (study.cells[on, label].status == "ok").any()
-        }
         runs = {}
-        if cells:
-            try:
-                runs["initial"] = Reader(study).initial_execution(name)
-            except MissingError:
-                continue
-        for condition, label in cells.items():
-            executed, every = study.executed(name, label), study.cells[name, label]
-            median = np.median(every[every.status == "ok"].reward.astype(float))
-            rewards = -np.array([run.ticks for run in executed.runs])
-            runs[condition] = executed.runs[np.abs(rewards - median).argmin()]
+        for on, label in sorted(study.cells):
+            condition, every = label.removeprefix(LEARNER), solved(study.cells[on, label])
+            if on == name and len(every) and published_cell(name, condition):
+                executed = study.executed(name, label)
+                typical = typical_run(every[:MOST_EXECUTED])
+                runs[condition] = executed.runs[executed.run_ids.index(typical)]
+        if runs:
+            runs = {"initial": Reader(study).initial_execution(name)} | runs
         for condition, run in runs.items():
             for goal, (q, ticks) in enumerate(
                 zip(run.configurations, run.ticks_by_goal(), strict=True)

@@ -12,19 +12,13 @@ DISTANCES = [0.25, 0.5, 1.0]
 HALF = 0.5
 
 
-def changed(task, goals):
-    """The task with other goals. Raises CoarticError or MethodError where they cannot be hit."""
-    other = parse_task(task.model_dump() | {"goals": goals, "name": "changed"}, "a changed task")
-    objective(other)  # or it says that no hands hit them all
-    return other
-
-
 def moves(task, seed):
     """Yield, for each goal but the last and each distance, the goal (from 0), the distance, and the
     task with the goal after it moved by this distance. The direction is random, the same for all
     distances; the moved goal stays apart from its neighbours. A goal for which no direction is
     found is left out."""
     rng, goals = np.random.default_rng([68, seed]), task.goal_array
+    content = task.model_dump() | {"name": "changed"}
     for g in range(len(goals) - 1):
         neighbours = np.delete(goals, g + 1, axis=0)[max(g - 1, 0) : g + 2]
         for _ in range(100):
@@ -33,18 +27,28 @@ def moves(task, seed):
             if np.linalg.norm(places[:, None] - neighbours, axis=2).min() < 4 * task.radius:
                 continue
             try:
-                tasks = [changed(task, [*goals[: g + 1], place, *goals[g + 2 :]])
-                         for place in places]  # fmt: skip
+                tasks = [parse_task(content | {"goals": [*goals[: g + 1], place, *goals[g + 2 :]]},
+                                    "a changed task") for place in places]  # fmt: skip
+                for other in tasks:
+                    objective(other)  # or it says that no hands hit them all
             except (CoarticError, MethodError):
                 continue
             yield from zip([g] * len(tasks), DISTANCES, tasks, strict=True)
             break
 
 
+def with_shares(shifts, after):
+    """Add ``share_N`` of the final shift that is there after N trials, and ``log_half``, the
+    logarithm (base 10) of the trials until the share is a half, to columns ``dot_N`` and
+    ``square``. ``after`` has the numbers of trials."""
+    shares = {f"share_{n}": shifts[f"dot_{n}"] / shifts.square for n in after}
+    half = [trials_to_half(curve, after) for curve in np.array([*shares.values()]).T]
+    return shifts.assign(**shares, log_half=half)
+
+
 def trials_to_half(shares, after):
-    """Return the logarithm, base 10, of the trials until a share of the final shift is a half,
-    interpolated. ``shares``: after each number of trials in ``after``. NaN if the last share is
-    below a half."""
+    """Return the logarithm, base 10, of the trials until a share is a half, interpolated; NaN if
+    the last share is below a half."""
     if not shares[-1] >= HALF:
         return np.nan
     k = int((shares >= HALF).argmax())

@@ -15,14 +15,7 @@ def condition(task):
     return "EC1" if len(task.hands) == 1 else "EC4"
 
 
-def look(task, movements):
-    """Return the postures at the hits of the goals, shape ``(G, dof)``, and the ticks of a
-    trial."""
-    done = execute(task, movements)
-    return done.configurations, done.ticks
-
-
 def plan(task, method, seed=0, **parameters):
-    """As :func:`look`, for the solution of a planner or controller of the package."""
+    """Return the execution of the solution of one of the package's planners."""
     result, _ = run_method(method(method.Parameters(**parameters)), task, seed)
-    return look(task, result.solution)
+    return execute(task, result.solution)

@@ -1,9 +1,9 @@
 """The second contrast, practice from another start: do learners keep apart?"""
 
 import numpy as np
-from people import PEOPLE, condition, look, plan
+from people import PEOPLE, condition, plan
 
-from coartic import learn, learn_many, parse_task
+from coartic import execute, learn, learn_many, parse_task
 from coartic.baselines.posture_based import TwoGoals
 
 
@@ -21,14 +21,14 @@ def start_elsewhere(task, seed):
     seeds = [1000 * seed + n for n in range(2 * PEOPLE)]
     runs = [run for start, some in ((a, seeds[:PEOPLE]), (b, seeds[PEOPLE:]))
             for run in learn_many(start, condition(task), seeds=some, jobs=1)]  # fmt: skip
-    tested = [look(c, run.solution)[0] for run in runs]
-    went_on = [look(c, learn(c, condition(task), seed=s + 500, start=run.solution).solution)[0]
+    tested = [execute(c, run.solution) for run in runs]
+    went_on = [learn(c, condition(task), seed=s + 500, start=run.solution).execute()
                for s, run in zip(seeds, runs, strict=True)]  # fmt: skip
-    planned = [plan(c, TwoGoals, s)[0] for s in seeds]
-    for model, trials, postures in (
+    planned = [plan(c, TwoGoals, s) for s in seeds]
+    for model, trials, people in (
         ("learner", 1, tested), ("learner", 10_000, went_on), ("planner", 1, planned)
     ):  # fmt: skip
-        q = np.array(postures).reshape(2 * PEOPLE, -1)
+        q = np.array([person.configurations for person in people]).reshape(2 * PEOPLE, -1)
         apart = ((q[:, None] - q) ** 2).sum(axis=2)
         same = np.kron(np.eye(2), np.ones((PEOPLE, PEOPLE))).astype(bool)
         within = apart[same].sum() / (2 * PEOPLE * (PEOPLE - 1))

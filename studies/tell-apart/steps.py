@@ -17,14 +17,14 @@ def series(task, model, seed):
     """Postures at the goals, ``(trials, G, dof)``, and rewards of a person of a task for one arm.
 
     The ``learner`` keeps a trial that is better than all before, and adds noise to what it keeps;
-    up to there it is the paper's, number for number. The ``fixed`` one keeps nothing more from
-    the block on, the ``walk`` keeps every trial. The ``planner`` adds noise to its plan.
+    up to there it is the paper's, number for number. The ``walk`` keeps every trial. The
+    ``planner`` adds noise to its plan.
     """
     session = Session(task, 0, [Information.REWARD_BY_TRIAL, Information.CORRECTIVE_PROCESS])
     rng, best = np.random.default_rng(seed), -np.inf
     targets = np.full((1, len(task.goals), len(task.q0)), np.nan)
     if model == "planner":
-        targets[0] = plan(task, TwoGoals, seed)[0]
+        targets[0] = plan(task, TwoGoals, seed).configurations
     free, postures, rewards = movable(task, "right"), [], []
     for trial in range(BLOCK.stop):
         tried = targets.copy()
@@ -33,8 +33,8 @@ def series(task, model, seed):
         done = session.trials("R" * len(task.goals), tried)
         postures.append(done.reached[0])
         rewards.append(done.rewards[0])
-        learns = model == "learner" or (model == "fixed" and trial < BLOCK.start)
-        if (learns and rewards[-1] > best) or (model == "walk" and done.completed[0]):
+        is_better = model == "learner" and rewards[-1] > best
+        if is_better or (model == "walk" and done.completed[0]):
             best, targets = rewards[-1], done.reached
     return np.array(postures), np.array(rewards)
 
@@ -47,7 +47,7 @@ def steps(task, seed):
     that if it was not.
     """
     free = movable(task, "right")
-    for model, person in product(("learner", "fixed", "walk", "planner"), range(PEOPLE)):
+    for model, person in product(("learner", "walk", "planner"), range(PEOPLE)):
         postures, rewards = series(task, model, 1000 * seed + person)
         records = np.flatnonzero(rewards[1:] > np.maximum.accumulate(rewards)[:-1]) + 1
         same, sums = [], np.zeros((2, 2))

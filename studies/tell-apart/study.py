@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from announced import HALF, trials_to_half
+from announced import HALF, with_shares
 from changes import AFTER
 from people import NOISE
 from scipy import stats
@@ -20,16 +20,12 @@ EXPERIMENTS = 2000
 
 
 def share_by_task(changes):
-    """A row for each task, distance and model: sums over people and goals, and shares of the shift.
-
-    ``half``: trials until the share is a half, interpolated on a logarithmic scale.
-    """
+    """A row for each task, distance and model: sums over people and goals, and shares of the shift
+    as of :func:`announced.with_shares`."""
     shares = changes.groupby(["distance", "model", "task"], sort=False)
-    shares = shares.sum(numeric_only=True, min_count=1).reset_index()
-    numbers = {f"share_{n}": shares[f"dot_{n}"] / shares.square for n in AFTER}
-    half = [trials_to_half(curve, AFTER) for curve in np.array(list(numbers.values())).T]
+    shares = with_shares(shares.sum(numeric_only=True, min_count=1).reset_index(), AFTER)
     return shares.assign(
-        **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
+        half=shares.log_half, shift=np.sqrt(shares.square / shares.cases),
         drift=shares["same"] / shares.square, from_anew=np.log10(shares.anew / shares.among) / 2,
         gap=100 * (shares.ticks_10000 / shares.ticks_anew - 1),
     )  # fmt: skip
@@ -38,9 +34,9 @@ def share_by_task(changes):
 def tabulate(shares, starts, steps):
     """Means over tasks with intervals, a row for each measure of a model.
 
-    Shares vary between tasks, so that ``share_1`` has its median and its ``pooled`` value, sums
-    over tasks, as well, and the trials to half their quartiles. ``unlike``: tasks on which two
-    learners of the changed task differ by more than the learner shifts.
+    Shares vary between tasks, so that ``share_1`` has its median, too, and the trials to half their
+    quartiles. ``unlike``: tasks on which two learners of the changed task differ by more than the
+    learner shifts.
     """
     columns = [*(f"share_{n}" for n in AFTER), "shift", "half", "drift", "from_anew", "gap"]
     by = shares.assign(unlike=shares.among > shares.square).groupby(
@@ -48,7 +44,6 @@ def tabulate(shares, starts, steps):
     )
     more = pd.DataFrame({
         "share_1_median": by.share_1.median(),
-        "share_1_pooled": by.dot_1.sum() / by.square.sum(),
         **{f"half_{100 * part:.0f}": by.half.quantile(part) for part in (0.25, 0.5, 0.75)},
         "unlike": by.unlike.sum(),
     })  # fmt: skip

@@ -29,7 +29,6 @@ def planted(gains, quarters=None):
                     "task": f"{family}/v1/i{number:03d}", "family": family, "setting": setting,
                     "run": 0, "corrective_best": -600, "best_known": -500, **rewards,
                     "quarter": (quarters or {}).get(setting, 1000) + number, "half": np.inf,
-                    "first": 0.0,
                 })  # fmt: skip
     return STUDY.measure_runs(pd.DataFrame(rows))
 
@@ -47,7 +46,6 @@ def test_gains_are_shares_of_the_way_to_the_best_known():
     runs = planted({"0 0.05": (30, 70)})
     paper = runs[(runs.setting == "0 0.05") & (runs.task == "long/v1/i000")].iloc[0]
     assert (paper.gain_30, paper.gain_100, paper.gain_10000) == (0, 28.5, 68.5)
-    assert paper.gap_100 == pytest.approx(100 * (571.5 / 500 - 1))
     assert (paper.log_quarter, paper.log_half) == (3, 4)  # a run that does not come there: all
     nothing = STUDY.measure_runs(runs.assign(best_known=-600))
     assert nothing.gain_100.isna().all()
@@ -75,7 +73,7 @@ def test_a_task_is_run_under_every_setting(monkeypatch):
         monkeypatch.setattr(PROTOCOLS, name, value)
     rows = pd.DataFrame(PROTOCOLS.run_task("ascending"), columns=[
         "task", "family", "setting", "run", "corrective_best", "best_known", *"abcd",
-        "quarter", "half", "first", "hands",
+        "quarter", "half",
     ])  # fmt: skip
     assert rows.groupby("setting").size().eq(2).all()
     assert {*rows.setting} == {*PROTOCOLS.SETTINGS}
@@ -138,9 +136,8 @@ def test_other_methods_and_shifts_of_a_task(monkeypatch):
     monkeypatch.setattr(SHIFTS, "TRIALS", 40)
     monkeypatch.setattr(SHIFTS, "SHIFT_AFTER", (1, 10, 40))
     monkeypatch.setattr(PROTOCOLS, "OTHERS", {"posture planning": (PROTOCOLS.TwoGoals, 1)})
-    ((*_, start, best_known, first, last, _, _, _, hands),) = PROTOCOLS.run_others("ascending")
-    assert (first, hands) == (last, "RRR")
-    assert start < first <= best_known
+    ((*_, start, best_known, first, last, _, _),) = PROTOCOLS.run_others("ascending")
+    assert start < first == last <= best_known
     task = "one-armed/v1/d000"
     monkeypatch.setattr(SHIFTS, "SHIFT_TASKS", [task])
     rows = SHIFTS.run_shifts(task)

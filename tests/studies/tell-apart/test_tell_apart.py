@@ -50,7 +50,6 @@ def corrected(task, q, hand, goal):
 def test_share_at_once_by_other_code(monkeypatch, name):
     """By the step-by-step reference, one movement after the other."""
     monkeypatch.setattr(changes, "AFTER", [1, 100])
-    monkeypatch.setattr(changes, "EVOLVED", 2)
     monkeypatch.setattr(changes, "PLANNERS", {})
     task, practised = load_task(name), learn(name, changes.condition(load_task(name)), seed=0)
     cases = [case for case in changes.moves(task, 0) if case[1] == 0.5]
