@@ -68,7 +68,7 @@ UNCHECKED = (
 )
 
 
-def _need(holds: Any, words: str) -> None:
+def need(holds: Any, words: str) -> None:
     """Raise ValueError with these words unless something holds."""
     if not holds:
         raise ValueError(words)
@@ -114,10 +114,10 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 def stored_task(definition: str, model: str) -> Any:
     """Return a task from its stored JSON, with its constants of movement (``model``), start
     (``q0``), locked base coordinates and arms."""
-    _need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
+    need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
-    _need(1 <= len(task.goals) <= MOST_GOALS, "the task has too many goals")
+    need(1 <= len(task.goals) <= MOST_GOALS, "the task has too many goals")
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
     task.locked = ["xy".index(coordinate) for coordinate in task.locked_base]
     robot, middle = task.robot, 2 + len(task.robot.left_links)
@@ -197,14 +197,14 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
             if hit or (is_corrective and hits and ticks == 1):
                 # Nothing is to be done. A movement of no ticks to where it is names the hand.
                 is_none = len(to_goal) == 1 and not movement.ticks and (movement.corners == q).all()
-                _need(is_none, f"{which} is made after goal {goal} is hit")
+                need(is_none, f"{which} is made after goal {goal} is hit")
                 hit = True
                 continue
             q, hit = end, hits
             words = f"{which} takes {'at least ' * (ticks > movement.ticks)}{ticks} ticks"
-            _need(ticks == movement.ticks, f"{words}, not {movement.ticks}")
+            need(ticks == movement.ticks, f"{words}, not {movement.ticks}")
             reward, corrections = reward - ticks, corrections + is_corrective
-        _need(hit, f"goal {goal} is not hit")
+        need(hit, f"goal {goal} is not hit")
         hands += to_goal[0].hand[0].upper()
         other = task.arms["right" if to_goal[0].hand == "left" else "left"][0]
         travel += math.dist(q[other], before[other])
@@ -215,18 +215,16 @@ def _check_rules(task: Any, movements: list[MoveRow]) -> None:
     """Raise ValueError if movements break a rule that is checked without making the movements."""
     goals = [movement.goal for movement in movements]
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
-    _need(goals == sorted(goals), f"its goals are out of order: {goals}")
-    _need(
-        [goal for goal, _ in hands] == [*range(1, len(task.goals) + 1)], "a goal has not one hand"
-    )
+    need(goals == sorted(goals), f"its goals are out of order: {goals}")
+    need([goal for goal, _ in hands] == [*range(1, len(task.goals) + 1)], "a goal has not one hand")
     for order, _, hand, kind, _, corners in movements:
         which = f"movement {order}"
-        _need(corners.shape[1:] == task.q0.shape, f"{which} has not a number for each joint")
-        _need(hand in task.hands, f"{which} uses the {hand} hand, which the task does not have")
-        _need(kind in ("learned", "planned", "corrective", "path"), f"{which} is of no known kind")
+        need(corners.shape[1:] == task.q0.shape, f"{which} has not a number for each joint")
+        need(hand in task.hands, f"{which} uses the {hand} hand, which the task does not have")
+        need(kind in ("learned", "planned", "corrective", "path"), f"{which} is of no known kind")
     every = np.concatenate([each.corners for each in movements])
-    _need((np.abs(every) <= 1e5).all(), "a movement has an entry that is no number up to 1e5")
-    _need((every == task.q0)[:, task.locked].all(), "a movement moves a locked base")
+    need((np.abs(every) <= 1e5).all(), "a movement has an entry that is no number up to 1e5")
+    need((every == task.q0)[:, task.locked].all(), "a movement moves a locked base")
 
 
 class _Report(NamedTuple):
@@ -270,23 +268,23 @@ def _check_all(db: sqlite3.Connection) -> _Report:
         where = f"Run {run}"
         try:
             task = tasks.get(row["cell"], "its cell is not there")
-            _need(not isinstance(task, str), task)
+            need(not isinstance(task, str), task)
             _check_identity(row)
             parts, stored = _read_movements(db, row["number"])
-            _need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
+            need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
             spent += sum(move.ticks for moves in parts.values() for move in moves)
             spent += row["trials"] or 0
-            _need(spent <= MOST_IN_ALL, "it and those before have too many ticks and trials")
+            need(spent <= MOST_IN_ALL, "it and those before have too many ticks and trials")
             for part, moves in parts.items():
                 where, movements = f"Run {run}, {part}", movements + len(moves)
                 outcome = recompute(task, moves) if moves else (None, None, None, None)
                 for name, now in zip(STATED[part], outcome, strict=False):
                     close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
-                    _need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
+                    need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
             where = f"Run {run}"
             content = json.dumps([row["status"], *stored])
             result = hashlib.sha256(content.encode() + _check_rewards(row)).hexdigest()[:16]
-            _need(row["result"] == result, "a joint or a trial was changed")
+            need(row["result"] == result, "a joint or a trial was changed")
         except Exception as problem:  # whatever keeps a run from being executed
             wrong.append(f"{where}: {problem}.")
     empty = [f"Runs without a solution: {unsolved}."] if unsolved else []
@@ -300,10 +298,10 @@ def _check_identity(row: Any) -> None:
     the suite and the number of the run, and ends with the hash of the code."""
     suite_seed, run = row["suite_seed"], row["run"]
     digits = hashlib.sha256(f"{row['digest']} {suite_seed} {run}".encode()).hexdigest()[:16]
-    _need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
+    need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
     words = np.frombuffer(hashlib.sha256(row["task"].encode()).digest()[:16], "<u4").tolist()
     (state,) = np.random.SeedSequence(suite_seed, spawn_key=(*words, run)).generate_state(1, "u8")
-    _need(row["seed"] == int(state) >> 1, f"its seed is not {row['seed']}")
+    need(row["seed"] == int(state) >> 1, f"its seed is not {row['seed']}")
 
 
 def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
@@ -320,11 +318,11 @@ def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]
             cell = {"task": definition, "model": model, "parameters": parameters}
             cell |= {name: row[name] for name in ("method", "trial_budget")}
             same = row["digest"] == hash_of(cell)
-            _need(same, "its task, method, parameters or model were changed")
-            _need(row["task"] == task.name, f"its task is not {row['task']}")
+            need(same, "its task, method, parameters or model were changed")
+            need(row["task"] == task.name, f"its task is not {row['task']}")
             changed = {k: v for k, v in parameters.items() if k not in defaults or v != defaults[k]}
             setting = ", ".join(f"{k}={v}" for k, v in changed.items())
-            _need(row["setting"] == setting, f"its parameters are not {row['setting']}")
+            need(row["setting"] == setting, f"its parameters are not {row['setting']}")
         except Exception as problem:
             tasks[row["id"]] = str(problem)
             yield f"Row {row['id']} of table cells: {problem}."
@@ -332,7 +330,7 @@ def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]
         try:
             content = json.loads(row["content"])
             packages = hash_of([content.get("python"), content.get("packages")])[:8]
-            _need(row["packages"] == packages, f"its packages are not {row['packages']}")
+            need(row["packages"] == packages, f"its packages are not {row['packages']}")
         except Exception as problem:
             yield f"Row {row['id']} of table environments: {problem}."
     query = """SELECT task FROM plan JOIN cells ON cells.id = cell
@@ -370,7 +368,7 @@ def _check_rewards(row: Any) -> bytes:
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
         content = zlib.decompressobj().decompress(row["rewards"] or EMPTY, size + 1)
-        _need(len(content) <= size, "")
+        need(len(content) <= size, "")
         numbers = np.frombuffer(content, "u1").reshape(4, -1)
         best = int.from_bytes(numbers[:, 0].tobytes(), "little", signed=True)
     except (zlib.error, ValueError, TypeError):
@@ -379,7 +377,7 @@ def _check_rewards(row: Any) -> bytes:
     wanted = np.frombuffer(worse.to_bytes(4, "little"), "u1")
     found = np.flatnonzero((numbers[:, 1:] == wanted[:, None]).all(axis=0))[:1].tolist()
     first = found[0] if found and worse and row["status"] == "ok" else None
-    _need(row["best_trial"] == first, f"best_trial is {first}, not {row['best_trial']}")
+    need(row["best_trial"] == first, f"best_trial is {first}, not {row['best_trial']}")
     return content
 
 
@@ -391,13 +389,13 @@ def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[Mo
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
         WHERE result_id = ? ORDER BY "order\""""
     for part, order, goal, hand, kind, ticks, text in db.execute(query, [run]):
-        _need(order == len(parts[part]), f"movement {len(parts[part])} is missing")
+        need(order == len(parts[part]), f"movement {len(parts[part])} is missing")
         which, is_count = f"movement {order}", type(ticks) is int and 0 <= ticks <= MOST_TICKS
-        _need(is_count, f"{which} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
-        _need(len(text) <= LONGEST_PATH, f"{which} is too long")
+        need(is_count, f"{which} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
+        need(len(text) <= LONGEST_PATH, f"{which} is too long")
         points = np.array(json.loads(text), dtype=np.float64)
         is_place = points.ndim == 1 + (kind == "path") and len(points)
-        _need(is_place, f"{which}: {kind} has no such points")
+        need(is_place, f"{which}: {kind} has no such points")
         parts[part].append(MoveRow(order, goal, hand, kind, ticks, np.atleast_2d(points)))
         stored[part].append([part, goal, hand, kind, ticks, text])
     return parts, [*chain(*stored.values())]

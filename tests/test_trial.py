@@ -149,12 +149,12 @@ def assert_due(door, task, model, cases):
             else:
                 due = np.reshape(due, np.shape(value))
                 np.testing.assert_allclose(value, due, rtol=0, atol=1e-9, err_msg=name)
-    assert any(found)
+    return any(found)
 
 
 @pytest.mark.parametrize("name", TASKS)
 def test_a_trial_is_the_references(name):
-    assert_due(by_trials, TASKS[name], MODELS[name], cases(name))
+    assert assert_due(by_trials, TASKS[name], MODELS[name], cases(name))
     rewards = [case.due.reward for case in cases(name)]
     assert (None in rewards) == (name != "two-armed-2")
     assert len({*rewards}) >= 8
@@ -201,7 +201,8 @@ def rich_cases(name, number):
 @pytest.mark.parametrize("name", ["ascending", "two-armed-1", "uneven"])
 @pytest.mark.parametrize("door", [by_execute_many, by_trajectory, by_checker])
 def test_a_solution_of_any_kind_is_the_references(door, name, number):
-    assert_due(door, TASKS[name], OTHERS[number], rich_cases(name, number))
+    found = assert_due(door, TASKS[name], OTHERS[number], rich_cases(name, number))
+    assert found or (name, number) == ("two-armed-1", 0)  # in which no solution is completed
 
 
 @pytest.mark.parametrize("name", ["two-armed-1", "uneven"])

@@ -342,7 +342,7 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["animate", "1a2b", "--out", "x.txt"], "the name must end in .gif or .mp4"),
         (["draw", "ascending", "--out", "x.txt"], "the name must end in .svg or .pdf or .png"),
         (["new", "my-search", "--out", "x.txt"], "the name must end in .py"),
-        (["new", "My Search"], "coartic new: My Search: the name 'My Search' must begin with"),
+        (["new", "My Search"], "coartic new: the name 'My Search' must begin with"),
         (["new", "dual-process/EC1"], "'dual-process/EC1' is reserved"),
         (["new", "cma-es"], "'cma-es' is a name of a method here"),
         (["new", "ec4"], "'ec4' is a name of a method here"),

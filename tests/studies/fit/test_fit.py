@@ -65,7 +65,8 @@ def with_noise(people, sd):
 def rough(people, noise):
     """The row of one subject, without intervals, which take long."""
     trials, condition = FIT.trials_of(people, TASK), FIT.condition_for(TASK)
-    return FIT.fit_subject(TASK, condition, trials, noise=noise, intervals=False)
+    plan = FIT.plan_for(TASK)
+    return FIT.fit_subject(TASK, condition, trials, noise=noise, plan=plan, intervals=False)
 
 
 def test_motor_noise_is_a_parameter(people):
