@@ -90,5 +90,5 @@ def _misc(key: str, **fields: str) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return a line that BibTeX skips: between entries BibTeX reads nothing but an @."""
+    """Return text as one line that BibTeX skips: it has (at) for @, which would begin an entry."""
     return f"% {one_line(text)}".replace("@", "(at)")

@@ -96,7 +96,7 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float], str]:
 
 @cached
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the most trials that a run of a method made on a task."""
+    """Return the most trials that a run of a method made on a task, 0 if no run made trials."""
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
@@ -111,7 +111,7 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
 
 
 def selects(study: Study, label: str) -> bool:
-    """Return whether a method may select its solution from many trials by their rewards."""
+    """Return whether a method, not random search, may select its solution by rewards of trials."""
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
@@ -148,7 +148,7 @@ def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> s
     For each method that may select its solution by rewards (:func:`selects`), the suite has random
     search with as many trials as the method and with each hand sequence that a tenth or more of the
     method's solved runs have, unless the study has this random search. Write the suite to a file
-    and run it beside the results of the study: ``coartic run control.toml --include FOLDER``.
+    and run it with the results of the study: ``coartic run control.toml --include FOLDER``.
 
     Parameters
     ----------

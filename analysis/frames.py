@@ -44,8 +44,8 @@ def checked(
     names: Sequence[str] = (),
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Return a copy of columns of a user's frame: ``numbers`` as float64 with NaN for missing
-    numbers, ``names`` and ``others`` as they are.
+    """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
+    missing numbers, ``names`` and ``others`` as they are.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
     that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
@@ -80,12 +80,12 @@ def checked(
 
 
 def inline(name: object) -> str:
-    """Return the name of a column as one inline line."""
+    """Return the name of a column as one printable line, cut if it is long (:func:`.plain`)."""
     return plain(str(name))
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return the names of columns that an argument has; a text is one name.
+    """Return a list of the names of columns that an argument has; a text is one name.
 
     Raises CoarticError, with ``what`` as the name of the argument, for an argument that is no list
     of columns, or names a column twice.
@@ -111,11 +111,11 @@ def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str
 
 
 def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
-    """Return checked columns with the ``gap`` and, of frames with :data:`ZERO`, the ``share`` of
-    each row.
+    """Return a copy of checked columns with the ``gap`` and, of frames with :data:`ZERO`, the
+    ``share`` of each row, NaN where nothing can be gained.
 
-    Raises CoarticError for rewards above 0 or above the best known reward, and for a best known
-    reward of 0.
+    Raises CoarticError for rewards above 0, for rewards or :data:`ZERO` above the best known
+    reward, and for a best known reward of 0.
     """
     for name in ("reward", "best_known"):
         sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
@@ -179,7 +179,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     ------
     CoarticError
         The frame has no rows, lacks a column, or has text, rewards above 0 (costs are positive,
-        rewards negative) or rewards above the best known reward.
+        rewards negative), rewards above the best known reward, or a best known reward of 0.
 
     Examples
     --------
@@ -241,12 +241,13 @@ def means(
     DataFrame
         A row for each group, in the order of first appearance: ``by``, the number of ``rows``, and
         for each column ``x`` the mean ``x`` with its interval ``x_low`` to ``x_high`` (BCa
-        bootstrap, NaN with fewer than three values).
+        bootstrap, NaN with fewer than three values); a mean without values is NaN.
 
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``.
+        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``;
+        ``by`` is empty or has a column that is in ``columns``, too.
 
     Examples
     --------
@@ -284,8 +285,9 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each pair of ``task`` and ``method``: mean ``reward`` (negative ticks) of ``n``
-        solved runs, ``gap``, and ``share`` where the frame has ``corrective_best``.
+        A row for each pair of ``task`` and ``method``, in the order of first appearance: mean
+        ``reward`` (negative ticks) of ``n`` solved runs, ``gap``, and ``share`` where the frame has
+        ``corrective_best``; NaN where ``n`` is 0.
 
     Raises
     ------
@@ -324,12 +326,12 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
         runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
         (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
-        that it solved in every run, of ``missing`` tasks, of ``runs`` and of ``failed`` runs. A
-        method with missing tasks has no gap and is last. The paper's learner over tasks for one arm
-        and for two has a row of its own, ``"dual-process (EC1, EC4)"``. With ``corrective_best``
-        also the ``share`` of the possible gain (:func:`shares`) with ``share_low`` and
-        ``share_high``, a mean over the tasks on which something can be gained, and
-        ``without_gain``, the number of other tasks.
+        that it solved in every run, of ``missing`` tasks (the others with a best known reward), of
+        ``runs`` and of ``failed`` runs on all tasks. A method with missing tasks has no gap and is
+        last. The paper's learner over tasks for one arm and for two has a row of its own,
+        ``"dual-process (EC1, EC4)"``. With ``corrective_best`` also the ``share`` of the possible
+        gain (:func:`shares`) with ``share_low`` and ``share_high``, a mean over the tasks on which
+        something can be gained, and ``without_gain``, the number of other tasks.
 
     Raises
     ------
@@ -441,7 +443,7 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
 def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     """Return recorded trials, of people for instance, as solutions for signatures.
 
-    Nothing is executed again: postures at hits and ticks are as recorded.
+    Nothing is executed again: postures at hits and ticks, rounded to whole ones, are as recorded.
 
     Parameters
     ----------
@@ -455,7 +457,7 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     Returns
     -------
     Solutions
-        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial.
+        A run for each trial in which all goals are hit, by subject and trial, as ``run_ids`` says.
 
     Raises
     ------

@@ -29,9 +29,10 @@ _LARGEST_TRIAL = 100_000
 def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> pd.DataFrame:
     """Read recorded trials: a CSV file with a row for each hit.
 
-    Blank lines, lines that begin with ``#``, and commas at the end of a line do not count. Angles
-    that jump by a turn (2π) between hits are unwrapped from hit to hit, from the start of the task
-    on, with a warning. They stay, also with a warning, if most hits are far from their goals.
+    Blank lines, lines that begin with ``#``, commas at the end of a line, and other columns do not
+    count. Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
+    start of the task on, with a warning. They stay, also with a warning, if the hand is more than
+    two radii from its goal in the median hit. Warns, too, if ticks rise from goal to goal.
 
     Parameters
     ----------
@@ -49,13 +50,14 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     Returns
     -------
     DataFrame
-        The rows by subject (in the order of the file), trial and goal, with ``ticks`` in place of
-        ``duration`` and all joints.
+        The rows sorted by subject (in the order of the file), trial and goal, with ``ticks`` in
+        place of ``duration`` and all joints; numbers are float64, the index is new.
 
     Raises
     ------
     CoarticError
-        The file is no such table. A sentence says where and what is needed.
+        The file is no such table, an angle exceeds 20 rad, or a wrapped joint turns by more than
+        2.5 rad between hits. A sentence says where and what is needed.
     """
     if words := foreign_file(str(path), "recorded hits are a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)

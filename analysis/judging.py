@@ -62,8 +62,11 @@ class Finding:
 
     def verdict(self, p: float, opposite_p: float) -> Verdict:
         """Return ``supported``, ``not supported`` or ``undecided`` by p-values of the claim and of
-        its opposite, corrected or not. With NaN for ``p``, as of an exact count, a claim that holds
-        is supported."""
+        its opposite, corrected or not.
+
+        A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
+        that does not hold is not supported if ``opposite_p`` is below 5 %, or without tests. Other
+        claims, and claims with too few runs, are undecided."""
         untested = any(math.isnan(test.p) and min(test.n) < 2 for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -151,7 +154,7 @@ def all_of(*findings: Finding) -> Finding:
     -------
     Finding
         Holds if all findings hold. It has the tests of all, and the tests in ``against`` of all, or
-        None if a finding has None. The first finding whose runs are too few, if there is one.
+        None if a finding has None. If findings have too few runs, the first of these is returned.
 
     Raises
     ------
@@ -195,8 +198,8 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
         A row for each claim, by its id: ``statement``, ``verdict`` (``supported``, ``not
         supported`` or ``undecided``), ``evidence``, ``test`` and corrected p-values: ``p_holm`` of
         the claim, ``p_without`` of the claim without the task that favours it most, and
-        ``opposite_p_holm`` of its opposite. A claim is supported if both ``p_holm`` and
-        ``p_without`` are below 5 %.
+        ``opposite_p_holm`` of its opposite. A claim that holds is supported if both ``p_holm``
+        and ``p_without`` are below 5 %, or NaN for want of a test (:meth:`Finding.verdict`).
 
     Examples
     --------

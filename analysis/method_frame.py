@@ -37,8 +37,9 @@ OWN_COLOR = "brown"
 
 
 def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
-    """Return a row for each method with its setting, and for each pair of conditions of the learner
-    on tasks for one arm and for two, in the order of lists and figures.
+    """Return a row for each method with its setting, and for each pair of learners that
+    :func:`_joined_learners` joins: built-in methods in the order of ``methods.toml``, then methods
+    from files in the order of the suite.
 
     Parameters
     ----------
@@ -90,8 +91,8 @@ def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.Dat
 def _group_of(runs: pd.DataFrame) -> str:
     """Return the group of a method, one of :data:`GROUPS`, from its runs.
 
-    A method that learns from the reward of its trials is in the first group, whatever else it uses.
-    A method that makes a single trial on every task does not use the reward of trials.
+    The first if the method declares the reward of trials and a run made more than one trial,
+    whatever else it uses; or else the second if it declares the formula; or else the third.
     """
     information = {each for text in runs.information.unique() for each in text.split(", ")}
     if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:
@@ -121,9 +122,9 @@ def joined_label(one: str, two: str) -> str:
 
 
 def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
-    """Return the runs of each method by label, and those of the learner over tasks for one arm and
-    for two by :func:`joined_label`: all runs of its second method, and the runs of its first method
-    on tasks on which the second did not run."""
+    """Return runs by label: first those of the learner over tasks for one arm and for two, by
+    :func:`joined_label` (of its first method on tasks on which its second did not run, and all of
+    its second), then those of each given method."""
     tasks = {method: {*runs.task} for method, runs in by_method.items()}
     joined = {
         label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
@@ -134,7 +135,7 @@ def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.Dat
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield the label of each row with the names of its colour and dash: those in its ``look``; or
-    for the first methods from files brown; or the next pair that no ``look`` has."""
+    for the first methods from files brown and a dash; or the next pair that no ``look`` has."""
     fixed = {row["look"] for row in rows.values()}
     free = itertools.cycle((c, d) for d in DASHES for c in COLORS if (c, d) not in fixed)
     theirs = itertools.chain(((OWN_COLOR, dash) for dash in DASHES), free)
@@ -144,8 +145,8 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return those of some rows of :attr:`.Study.methods` that are no settings or ablations of a
-    method among them."""
+    """Return some rows of :attr:`.Study.methods` without settings and ablations of a method that
+    has a row among them."""
     return rows[~rows.under.isin(rows.index)]
 
 

@@ -37,8 +37,8 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 
     All runs count, including searches and runs copied from other folders, but not runs with another
     base, which solve another task. A task has no best known reward if its best reward is 0, which
-    leaves no gap, or if runs of one method are all that is known of the task, as they would be
-    compared with themselves; such a task is not in the result.
+    leaves no gap, or if runs of one method with one setting are all that is known of the task, as
+    they would be compared with themselves; such a task is not in the result.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 @checked_arguments
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the parameters ``base`` and ``other_arm``, which restrict movements, of each run, as
-    columns; the default for methods without such a parameter."""
+    columns by the index of ``runs``; for methods without them ``task`` and ``free``."""
     default = {"base": BASE, "other_arm": "free"}
     asked = {text: default | json.loads(text) for text in runs.parameters.unique()}
     return pd.DataFrame(

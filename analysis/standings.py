@@ -18,8 +18,9 @@ from coartic.internal.text import counted
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
-    best known rewards are proven, ``best of this folder`` if all are known from methods of this
-    folder alone, or else ``best known reward``. All tasks need a best known reward."""
+    best known rewards are proven, or without tasks; ``best of this folder`` if all are known from
+    methods of this folder alone; or else ``best known reward``. Raises KeyError for a task without
+    a best known reward."""
     best = [study.optima[task] for task in tasks]
     if all(each.proven for each in best):
         return "optimum"
@@ -28,15 +29,16 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
-    """Return the runs of every method but searches for the optimum, by the label of the method's
-    row in :attr:`.Study.methods`. Runs on tasks without a best known reward, and runs that lock
-    the base, are left out, and so are methods without other runs."""
+    """Return the runs, also failed ones, of every method except searches for the optimum, as
+    :func:`by_row` does. Runs on tasks without a best known reward, and runs that lock the base, are
+    left out, and so are methods without other runs."""
     return by_row(study, study.runs[study.runs.best_known.notna()])
 
 
 def by_row(study: Study, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Return runs of a study by the label of the row in :attr:`.Study.methods`, in the order of
-    these rows, without searches for the optimum."""
+    these rows, without searches for the optimum and rows without runs. A row that joins two
+    conditions of the learner has runs that are in the rows of these conditions, too."""
     runs = runs.copy(deep=False)
     runs.attrs = {}  # which pandas copies with every selection
     by_label = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
@@ -45,7 +47,7 @@ def by_row(study: Study, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method of :func:`compared` on some tasks.
+    """Return the runs of a method of :func:`compared` on some tasks; KeyError for other methods.
 
     No rows if the method has no run on one of the tasks, or if it is a row of
     :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.
@@ -57,7 +59,7 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the task and the label of each cell of some runs."""
+    """Return the pair of task and label of each cell of some runs, in the order of the runs."""
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
@@ -80,26 +82,26 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 
 
 def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Return runs of rows of :attr:`.Study.methods`, given by label, as one frame, with the label
-    in column ``method`` and an empty ``setting``."""
+    """Return runs of rows of :attr:`.Study.methods`, given by label, as one frame with a new index,
+    the label in column ``method`` and an empty ``setting``; without runs a frame without rows."""
     parts = [runs.assign(method=method) for method, runs in by_method.items()]
     return pd.concat([*parts, study.runs[:0]], ignore_index=True).assign(setting="")
 
 
 def common_runs(study: Study) -> pd.DataFrame:
-    """Return the runs of the methods that ran on all :func:`common_tasks`, on these tasks, as of
-    :func:`together`."""
+    """Return the runs on :func:`common_tasks` of the methods that ran on all of them, as one frame
+    (:func:`together`)."""
     tasks = common_tasks(study)
     return together(study, {method: runs_on(study, method, tasks) for method in compared(study)})
 
 
 @cached
 def board(study: Study) -> pd.DataFrame:
-    """Return a row for each method with a gap, the smallest gap first, with the columns of
-    :func:`.ranking` and of :attr:`.Study.methods`.
+    """Return a row for each method with a gap, by label, the smallest gap first, with the columns
+    of :func:`.ranking` and of :attr:`.Study.methods`.
 
     Methods that solved every run on :func:`common_tasks` are ranked over these tasks, other methods
-    from files over the tasks on which they solved every run.
+    from files over the tasks on which they solved every run; other built-in methods have no row.
     """
     runs, methods = common_runs(study), study.methods
     parts = [ranking(runs)] if len(runs) else []
@@ -121,7 +123,7 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
 
 def shown_name(study: Study, method: str) -> str:
     """Return the title of a method, for a method from a file that did not solve every run on
-    :func:`common_tasks` with the number of tasks that it solved: ``mine (3 of 8 tasks)``."""
+    :func:`common_tasks` with the number of tasks that it solved of all: ``mine (3 of 8 tasks)``."""
     row, on = study.methods.loc[method], {*solved_tasks(study, method)}
     if row.built_in or {*common_tasks(study)} <= on:
         return str(row.title)

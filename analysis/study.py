@@ -69,8 +69,8 @@ def solved(runs: pd.DataFrame) -> pd.DataFrame:
 
 @checked_arguments
 def typical_run(runs: pd.DataFrame) -> str:
-    """Return the id of the run with the reward nearest to the median of solved runs, the first of
-    several."""
+    """Return the id of the run with the reward nearest to the median, the first of several. All
+    runs need a solution (:func:`solved`)."""
     rewards = runs.reward.to_numpy(dtype=np.float64)
     return str(runs.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
@@ -309,7 +309,7 @@ class Study:
 
     @cached_property
     def cells(self) -> dict[CellKey, pd.DataFrame]:
-        """Runs by task and label (method with its setting), in the order of the plan."""
+        """Runs, also failed, by task and label (method with its setting), in the plan's order."""
         runs = self.runs.copy(deep=False)
         runs.attrs = {}  # which pandas copies with every column that is taken
         return dict([*runs.groupby(["task", "label"], sort=False)])
@@ -333,13 +333,14 @@ class Study:
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
-        """A row for each movement of the solutions (docs/results.md)."""
+        """A row for each movement of the solutions (docs/results.md), of all runs of the folder,
+        also in a study by :meth:`only`."""
         with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run that made trials, with the rewards of its trials, ticks, shape
-        ``(trials,)``; NaN for failed trials."""
+        ``(trials,)``, NaN for failed trials; of all runs, as :attr:`solutions`."""
         with open_results(self.folder) as store:
             yield from store.rewards()
 
@@ -360,7 +361,7 @@ class Study:
         Returns
         -------
         Solutions
-            Executions of the first 500 solved runs.
+            Executions of the first 500 solved runs, of those with a replay for ``replay``.
 
         Raises
         ------
@@ -419,8 +420,8 @@ class Study:
         Returns
         -------
         Series
-            By the index of :attr:`runs`; NaN for runs without the signature, and for runs after the
-            first 500 of a method on a task.
+            By the index of :attr:`runs`; NaN for runs without the signature, failed runs, and runs
+            after the first 500 solved ones of a method on a task.
         """
         values = pd.Series(np.nan, self.runs.index, name=name)
         for key, runs in self.cells.items():
@@ -443,7 +444,7 @@ class Study:
 
     @cached
     def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
-        """Return a signature of the runs of a method on a task by hand sequence.
+        """Return a signature of the runs of a method on a task by hand sequence, sorted.
 
         Arrays have shape ``(n,)``; runs without the signature are left out. Signature ``hand``, the
         choice of hands itself, has one entry ``""`` for all hand sequences together. Parameters are
@@ -458,17 +459,17 @@ class Study:
     @cached
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
-        runs of each method on each task; runs without a replay are left out."""
+        runs of each method on each task, of all as :attr:`solutions`, without runs that lack a
+        replay."""
         with open_results(self.folder) as store:
             return store.movements(part, MOST_EXECUTED)
 
 
 @cached
 def one_by_one(study: Study) -> dict[str, Task]:
-    """Return the tasks that a report shows one by one, by name: all tasks, but instances of
-    families, also changed ones such as ``two-armed/v1/i017.radius-0.2``, only if these are at most
-    eight.
-    """
+    """Return the tasks that a report shows one by one, by name: all tasks, but no instances of
+    families, changed ones such as ``two-armed/v1/i017.radius-0.2`` included, if there are more than
+    eight of them."""
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     left_out = drawn if len(drawn) > 8 else ()
     return {name: task for name, task in study.tasks.items() if name not in left_out}

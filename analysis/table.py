@@ -77,7 +77,8 @@ class Table:
         return f"<p>Table {self.id}, a function of a study. {html.escape(words)}</p>{columns}"
 
     def column(self, name: str) -> Column:
-        """Return the column to which a name in the CSV file belongs. Raises KeyError for others."""
+        """Return the column of this name, or with ``*`` of a beginning of the name. Raises KeyError
+        for others, such as ``gap_low`` of column ``gap[]``."""
         for column in self.columns:
             begins = column.ending in ("*", "[*]") and name.startswith(column.name)
             if name == column.name or begins:
@@ -117,7 +118,7 @@ class TableFrame(pd.DataFrame):
 @cached
 def _rows_of(study: Study, table: Table) -> pd.DataFrame:
     """Return a table as a DataFrame: a row for each name, and only the columns of the table, with
-    ``_low``, ``_high`` and ``_sd`` written out. Its ``attrs`` are those of :func:`_shown_names`."""
+    ``_low``, ``_high``, ``_sd`` written out; NaN for none. Its ``attrs``: :func:`_shown_names`."""
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
@@ -135,10 +136,10 @@ def _rows_of(study: Study, table: Table) -> pd.DataFrame:
 def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table.
 
-    ``title``: function that returns the title of a task, family or method (pandas copies a dict
-    with every column that is taken); ``under``: the method of each setting and ablation, by label;
-    ``own``: labels of methods from files; ``best_known``: True if a best known reward does not come
-    from this folder alone.
+    ``title``: function that returns the title of a task, family or method, or None (pandas copies a
+    dict with every column that is taken); ``under``: the method of each setting and ablation, by
+    label; ``own``: labels of methods from files; ``best_known``: True if a best known reward does
+    not come from this folder alone.
     """
     methods, tasks = study.methods, study.tasks
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
@@ -162,7 +163,7 @@ def is_setting(frame: pd.DataFrame) -> pd.Series:
 @checked_arguments
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
     """Return the common entries of a row for a cell with these runs: task, method, numbers of runs
-    and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.
+    and of solved runs, mean, SD and median of the reward, gap (or NaN), and the ids of the runs.
 
     A table leaves out entries for which it has no column.
     """
@@ -181,5 +182,5 @@ def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
 
 
 def run_ids(*parts: pd.DataFrame) -> Row:
-    """Return the entry ``run_ids`` of a row: the ids of all runs in the parts, as one text."""
+    """Return the entry ``run_ids`` of a row: the ids of all runs in the parts, as one line."""
     return {"run_ids": " ".join(run_id for runs in parts for run_id in runs.run_id)}

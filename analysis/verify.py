@@ -113,7 +113,7 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 
 def stored_task(definition: str, model: str) -> Any:
     """Return a task from its stored JSON, with its constants of movement (``model``), start
-    (``q0``), locked base coordinates and arms."""
+    (``q0``), locked base coordinates and arms. Raises ValueError if it is too long to check."""
     need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
@@ -140,8 +140,8 @@ class MoveRow(NamedTuple):
 
 
 def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """Return the points of a straight movement as columns, shape ``(dof, points)``, a step apart,
-    at most ``most`` + 1. The last is the target, even if points before it are left out."""
+    """Return points of a straight movement, from ``q``, as columns, shape ``(dof, points)``, a step
+    apart, at most ``most`` + 1. The last is the target, even if points before it are left out."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
@@ -249,7 +249,7 @@ def check_runs(folder: Path) -> _Report:
 
 
 def _check_all(db: sqlite3.Connection) -> _Report:
-    """Check the plan, the cells, and the runs one by one."""
+    """Check the plan, the cells, and the runs one by one; none if a table or view is foreign."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
     query = f"""SELECT sql FROM sqlite_master WHERE sql IS NOT NULL
@@ -305,9 +305,9 @@ def _check_identity(row: Any) -> None:
 
 
 def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
-    """Yield a sentence for each row that names no row, shows other runs than it says or cannot be
-    read. ``tasks`` gets the task of each cell by id, or the words of what is wrong with the cell:
-    the digest of a cell is a hash of its task, method, parameters, constants and budget."""
+    """Yield a sentence for each row that refers to a missing row, contradicts itself or cannot be
+    read, and for each name of two tasks in the plan. ``tasks`` gets the task of each cell by id, or
+    what is wrong with it; its digest is a hash of task, method, parameters, constants, budget."""
     for table, number, missing, _ in db.execute("PRAGMA foreign_key_check"):
         yield f"Row {number} of table {table} names a row of {missing} that is not there."
     for row in db.execute("SELECT * FROM cells"):
@@ -382,8 +382,9 @@ def _check_rewards(row: Any) -> bytes:
 
 
 def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
-    """Return the movements of a run by part (solution, initial, replay), and a list of all
-    movements as stored, which the hash of the result covers."""
+    """Return the movements of a run by part (solution, initial, replay; empty if it lacks one),
+    and a list of all movements as stored, part by part, which the hash of the result covers. Raises
+    ValueError for a missing or malformed movement."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
     stored: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements

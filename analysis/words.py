@@ -58,7 +58,8 @@ def id_of(function: Callable[..., Any]) -> str:
 def number(value: float, digits: _Digits | None = None) -> str:
     """Write a number, with a true minus and spaces between thousands from 10 000 on; – for NaN.
 
-    ``digits``: decimals; by default none for integers, and three significant figures for others.
+    ``digits``: decimals; by default none for integers, and three significant figures for others,
+    below 0.0001 two, as in ``1.2e−05``.
     """
     if math.isnan(value):
         return NONE
@@ -76,7 +77,7 @@ def number(value: float, digits: _Digits | None = None) -> str:
 
 
 def p_value(p: float) -> str:
-    """Write a p-value, ``p < 0.001`` or ``p = 0.012``, without a line break; empty for NaN."""
+    """Write a p-value, ``p < 0.001`` or ``p = 0.012``, with no-break spaces; empty for NaN."""
     if math.isnan(p):
         return ""
     return ("p < 0.001" if p < 0.001 else f"p = {p:.2g}").replace(" ", NO_BREAK)
@@ -94,7 +95,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 @checked_arguments
 def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
-    """Write a number of a table with its interval.
+    """Write a number of a table with its interval; CoarticError if the row lacks one of the three.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
 
 
 def titled_apart(tasks: Iterable[Task]) -> list[Task]:
-    """Return tasks in their order, copied with other titles where titles would be the same.
+    """Return the tasks in their order, copies of those whose titles change: no two are equal.
 
     The title of a changed task, ``ascending.radius-0.2``, is the title of its task and the change.
     Other tasks with the same title have their names in the title.
@@ -155,13 +156,13 @@ def marked(task: Task) -> str:
 
 
 def tally(counts: Mapping[Any, int]) -> str:
-    """Write counts by name, ``LRLR 17, RRLR 3``, the largest first; a dash without counts."""
+    """Write counts by name, ``LRLR 17, RRLR 3``, the largest first, then by name; – for none."""
     ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{name} {count}" for name, count in ordered) or NONE
 
 
 def commonest(reasons: Iterable[str]) -> list[str]:
-    """Write the three commonest reasons with their numbers, ``12 × no hit``."""
+    """Return texts of the (at most) three commonest reasons with numbers, ``12 × no hit``."""
     return [f"{count} × {reason}" for reason, count in Counter(reasons).most_common(3)]
 
 
@@ -177,7 +178,7 @@ def capital(text: str) -> str:
 
 
 def slugs(names: Iterable[str]) -> dict[str, str]:
-    """Return slugs (small letters, digits, dashes) by name, no two of them equal."""
+    """Return slugs (small letters, digits, dashes) by name, no two equal: ``a-b``, ``a-b-2``."""
     taken: dict[str, str] = {}
     for name in names:
         # Names of files are short.
@@ -191,10 +192,11 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 
 
 def latex(text: object) -> str:
-    """Return text with the characters escaped that are special in LaTeX and BibTeX.
+    """Return text as one printable line (:func:`.one_line`) for LaTeX and BibTeX.
 
-    Greek letters, arrows and signs become commands. Of other alphabets, such as Chinese, characters
-    become ``\\symbol``, which XeLaTeX and LuaLaTeX print.
+    Their special characters are escaped; Greek letters, arrows and signs become commands; accented
+    Latin letters stay. Characters of other alphabets, such as Chinese, become ``\\symbol``, which
+    XeLaTeX and LuaLaTeX print.
     """
 
     def escaped(c: str) -> str:

@@ -49,7 +49,7 @@ class Plot:
     """Drawn numbers as a tidy frame, enough to draw the figure again."""
 
     def save(self, path: str | Path) -> None:
-        """Write the picture into a file, whose name ends in ``.svg``, ``.pdf`` or ``.png``."""
+        """Write the picture into a file ``.svg``, ``.pdf`` or ``.png``, over an earlier one."""
         path = Path(path)
         with errors_in_words(path):
             path.write_bytes(picture(self.figure, path.suffix))

@@ -229,6 +229,6 @@ def log_axis(axes: Axes) -> None:
 
 @checked_arguments
 def letters(panels: Iterable[Axes]) -> None:
-    """Name panels a, b, ... z before their titles."""
+    """Name panels a, b, ... z before their titles; panels after the 26th stay as they are."""
     for letter, axes in zip(ascii_lowercase, panels, strict=False):
         axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left")

@@ -80,7 +80,7 @@ def write_report(
 
 
 def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
-    """Return the files of a table by path: CSV, and LaTeX ``for_paper``; none without rows."""
+    """Return files of a table by path: CSV, ``for_paper`` also ``IN_LATEX``; none without rows."""
     frame = table(study)
     if not len(frame):
         return {}

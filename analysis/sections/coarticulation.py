@@ -160,10 +160,10 @@ AGAINST_GAIN = {
 
 
 def _against_gain(study: Study) -> pd.DataFrame:
-    """Return gains and signatures, means over tasks of means over runs, a row for each method that
-    has a solution on each of :func:`.common_tasks`.
+    """Return gains and signatures, means over tasks of means over solved runs, a row for each
+    method that has a solution on each of :func:`.common_tasks`.
 
-    Columns ``method``, ``base`` (the method with its setting, but for its number of trials),
+    Columns ``method``, ``base`` (the method with its setting, without its number of trials),
     ``trials``, ``tasks``, ``gain`` (ticks) and a column for each signature of
     :data:`AGAINST_GAIN`.
     """
@@ -189,7 +189,7 @@ def _against_gain(study: Study) -> pd.DataFrame:
     "runs. Where a method ran with several numbers of trials, a line joins them.",
 )
 def draw_coarticulation(study: Study) -> Parts | None:
-    """Draw signatures against gain, a point for each method."""
+    """Draw signatures against gain, a point for each method; None for fewer than two methods."""
     data = _against_gain(study)
     shown = [name for name in AGAINST_GAIN if data[name].notna().any()]
     if len(data) < 2 or not shown:

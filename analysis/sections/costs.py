@@ -137,7 +137,7 @@ def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
 def _times_on_tasks(
     study: Study, runs: pd.DataFrame, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> list[Array]:
-    """Return :func:`times_of` for each task on which some runs of a method were made."""
+    """Return a list of :func:`times_of`, for each cell of runs of a method, in their order."""
     return [times_of(study, *cell, spend, shares) for cell in standings.cells_of(runs)]
 
 
@@ -173,7 +173,7 @@ def runtimes(
         ``forward_kinematics``, evaluations, and ``solve_s``, seconds, both spread evenly over the
         trials of a run), ``budget``, and ``share``, the share of the pairs of run and target
         reached within the budget. A method that reaches no target has a single row, with share 0
-        and an infinite budget.
+        and an infinite budget; a method without a known cost on a task has no row for this cost.
 
     Raises
     ------

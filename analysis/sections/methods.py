@@ -19,8 +19,8 @@ from coartic.analysis.words import commonest, marked, tally
 def list_methods(study: Study) -> Rows:
     """List every method on every task: mean reward, gap, hands and costs (medians).
 
-    Within a task, searches for the optimum come first, then methods by mean reward. ``median_run``
-    is the beginning of the id of the run with the reward nearest to the median.
+    Within a task, searches for the optimum come first, then methods from the highest mean reward
+    on. ``median_run`` is the beginning of the id of the run with the reward nearest to the median.
     """
     places, rows = {task: place for place, task in enumerate(one_by_one(study))}, []
     for (task, label), runs in study.cells.items():

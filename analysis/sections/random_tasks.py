@@ -32,8 +32,8 @@ def _instances(study: Study) -> dict[str, list[str]]:
 @cached
 def on_instances(study: Study) -> pd.DataFrame:
     """Return the runs of compared methods on those instances of families on which the method
-    solved every run, with the label of the row of the method in column ``method``, by ``place``,
-    the number of the instance from 0."""
+    solved every run, with the label of the row of the method in column ``method``, sorted by column
+    ``place``, the number of the instance, from 0 through all families."""
     parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
              for method, runs in compared(study).items()}  # fmt: skip
     every = together(study, parts)

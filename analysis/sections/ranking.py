@@ -46,7 +46,7 @@ _EARLY = 1_000
     "least_p: -",
 )
 def list_against_learner(study: Study) -> Rows:
-    """List the mean rewards of every method and of the learner that explores most, by task.
+    """List the mean rewards of every method and of the learner (EC1, EC4 on two arms), by task.
 
     For methods that solved every run; p is corrected over the tasks of a method (Holm). The reward
     of a deterministic method counts as exact. The test takes samples as independent, though runs
@@ -214,8 +214,8 @@ def draw_ranking(study: Study) -> Parts | None:
 
 
 def name_in_figure(study: Study, line: Any) -> str:
-    """Return the name left of a line of the figure, shortened if it is long. ``line`` is a heading,
-    or a row of a table with the label ``method``."""
+    """Return the name left of a line of the figure, with ``…`` for its middle beyond 44 letters (22
+    in a narrow figure). ``line`` is a heading, a text, or a dict with the label ``method``."""
     name = line if isinstance(line, str) else shown_name(study, line["method"])
     longest = _LONGEST_NAME // 2 if style.is_narrow() else _LONGEST_NAME
     if len(name) > longest:  # its end may say on how many tasks

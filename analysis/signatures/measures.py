@@ -123,7 +123,7 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     d_held(g) is this distance if the idle arm had kept its joints since its own last hit (or the
     start); and d_initial(g) is the distance at goal g in ``initial``, the corrective process alone
     with the task's hands. 0 if the arm keeps still, whatever the base does (always under
-    exploration conditions 1 and 3). NaN if the idle hand hits no later goal.
+    exploration conditions 1 and 3). NaN if the idle hand hits no later goal, or d_initial(g) is 0.
     """
     now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
@@ -157,7 +157,8 @@ class Signature:
 @checked_arguments
 def hand(runs: Solutions) -> Array:
     """Return, for each run, the share of goals before the last whose hand is not the fastest for
-    that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`."""
+    that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`. NaN on a task for
+    one hand or with one goal."""
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
@@ -193,7 +194,8 @@ def other_arm(runs: Solutions) -> Array:
 
 @checked_arguments
 def arm(runs: Solutions) -> Array:
-    """Return for each run the mean of :func:`gain_at_next` over goals g < G, ticks."""
+    """Return for each run the mean of :func:`gain_at_next` over goals g < G, ticks; NaN if
+    one of these is NaN, and on a task with one goal."""
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
     return np.asarray(gain_at_next(runs).mean(axis=1))

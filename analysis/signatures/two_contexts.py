@@ -32,8 +32,9 @@ from coartic.tasks.optima import KEPT
 
 @checked_arguments
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Return the names of each pair of tasks that differ only after their first goals, with the
-    number of first goals that they share and that another goal follows in both tasks."""
+    """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
+    of these, 1 or more, are followed by another goal in both tasks. Robot, start, radius, hands and
+    locked base are equal. Pairs with n = 0 are left out."""
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
         others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
@@ -118,7 +119,8 @@ class TwoContexts:
 
     @property
     def in_both(self) -> bool:
-        """True if each context has a run that hits ``goal`` with ``hand``."""
+        """True if each context has a run that hits ``goal`` with ``hand``, without which posture
+        differences and p raise ValueError."""
         return all(map(len, self.configurations))
 
     @property

@@ -50,7 +50,8 @@ def bootstrap_test(
     resamples: Resamples = RESAMPLES,
 ) -> Estimate:
     """Test the difference of two means, or of a mean and a number, by the bootstrap. The value of
-    the estimate is the mean of ``first`` less the mean of ``second`` (or less the number).
+    the estimate, which has no interval, is the mean of ``first`` less the mean of ``second`` (or
+    less the number). Raises ValueError for an empty sample, and for NaN or infinity.
 
     Algorithm 16.2 of Efron & Tibshirani (1993), the book that the paper cites: every sample is
     shifted to the mean 0 and resampled, and the statistic is the difference of means over its
@@ -60,7 +61,7 @@ def bootstrap_test(
     one-tailed, the mean of ``first`` is higher.
 
     Without spread in any sample, p is the p-value of the exact test of as many values, by signs or
-    by exchange. NaN with fewer than two values in a sample, or without spread and difference.
+    by exchange. p is NaN with fewer than two values in a sample, or without spread and difference.
     """
     samples: tuple[Array, ...] = vector(first), vector(np.atleast_1d(second))
     if np.ndim(second) == 0:  # a number without error
@@ -105,7 +106,7 @@ def _places(
     sizes: tuple[int, ...], resamples: int
 ) -> Iterator[tuple[int, slice, NDArray[np.int64]]]:
     """Yield the number of a sample, a slice of the resamples, and the places of the values that
-    these draw from the sample, shape ``(size, resamples)``. Equal arguments give equal places."""
+    these draw, shape ``(size, length of the slice)``. Equal arguments give equal places."""
     rng = np.random.default_rng(SEED)
     for sample, size in enumerate(sizes):
         for part in slices(resamples, max(1, IN_CACHE // size)):
@@ -127,7 +128,8 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
     value of the estimate is their mean.
 
     The level is exact if the two members of a pair are exchangeable. All 2^n signs are enumerated
-    up to 13 pairs; beyond, :data:`RESAMPLES` are drawn. p is NaN with fewer than two pairs.
+    up to 13 pairs; beyond, :data:`RESAMPLES` are drawn. p is NaN with a single pair. Raises
+    ValueError without a pair, and for NaN or infinity.
     """
     values = vector(differences)
     mean, n = float(values.mean()), (len(values),)

@@ -32,7 +32,7 @@ Scores = Mapping[str, Sequence[Array]]
 @checked_arguments
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     """Return the mean over tasks of the mean over runs, with its stratified BCa interval, for
-    ``values`` of the runs on each task, shape ``(runs,)``. Raises ValueError without a task."""
+    ``values`` of shape ``(runs,)`` on each task. Raises ValueError for no task or an empty one."""
     strata = [*map(estimates.vector, values)]
     return estimates.mean_of_means(strata, [1 / len(strata) for _ in strata])
 

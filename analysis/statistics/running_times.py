@@ -59,7 +59,7 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     reached, infinite if no budget is enough.
 
     The percentile interval is of the bootstrap over runs within tasks, without widening, as budgets
-    can be infinite. No interval if a task has too few runs.
+    can be infinite. No interval if a task has fewer than three runs.
     """
     values, weights, runs = _pairs(times)
 
@@ -78,10 +78,10 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
 
 
 def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Array]:
-    """Return both ends of the interval of the share of targets reached within each budget.
+    """Return low and high ends of the interval of the share of targets reached within each budget.
 
-    The percentile interval is of the bootstrap over runs within tasks; NaN if a task has too few
-    runs.
+    The percentile interval is of the bootstrap over runs within tasks; NaN if a task has fewer than
+    three runs.
     """
     sizes = tuple(map(len, times))
     if min(sizes) < FEWEST:
