@@ -29,9 +29,9 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
-    """Return the runs, also failed ones, of every method except searches for the optimum, as
-    :func:`by_row` does. Runs on tasks without a best known reward, and runs that lock the base, are
-    left out, and so are methods without other runs."""
+    """Return the runs, also failed ones, of every method except searches for the optimum, by label
+    of the row in :attr:`.Study.methods`. Runs on tasks without a best known reward, and runs that
+    lock the base, are left out, and so are methods without other runs."""
     return by_row(study, study.runs[study.runs.best_known.notna()])
 
 
@@ -47,7 +47,7 @@ def by_row(study: Study, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method of :func:`compared` on some tasks; KeyError for other methods.
+    """Return the runs of a method of :func:`compared` on some tasks. Raises KeyError for others.
 
     No rows if the method has no run on one of the tasks, or if it is a row of
     :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.

@@ -444,7 +444,7 @@ class Study:
 
     @cached
     def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
-        """Return a signature of the runs of a method on a task by hand sequence, sorted.
+        """Return a signature of a method's runs on a task by hand sequence, in alphabetical order.
 
         Arrays have shape ``(n,)``; runs without the signature are left out. Signature ``hand``, the
         choice of hands itself, has one entry ``""`` for all hand sequences together. Parameters are
@@ -459,8 +459,8 @@ class Study:
     @cached
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
-        runs of each method on each task, of all as :attr:`solutions`, without runs that lack a
-        replay."""
+        runs of each method on each task, of all runs as :attr:`solutions`; runs without a replay
+        are left out."""
         with open_results(self.folder) as store:
             return store.movements(part, MOST_EXECUTED)
 

@@ -77,8 +77,8 @@ class Table:
         return f"<p>Table {self.id}, a function of a study. {html.escape(words)}</p>{columns}"
 
     def column(self, name: str) -> Column:
-        """Return the column of this name, or with ``*`` of a beginning of the name. Raises KeyError
-        for others, such as ``gap_low`` of column ``gap[]``."""
+        """Return the column with this name, or the column with ``*`` whose name begins it. Raises
+        KeyError for other names, such as ``gap_low`` of column ``gap[]``."""
         for column in self.columns:
             begins = column.ending in ("*", "[*]") and name.startswith(column.name)
             if name == column.name or begins:
@@ -118,7 +118,8 @@ class TableFrame(pd.DataFrame):
 @cached
 def _rows_of(study: Study, table: Table) -> pd.DataFrame:
     """Return a table as a DataFrame: a row for each name, and only the columns of the table, with
-    ``_low``, ``_high``, ``_sd`` written out; NaN for none. Its ``attrs``: :func:`_shown_names`."""
+    ``_low``, ``_high`` and ``_sd`` written out; NaN where a row has no entry. Its ``attrs`` are
+    those of :func:`_shown_names`."""
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
@@ -163,9 +164,9 @@ def is_setting(frame: pd.DataFrame) -> pd.Series:
 @checked_arguments
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
     """Return the common entries of a row for a cell with these runs: task, method, numbers of runs
-    and of solved runs, mean, SD and median of the reward, gap (or NaN), and the ids of the runs.
+    and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.
 
-    A table leaves out entries for which it has no column.
+    A table leaves out entries for which it has no column. Without a solved run numbers are NaN.
     """
     rewards = solved(runs).reward.to_numpy(np.float64)
     return {

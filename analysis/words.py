@@ -95,7 +95,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 @checked_arguments
 def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
-    """Write a number of a table with its interval; CoarticError if the row lacks one of the three.
+    """Write a number of a table with its interval. Raises CoarticError if the row lacks one.
 
     Parameters
     ----------

@@ -33,8 +33,8 @@ from coartic.tasks.optima import KEPT
 @checked_arguments
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
-    of these, 1 or more, are followed by another goal in both tasks. Robot, start, radius, hands and
-    locked base are equal. Pairs with n = 0 are left out."""
+    shared first goals have a following goal in both tasks. Pairs with n = 0, and with different
+    robots, starts, radii, hands or locked bases, are left out."""
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
         others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
