@@ -174,7 +174,7 @@ class Study:
         Returns
         -------
         Study
-            Gaps are as in the whole study: best known rewards are of all methods.
+            Gaps are as in this study: best known rewards are of all its methods.
 
         Raises
         ------

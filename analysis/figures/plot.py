@@ -137,7 +137,7 @@ def picture(drawing: Figure, ending: str) -> bytes:
 
 def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
     """Return a figure as the bytes of a file, with settings of Matplotlib and arguments of
-    ``Figure.savefig``, which would draw the whole figure once more to place its parts."""
+    ``Figure.savefig``, which without this layout would draw the figure twice to place its parts."""
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     with rc_context(settings), environment(_NO_DATE):
         if layout is not None:
