@@ -129,7 +129,7 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
 
 
 def titled_apart(tasks: Iterable[Task]) -> list[Task]:
-    """Return the tasks in their order, copies of those whose titles change: no two are equal.
+    """Return the tasks in their order, with copies of those that get another title: titles differ.
 
     The title of a changed task, ``ascending.radius-0.2``, is the title of its task and the change.
     Other tasks with the same title have their names in the title.

@@ -42,7 +42,7 @@ def isolated_reaches(
     q : ndarray, shape (..., dof)
         Configurations at the start, length unit and rad.
     goals, hands : array_like of int, shapes that broadcast to (...)
-        Numbers of goals, from 1, and places of hands in HANDS.
+        Numbers of goals, from 1 (ValueError for others), and places of hands in HANDS.
 
     Returns
     -------
