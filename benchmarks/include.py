@@ -30,15 +30,17 @@ from coartic.runs.store import Store, open_store, writing
 
 
 def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
-    """Copy the runs of other folders into ``out``, and return the plan of all these runs.
+    """Copy the runs of other folders into ``out``, and return the plan of all these runs, which
+    becomes the plan of ``out``.
 
     ``shipped`` names the shipped results. To perform the returned plan in ``out`` makes only those
     runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has.
     A warning names an unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
-    Raises CoarticError if the folders do not go together, if a stored solution does not score as
-    stored, and if two folders have different results of a run. Then nothing is copied but shipped
-    results.
+    Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
+    at 0, if the folders do not go together, if a stored solution does not score as stored, and if
+    two folders have different results of a run. Then nothing is copied, except shipped results into
+    an ``out`` without runs.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -72,8 +74,9 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
 
 
 def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
-    """Return the plan with the cells of the sources. A cell has the runs that the plan asks for,
-    and the runs that follow in the sources without a gap.
+    """Return the plan with the cells of the sources, its own cells first. A cell has the runs that
+    the plan asks for, and the runs that follow in the sources without a gap. Warns of gaps
+    (:func:`_warn_of_gaps`).
 
     Raises CoarticError if sources contradict each other, or contradict the plan about runs that no
     source has.
@@ -112,7 +115,8 @@ def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of unfinished sources, and of sources that have fewer runs of a cell than the plan asks
-    for of its own cells; ``asked`` has the numbers of these by digest."""
+    for of its own cells. ``asked`` has the numbers of runs that the plan asks for, ``jobs`` the
+    joined plan, both by digest; ``plans`` has the plans of the sources by name."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
@@ -172,8 +176,9 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
-    """Copy the runs of a source's plan that the target lacks, each scored again. ``origin`` names
-    the folder of each run of the target by run id.
+    """Copy the runs of a source's plan that the target lacks, each scored again unless it is
+    shipped. ``origin`` names the folder of each run of the target by run id; the copied runs are
+    added to it.
 
     Raises CoarticError if a run does not score as stored, or if the target has another result of
     the run.

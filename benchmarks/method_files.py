@@ -33,8 +33,10 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """Start a process that imports a method file, and return a function that asks the process about
     a method. ``shown`` is the name of the file in messages. The function takes the id of a method,
     a question of :class:`MethodInfo` and its arguments; the question ``methods``, with an empty id,
-    gives the infos of all methods as dictionaries. It raises CoarticError if the process gives no
-    answer or an error. The process, with all processes that it starts, ends with this process."""
+    imports the file again and gives the infos of all its methods as dictionaries: ask it first. The
+    function raises CoarticError if the process gives an error, or no answer in 5 minutes. The
+    process, with all processes that it starts, ends with this process. Raises CoarticError if no
+    process begins."""
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, path, shown
@@ -74,7 +76,8 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
 
 
 def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
-    """Answer questions until the pipe is closed."""
+    """Answer questions (:func:`begin_reader`) that come through a pipe as JSON, by ``answer`` or by
+    a sentence ``error``, until the pipe is closed."""
     begin_worker()
     methods: dict[str, type[Method]] = {}
     while True:
@@ -113,8 +116,9 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
 def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
-    """Yield the infos of a module's methods, with their code. Raises CoarticError if the module
-    defines no method."""
+    """Yield the infos of a module's methods, with their code. Raises CoarticError if there is no
+    method, if a declaration is wrong (:func:`_check_declaration`), or if a declared file or the
+    code cannot be read."""
     for method in methods:
         _check_declaration(method, origin)
         try:
