@@ -46,12 +46,10 @@ class Dask:
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with its outcomes, in the order in which jobs finish. If a worker dies,
-        another worker performs its jobs; the runs of a job on which worker after worker dies have
-        crashed.
+        another worker performs its jobs; a job on which worker after worker dies has crashed.
 
-        Raises CoarticError if the scheduler is missing or lost, if it has no worker for 10 minutes,
-        if its workers lack this version of coartic, or if the extra ``cluster`` is not installed
-        here.
+        Raises CoarticError if the scheduler is missing or lost or has no worker for 10 minutes, and
+        if its workers lack this version of coartic, or this machine the extra ``cluster``.
         """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed

@@ -51,7 +51,7 @@ class Law(NamedTuple):
 
 
 def _law(name: str, problems: Iterable[str], finding: str) -> Law:
-    """Return a law that holds if there are no problems; the finding of a broken law is its first
+    """Return a law that holds if there are no problems; otherwise its finding is the first
     problem."""
     problem = next(iter(problems), None)
     return Law(name, problem is None, problem or finding)

@@ -116,9 +116,9 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
 def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
-    """Yield the infos of a module's methods, with their code. Raises CoarticError if there is no
-    method, if a declaration is wrong (:func:`_check_declaration`), or if a declared file or the
-    code cannot be read."""
+    """Yield the infos of a module's methods, with their code. Raises CoarticError for no method,
+    for a wrong declaration (:func:`_check_declaration`), and for code or a file that cannot be
+    read."""
     for method in methods:
         _check_declaration(method, origin)
         try:
@@ -145,9 +145,8 @@ def _methods_of_module(
 
 
 def _check_declaration(method: type[Method], origin: str) -> None:
-    """Check the declaration of a method but for its id, which the registry checks; ``origin`` is
-    the name of its file in messages. Raises CoarticError if a required attribute is missing or
-    wrong."""
+    """Check the declaration of a method except its id, which the registry checks; ``origin`` is the
+    name of its file in messages. Raises CoarticError for a missing or wrong attribute."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)

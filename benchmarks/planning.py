@@ -39,16 +39,15 @@ from coartic.tasks.task import address_of, check_task
 
 
 def _task_or_name(value: Any) -> Task | str:
-    """Return a task, or its name or path as a text. Raises an error of Pydantic for any other
-    value."""
+    """Return a task, or its name or path as a text. Raises an error for any other value."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise sentence_error(f"{value!r} is no task; it should be a name, a path or a task")
 
 
 def _runs_asked(value: Any) -> int | range | None:
-    """Return a number of runs, a range of runs with step 1, or None. Raises an error of Pydantic
-    for any other value."""
+    """Return a number of runs, a range of runs (step 1) or None. Raises an error for other
+    values."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
@@ -132,13 +131,12 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     """Return the jobs that a request asks for, one for each cell that has runs; ``registered`` has
-    all known methods. Where a name comes from a wildcard or from the request, pairs of a task and a
-    method that does not apply to it are left out.
+    all known methods. In a block with a wildcard, and for tasks and methods that the request adds,
+    a method is left out where it does not apply.
 
-    Raises CoarticError for unknown names, for a task whose name is taken, for other pairs that do
-    not fit, for parameters that a method does not take, for two numbers of runs of a cell, for more
-    than :data:`MOST_CELLS` cells, for a task or method that has nothing to run, and for an option
-    without effect.
+    Raises CoarticError for unknown names, for a task whose name is taken, for other methods that do
+    not apply, for parameters that a method does not take, for two numbers of runs of a cell, for
+    more than :data:`MOST_CELLS` cells, and for a task, a method or an option without effect.
     """
     asked = {name: methods_named(name, registered) for name in request.methods}
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
@@ -290,8 +288,8 @@ def _extra_jobs(
     job: Callable[..., Job],
 ) -> Iterator[Job]:
     """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
-    does not have on the tasks of the suite, and all methods on the tasks that the request brings,
-    where a method applies."""
+    does not have on the tasks of the suite, and all methods on the tasks of the request, where they
+    apply."""
     of_suite = {each.cell.method.name for each in jobs}
     there = {(each.cell.task.name, each.cell.label) for each in jobs}
     new = [method for method in methods if method.name not in of_suite]

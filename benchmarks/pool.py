@@ -79,12 +79,11 @@ class Local:
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish; runs whose process
-        ends have outcomes ``timeout`` or ``crashed``. One process performs jobs of one method in
-        order.
+        """Yield each job with its outcomes, in the order in which jobs finish; ``timeout`` or
+        ``crashed`` if its process ends. One process performs jobs of one method in order.
 
-        Raises CoarticError if process after process ends before its first job, and if answers
-        cannot be written.
+        Raises CoarticError if process after process ends before its first job, or answers are not
+        written.
         """
         with closing(Workers(self)) as workers:
             yield from workers.perform(jobs)
@@ -228,8 +227,7 @@ class Worker:
 
     @property
     def is_late(self) -> bool:
-        """True if the current job has exceeded its limit of wall time. The worker must have a
-        job."""
+        """True if the current job, which must exist, has exceeded its limit of wall time."""
         return time.monotonic() > self.since_s + self.wall_limit_s
 
     @property
@@ -261,8 +259,8 @@ class Worker:
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None) -> list[Outcome]:
-        """Return the outcomes of the current job of a process that has ended, or that is late
-        (``exit_code`` None)."""
+        """Return outcomes of the current job; its process has ended, or is late (``exit_code``
+        None)."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
@@ -323,9 +321,8 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
 
 
 def _answer_to(job: Job, folder: Path) -> bytes:
-    """Perform a job, and return its outcomes as JSON (:func:`answer_of`), crashed outcomes if JSON
-    cannot hold them. At its limit of CPU time the system ends this process. The job's log in
-    ``folder`` is emptied first."""
+    """Perform a job, and return its outcomes as JSON, crashed ones if JSON cannot hold them; the
+    system ends this process at the job's limit of CPU time. Empties the log in ``folder`` first."""
     with contextlib.suppress(OSError):  # the file is missing
         os.truncate(folder / _SAID, 0)
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
@@ -339,9 +336,8 @@ def _answer_to(job: Job, folder: Path) -> bytes:
 
 
 def _limit_cpu_time(limit_s: float) -> None:
-    """Let the system end this process after ``limit_s`` more seconds of CPU time, by SIGPROF, or by
-    SIGXCPU if a method has turned SIGPROF off. A limit of 0 lifts the limit. On Windows nothing
-    happens."""
+    """Let the system end this process after ``limit_s`` more seconds of CPU time (not on Windows),
+    by SIGPROF, or by SIGXCPU if a method has turned SIGPROF off. A limit of 0 lifts the limit."""
     if not hasattr(signal, "setitimer"):
         return
     import resource

@@ -71,8 +71,7 @@ def made_with() -> dict[str, Any]:
 
 
 def process_peak_mb() -> float | None:
-    """Return the most memory that this process has had so far, MiB; None if the system does not
-    count it."""
+    """Return the most memory of this process so far, MiB; None if the system does not count it."""
     try:
         import resource
     except ImportError:  # Windows

@@ -38,11 +38,11 @@ _INFOS = TypeAdapter(list[MethodInfo])
 
 
 def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> dict[str, MethodInfo]:
-    """Return every known method by id, the built-in methods first; ``with_code`` as in
-    :func:`built_in`, methods of files always have the hash.
+    """Return every known method by id, the built-in methods first, these ``with_code``
+    (:func:`built_in`).
 
-    Raises CoarticError for a file that cannot be loaded or holds no method, and as :func:`check_id`
-    does.
+    Raises CoarticError for a file that cannot be loaded or holds no method, and as
+    :func:`check_id`.
     """
     infos = dict(built_in(with_code=with_code))
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
@@ -73,9 +73,8 @@ _parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
 
 
 def current_code(where: str, name: str) -> str:
-    """Return the hash of the present code of a method that is imported from ``where``, a module or
-    a method file; ``none`` if the file defines the method no longer. Raises CoarticError if the
-    file cannot be used."""
+    """Return the hash of the present code of a method that is imported from ``where``; ``none`` if
+    its file no longer defines it. Raises CoarticError for a file that cannot be used."""
     with _parsing:
         if where.endswith(".py"):
             if where not in READERS:  # a reader imports the file again for every question
@@ -120,8 +119,7 @@ def methods_named(name: str, registered: Registry) -> list[str]:
 
 def _methods_of_file(path: Path) -> Iterator[MethodInfo]:
     """Yield a MethodInfo for each method of a file, which a separate process imports; ``READERS``
-    keeps the function that asks this process. Raises CoarticError for a file that cannot be
-    used."""
+    keeps the function that asks this process. Raises CoarticError for an unusable file."""
     shown = plain(str(path), LONGEST_LINE)
     check_file(path)
     if path.suffix != ".py":

@@ -70,8 +70,8 @@ def find_run(prefix: str, folder: Path) -> Run:
 
 
 def trajectory_of(run: Run) -> Trajectory:
-    """Return the solution of a run tick by tick. Raises CoarticError if the run has no solution, or
-    none that can be executed."""
+    """Return the solution of a run tick by tick. Raises CoarticError for none that can be
+    executed."""
     if "solution" not in run.scores:
         why = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
@@ -85,8 +85,8 @@ def trajectory_of(run: Run) -> Trajectory:
 
 
 def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
-    """Perform jobs of one method in order in one new process, and yield their runs, which are
-    scored and not stored."""
+    """Yield the scored runs of jobs of one method, performed in order in one new process, not
+    stored."""
     for job, outcomes in Local(1, verbose=verbose).perform(jobs):
         yield from score(job, outcomes)
 
@@ -159,9 +159,8 @@ def doubts_of(run: Run) -> Iterator[str]:
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:
-    """Return the differences between the results of two runs, in words; an empty list for equal
-    results. Times and environments do not count, nor, if a run is downsampled, rewards that it does
-    not keep."""
+    """Return the differences between the results of two runs, in words, an empty list for equal
+    results. Times and environments do not count, nor rewards that one run does not keep."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     first, second = a.to_row(), b.to_row()

@@ -36,8 +36,8 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
 
 
 def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
-    """Return the score of a part that completed the task; corrections and travel of the solution
-    alone."""
+    """Return the score of a part that completed the task; ``corrections``, travel: of a
+    solution."""
     assert isinstance(execution, Execution)
     result = Score(execution.reward, execution.hands, execution.movements)
     if part != "solution":

@@ -33,8 +33,8 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter, a list as a tuple of floats. Raises an error of Pydantic for
-    any other value."""
+    """Return the value of a parameter, a list as a tuple of floats. Raises an error if it is
+    neither."""
     numbers = value if isinstance(value, list | tuple) else [value]
     if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
         return value if value is numbers[0] else tuple(map(float, numbers))
@@ -87,8 +87,7 @@ class _Block(FileData):
 
     @model_validator(mode="after")
     def says_everything_once(self) -> _Block:
-        """Refuse a parameter that stands in both tables, and a value that stands twice in the
-        grid."""
+        """Refuse a parameter in both tables, and a value that stands twice in the grid."""
         for name, values in self.grid.items():
             if name in self.parameters:
                 raise sentence_error(

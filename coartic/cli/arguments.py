@@ -28,8 +28,7 @@ def file_or_folder(metavar: str, what: str, *names: str) -> Any:
 
 
 def option(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for text, or for files that are read later; arguments as of
-    :func:`file_or_folder`."""
+    """Return an option for text, or for files that are read later (:func:`file_or_folder`)."""
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
@@ -72,9 +71,8 @@ def value_in(text: str) -> Any:
 
 
 def asked(name: str, what: str, unit: str = "N") -> Any:
-    """Return an option for the field ``name`` of a request, a number that the request checks: a
-    wrong value raises CoarticError. Its flag is the name without ``_s``, such as
-    ``--time-limit``."""
+    """Return an option for the field ``name`` of a request, a number; a wrong number raises
+    CoarticError. Its flag is the name without ``_s``, such as ``--time-limit``."""
     option = f"--{name.removesuffix('_s').replace('_', '-')}"
 
     def read(text: str) -> Any:
@@ -104,8 +102,7 @@ def _id_named(name: str, names: Mapping[str, str]) -> str:
 
 
 def tasks_meant(names: Sequence[str]) -> list[str]:
-    """Return the ids of tasks from their ids or titles, in small or capital letters; other names
-    are returned unchanged."""
+    """Return the ids of tasks from their ids or titles, in any case; other names stay unchanged."""
     from coartic import builtin_tasks, load_task
 
     known = {name: load_task(name).label for name in builtin_tasks()}

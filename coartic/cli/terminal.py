@@ -61,8 +61,8 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text below their headings, the first column to the left; nothing without
-    rows."""
+    """Print rows of text below their headings, the first column to the left; without rows
+    nothing."""
     if rows:
         widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
         for first, *others in (headings, *rows):
@@ -71,8 +71,7 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def say_part(name: str) -> None:
-    """Show on a terminal what is being made, in one line that changes; an empty name ends the
-    line."""
+    """Show on a terminal what is being made, in one line that changes; an empty name ends it."""
     if sys.stderr.isatty():
         width = shutil.get_terminal_size().columns - 1
         print("\r", end="", file=sys.stderr)

@@ -20,8 +20,7 @@ UP_OR_DOWN = ("ascending", "descending")
 
 
 def play_page(task: Task | None = None) -> str:
-    """Return the page as HTML; it begins with a task, by default with one first goal before two
-    others."""
+    """Return the page as HTML; it begins with ``task``, by default with :func:`up_or_down`."""
     presets = [preset_of(each) for each in shipped_tasks().values()]
     if task is None:
         presets.insert(0, up_or_down())
@@ -63,8 +62,8 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
 
 
 def preset_of(task: Task) -> dict[str, Any]:
-    """Return a task as the figure offers it: ``label``, ``task`` as plain data, and ``optimum``,
-    its proven best reward or None."""
+    """Return a task as the figure offers it: its label, the task, its proven optimum (reward) or
+    None."""
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)

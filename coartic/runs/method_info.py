@@ -54,14 +54,12 @@ class MethodInfo:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Place, id and, as a method file may change, code: the arguments of
-        :func:`load_method`."""
+        """Place, id and, for a method file, code: the arguments of :func:`load_method`."""
         return self.where, self.name, "" if self.is_ours else self.code
 
     def load(self) -> type[Method]:
-        """Import the method and return its class. A process imports a method once for each hash
-        ``code``: no change of the file is noticed. Raises CoarticError if the method is not
-        there."""
+        """Import the method and return its class; a process imports it once for each ``code``, and
+        notices no change of the file. Raises CoarticError if the method is not there."""
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
@@ -71,7 +69,7 @@ class MethodInfo:
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all parameters, defaults included, as plain data. Raises CoarticError for a wrong
+        """Return all parameters as plain data, with defaults. Raises CoarticError for a wrong
         parameter."""
         return dict(self._ask("complete", parameters))
 
@@ -168,8 +166,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 
 
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
-    """Return the methods that a module itself defines; with ``abstract`` its abstract ones, and
-    without all others."""
+    """Return the concrete methods that a module itself defines; its abstract ones with
+    ``abstract``."""
     return [
         value
         for value in vars(module).values()

@@ -131,8 +131,8 @@ class Run:
 
     @property
     def initial(self) -> Score:
-        """Score of the first trial of a learner; a blank score if the trial failed, the run is not
-        ok, or for other methods."""
+        """Score of a learner's first trial; a blank score if it or the run failed, or for other
+        methods."""
         return self.scores.get("initial", Score())
 
     @property
@@ -159,14 +159,13 @@ class Run:
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials; None as in the first
-        tenth."""
+        """Corrective movements in the last tenth of a learner's trials; None for other and failed
+        runs."""
         return self._corrections(-1)
 
     def _corrections(self, place: int) -> int | None:
         """Return the corrective movements of a learner in trial 0 (place 0) or in a tenth of the
-        other trials (places 1 to 10, from the end if negative); None if the run has no such
-        counts."""
+        other trials (places 1 to 10; -1 is the last); None if they were not counted."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         return counts[place] if isinstance(counts, list) and len(counts) == 11 else None
 
@@ -178,8 +177,7 @@ class Run:
 
     def downsample(self) -> Run:
         """Return a copy of the run with the rewards of its best trial and of the trials that were
-        better than all earlier trials, and None for other trials. The copy takes a tenth of the
-        space."""
+        better than all earlier trials, and None for other trials. It takes a tenth of the space."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best

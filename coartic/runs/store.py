@@ -142,8 +142,8 @@ class Store:
     # The plan.
 
     def begin_as(self, other: Store) -> bool:
-        """Become a copy of another store if this store has no run; return True if it has become
-        a copy."""
+        """Become a copy of another store, and return True, if this store has no run; else return
+        False."""
         if empty := not self.ids():
             other._db.backup(self._db)
         return empty
@@ -180,8 +180,8 @@ class Store:
 
     def plan(self) -> list[Job]:
         """Return the plan of the folder, the jobs of its last suite; their methods have no
-        ``where``. Raises CoarticError if no plan is stored yet, or if the plan was changed by
-        another program."""
+        ``where``. Raises CoarticError if no plan is stored yet, or if the plan is not as it was
+        written."""
         with explain_errors(self.folder):
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
@@ -241,8 +241,8 @@ class Store:
         return int(self._one(query)[0])
 
     def others(self) -> Counter[int]:
-        """Return the number of runs that the plan does not ask for, stale runs too, by the seed of
-        their suite."""
+        """Return the number of runs that the plan does not ask for, with stale runs, by suite
+        seed."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
         return Counter(dict(self._rows(query)))
@@ -269,9 +269,8 @@ class Store:
                     ) from None
 
     def run(self, run_id: str) -> Run:
-        """Return a run by its id, of earlier plans as well; its job has no ``suite``, its method no
-        ``where``. Raises CoarticError if the folder has no such run, or if the id belongs to
-        another run."""
+        """Return a run by its id, without ``suite`` of its job and ``where`` of its method. Raises
+        CoarticError if the folder has no such run, or if the id belongs to another run."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
@@ -313,19 +312,17 @@ class Store:
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``, the runs of the plan in order, as a data frame with nullable
+        """Return view ``runs``, the plan's runs in its order, as a data frame with nullable
         types."""
         return self._frame("runs")
 
     def solutions(self) -> pd.DataFrame:
-        """Return view ``solutions``, a row for each movement, as a data frame with nullable
-        types."""
+        """Return view ``solutions``, a row for each movement, as a data frame (nullable types)."""
         return self._frame("solutions")
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of a part (:data:`PREFIXES`) of runs of the plan that are ok, by run
-        id; runs without the part are left out. Of each cell only the first ``most`` of the ok runs
-        count."""
+        """Return the movements of a part (:data:`PREFIXES`) by run id, of the first ``most`` ok
+        runs of each cell of the plan; runs without the part are left out."""
         query = """SELECT run_id, goal, hand, kind, ticks, path FROM
             (SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
             FROM asked WHERE status = 'ok') AS solved
@@ -350,8 +347,8 @@ class Store:
     # Rows.
 
     def _suite(self) -> Any:
-        """Return the row of the last suite, with its environment. Raises CoarticError if there is
-        none."""
+        """Return the row of the last suite, with its environment. Raises CoarticError without
+        one."""
         row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
         if row is None:
             raise CoarticError("it is not finished; repeat the `coartic run` command")
@@ -380,8 +377,8 @@ class Store:
             self._insert("learning", {"result_id": result, "rewards": blob})
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
-        """Return a cell from its row. Raises ValueError or TaskError if coartic cannot have written
-        the row."""
+        """Return a cell from its row. Raises ValueError or TaskError for a row that coartic cannot
+        have written."""
         method = {name: row[name] for name in _OF_METHOD} | {
             "name": row["method"],
             "defaults": json.loads(row["defaults"]),
@@ -399,8 +396,7 @@ class Store:
         return cell
 
     def _plan_hash(self) -> str:
-        """Return the hash of the folder's last suite: settings, command, date, environment,
-        cells."""
+        """Return the hash of the last suite: settings, command, date, environment, cells."""
         return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:
@@ -414,8 +410,8 @@ class Store:
         return self._id_of("environments", row, "content")
 
     def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
-        """Return the id of the row with the values of these keys; insert the row if it is
-        missing."""
+        """Return the id of the row with the values of these keys; insert the row if there is
+        none."""
         condition = " AND ".join(f"{key} = ?" for key in keys)
         query = f"SELECT id FROM {table} WHERE {condition}"
         stored = self._one(query, *(row[key] for key in keys))
@@ -601,8 +597,7 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
 
 def _check_files(folder: Path) -> None:
     """Raise CoarticError if ``runs.sqlite``, or a file that SQLite keeps next to it, is a symbolic
-    link, through which SQLite would change another file, or a folder, pipe or device. Missing files
-    pass."""
+    link, through which SQLite would change another file, or no regular file; missing files pass."""
     for ending in ("", "-journal", "-wal", "-shm"):
         path = folder / f"{RUNS_FILE}{ending}"
         if path.is_symlink():
