@@ -45,8 +45,7 @@ class HandController(Controller):
     ) -> tuple[Solution, Array, Array]:
         """Return the solution for a control step from ``q`` that moves the hand straight to its
         goal, and the joints as near to what they prefer as that allows; the changes that they
-        prefer, shape ``(joints,)``; and ``memory`` itself. ``first`` is not used
-        (:meth:`Controller.step`)."""
+        prefer, shape ``(joints,)``; and ``memory``, unchanged. ``first`` is not used."""
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)

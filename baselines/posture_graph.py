@@ -174,10 +174,10 @@ def cheapest_chains(
     most: int = BEAM_WIDTH,
     spread: bool = False,
 ) -> Iterator[Chain]:
-    """Yield the cheapest chain of each hand sequence, hands and configurations ``(G, dof)``, graph
-    by graph as :func:`chains_of` orders them, of ``graphs`` random graphs with ``nodes`` postures
-    per goal and hand, then of more graphs until at least ``chains`` are yielded; at most ``most``
-    of a graph. With ``spread`` and two hands each chain is followed by its :func:`move_other_arm`,
+    """Yield hands and configurations ``(G, dof)`` of the cheapest chain of each hand sequence, at
+    most ``most`` a graph in alphabetical order (:func:`chains_of`), of ``graphs`` random graphs
+    with ``nodes`` postures per goal and hand, then of more graphs until at least ``chains`` are
+    yielded. With ``spread`` and two hands each chain is followed by its :func:`move_other_arm`,
     which is not one of the ``chains``. The session counts the evaluations. Raises MethodError if a
     goal has no posture in a graph."""
     yielded = 0

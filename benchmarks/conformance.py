@@ -51,7 +51,7 @@ class Law(NamedTuple):
 
 
 def _law(name: str, problems: Iterable[str], finding: str) -> Law:
-    """Return a law that holds if there are no problems; otherwise its finding is the first
+    """Return a law that holds if there are no problems; the finding of a broken law is its first
     problem."""
     problem = next(iter(problems), None)
     return Law(name, problem is None, problem or finding)
@@ -223,8 +223,8 @@ def _hopeless_task(like: Task) -> Task:
 
 
 def check_task_file(path: Path, registered: Registry) -> list[Law]:
-    """Check every law of a task file, and return the laws in order, kept and broken; for an invalid
-    file law ``valid`` alone. ``registered``: the methods of which some have to apply."""
+    """Check every law of a task file, and return the laws in order; for an invalid file the first
+    law alone. ``registered``: the methods of which some have to apply."""
     try:
         task = load_task(path)
     except TaskError as error:

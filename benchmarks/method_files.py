@@ -33,10 +33,9 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """Start a process that imports a method file, and return a function that asks the process about
     a method. ``shown`` is the name of the file in messages. The function takes the id of a method,
     a question of :class:`MethodInfo` and its arguments; the question ``methods``, with an empty id,
-    imports the file again and gives the infos of all its methods as dictionaries: ask it first. The
-    function raises CoarticError if the process gives an error, or no answer in 5 minutes. The
-    process, with all processes that it starts, ends with this process. Raises CoarticError if no
-    process begins."""
+    is the first: it imports the file, and gives the infos of all methods as dictionaries. The
+    function raises CoarticError for an error, and for no answer in 5 minutes. The process, with all
+    processes that it starts, ends with this process. Raises CoarticError if no process begins."""
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, path, shown
@@ -116,9 +115,8 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
 def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
-    """Yield the infos of a module's methods, with their code. Raises CoarticError for no method,
-    for a wrong declaration (:func:`_check_declaration`), and for code or a file that cannot be
-    read."""
+    """Yield the infos of a module's methods, with their code. Raises CoarticError for no method, a
+    wrong declaration (:func:`_check_declaration`), and a file that cannot be read."""
     for method in methods:
         _check_declaration(method, origin)
         try:

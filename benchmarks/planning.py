@@ -47,7 +47,7 @@ def _task_or_name(value: Any) -> Task | str:
 
 def _runs_asked(value: Any) -> int | range | None:
     """Return a number of runs, a range of runs (step 1) or None. Raises an error for other
-    values."""
+    things."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
@@ -287,9 +287,9 @@ def _extra_jobs(
     methods: Sequence[MethodInfo],
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
-    does not have on the tasks of the suite, and all methods on the tasks of the request, where they
-    apply."""
+    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods new to the
+    suite on the tasks of the suite, and all methods on the tasks that the request brings, where
+    they apply."""
     of_suite = {each.cell.method.name for each in jobs}
     there = {(each.cell.task.name, each.cell.label) for each in jobs}
     new = [method for method in methods if method.name not in of_suite]

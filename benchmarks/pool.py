@@ -79,11 +79,11 @@ class Local:
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish; ``timeout`` or
-        ``crashed`` if its process ends. One process performs jobs of one method in order.
+        """Yield each job with its outcomes, in the order in which jobs finish; a job whose process
+        ends has ``timeout`` or ``crashed``. One process performs jobs of one method in order.
 
-        Raises CoarticError if process after process ends before its first job, or answers are not
-        written.
+        Raises CoarticError if process after process ends before its first job, and if answers
+        cannot be written.
         """
         with closing(Workers(self)) as workers:
             yield from workers.perform(jobs)
@@ -259,8 +259,8 @@ class Worker:
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None) -> list[Outcome]:
-        """Return outcomes of the current job; its process has ended, or is late (``exit_code``
-        None)."""
+        """Return the outcomes of the current job of a process that has ended, or that is late
+        (``exit_code`` None)."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"

@@ -63,8 +63,8 @@ def now() -> str:
 
 
 def made_with() -> dict[str, Any]:
-    """Return the environment of this process (a copy) with its ``command``, a list of words (``a
-    notebook`` in a notebook), and the ``date``."""
+    """Return the environment of this process with its ``command``, a list of words (``a notebook``
+    in a notebook), and the ``date``."""
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}

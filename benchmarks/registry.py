@@ -38,11 +38,10 @@ _INFOS = TypeAdapter(list[MethodInfo])
 
 
 def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> dict[str, MethodInfo]:
-    """Return every known method by id, the built-in methods first, these ``with_code``
-    (:func:`built_in`).
+    """Return every known method by id, built-in ones first; ``with_code`` as in :func:`built_in`.
 
-    Raises CoarticError for a file that cannot be loaded or holds no method, and as
-    :func:`check_id`.
+    Raises CoarticError for a file that cannot be loaded or holds no method, and as :func:`check_id`
+    does.
     """
     infos = dict(built_in(with_code=with_code))
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):

@@ -70,8 +70,8 @@ def find_run(prefix: str, folder: Path) -> Run:
 
 
 def trajectory_of(run: Run) -> Trajectory:
-    """Return the solution of a run tick by tick. Raises CoarticError for none that can be
-    executed."""
+    """Return the solution of a run tick by tick. Raises CoarticError if the run has no solution, or
+    none that can be executed."""
     if "solution" not in run.scores:
         why = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
@@ -85,7 +85,7 @@ def trajectory_of(run: Run) -> Trajectory:
 
 
 def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
-    """Yield the scored runs of jobs of one method, performed in order in one new process, not
+    """Perform jobs of one method in order in one new process; yield the runs, scored, not
     stored."""
     for job, outcomes in Local(1, verbose=verbose).perform(jobs):
         yield from score(job, outcomes)

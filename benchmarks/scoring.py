@@ -36,8 +36,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
 
 
 def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
-    """Return the score of a part that completed the task; ``corrections``, travel: of a
-    solution."""
+    """Return the score of a part that completed the task; corrections and travel for a solution."""
     assert isinstance(execution, Execution)
     result = Score(execution.reward, execution.hands, execution.movements)
     if part != "solution":

@@ -33,8 +33,7 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter, a list as a tuple of floats. Raises an error if it is
-    neither."""
+    """Return the value of a parameter, a list as a tuple. Raises an error for any other value."""
     numbers = value if isinstance(value, list | tuple) else [value]
     if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
         return value if value is numbers[0] else tuple(map(float, numbers))
@@ -195,7 +194,7 @@ def tasks_of(
     """Yield the tasks of a block that have a number of goals that it allows, with a freed base or a
     moved goal where the block asks for it. ``own`` has the names of the user's tasks,
     ``task_named`` returns a task by name. A block for all tasks (``*``) is for the user's tasks as
-    well; those are left out if it moves a goal."""
+    well, unless it moves a goal."""
     every = [*builtin_tasks(), *own]
     names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):

@@ -68,8 +68,8 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 
 
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
-    """Return the outcomes of a job from its answer (:func:`answer_of`), crashed if it is
-    unreadable."""
+    """Return the outcomes of a job from its answer (:func:`answer_of`); crashed outcomes if the
+    answer cannot be read."""
     try:
         content = json.loads(answer)
         for each in content:
@@ -178,7 +178,7 @@ _seen: set[str] = set()
 
 
 def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
-    """Return the outcome of a run from the result of its method, or from the error that it
+    """Return the outcome of a run from the result of its method, or from the error that the method
     raised."""
     spent: dict[str, Any] = {
         "used": (
@@ -206,8 +206,8 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
 
 
 def _place_of(error: BaseException, method: MethodInfo) -> str:
-    """Return where in a method file a run crashed, as ``mine.py, line 12: ``; empty for
-    elsewhere."""
+    """Return the line of a method file in which a run crashed, as ``mine.py, line 12: ``; empty for
+    an error elsewhere."""
     if method.is_ours:
         return ""
     module = sys.modules.get(method.where)

@@ -120,8 +120,8 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
 def difference_of_means(
     first: ArrayLike, second: ArrayLike, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """Return the mean of ``first`` less that of ``second``, independent samples, and its
-    interval."""
+    """Return the mean of ``first`` less the mean of ``second``, two independent samples, with its
+    interval, as :func:`mean` does."""
     return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
 
 

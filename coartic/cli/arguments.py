@@ -28,7 +28,7 @@ def file_or_folder(metavar: str, what: str, *names: str) -> Any:
 
 
 def option(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for text, or for files that are read later (:func:`file_or_folder`)."""
+    """Return an option for text, or for files that are read later; see :func:`file_or_folder`."""
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 

@@ -61,8 +61,8 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text below their headings, the first column to the left; without rows
-    nothing."""
+    """Print rows of text below their headings, the first column to the left; nothing without
+    rows."""
     if rows:
         widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
         for first, *others in (headings, *rows):

@@ -62,8 +62,7 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
 
 
 def preset_of(task: Task) -> dict[str, Any]:
-    """Return a task as the figure offers it: its label, the task, its proven optimum (reward) or
-    None."""
+    """Return a task as the figure offers it: label, task, and proven optimum (reward) or None."""
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
@@ -74,7 +73,8 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """Return a preset with one first goal before two others: ``others`` has the second task's."""
+    """Return a preset with one first goal before two others, to which ``others`` are
+    alternatives."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 

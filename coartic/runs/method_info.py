@@ -69,7 +69,7 @@ class MethodInfo:
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all parameters as plain data, with defaults. Raises CoarticError for a wrong
+        """Return all parameters, defaults included, as plain data. Raises CoarticError for a wrong
         parameter."""
         return dict(self._ask("complete", parameters))
 
@@ -166,8 +166,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 
 
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
-    """Return the concrete methods that a module itself defines; its abstract ones with
-    ``abstract``."""
+    """Return the methods that a module itself defines; with ``abstract`` its abstract ones, and
+    without all others."""
     return [
         value
         for value in vars(module).values()
@@ -179,8 +179,9 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 
 def load_file(path: Path) -> ModuleType:
-    """Import a method file, also one that was imported before, and return the module; errors of the
-    file pass. Its folder is added to ``sys.path``, so that it can import modules from there."""
+    """Import a method file, also one that was imported before, and return the module; an error of
+    the file is raised as it is. Its folder is added to ``sys.path``, so that it can import from
+    there."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

@@ -131,7 +131,7 @@ class Run:
 
     @property
     def initial(self) -> Score:
-        """Score of a learner's first trial; a blank score if it or the run failed, or for other
+        """Score of a learner's first trial; blank if it or the run failed, and for other
         methods."""
         return self.scores.get("initial", Score())
 
@@ -159,8 +159,7 @@ class Run:
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials; None for other and failed
-        runs."""
+        """Corrective movements in the last tenth of a learner's trials; None for other methods."""
         return self._corrections(-1)
 
     def _corrections(self, place: int) -> int | None:

@@ -42,8 +42,7 @@ def open_results(folder: Path) -> AbstractContextManager[Store]:
 
 
 def shipped_hashes() -> dict[str, str]:
-    """Return the SHA-256 of packed files by suite. Raises OSError or ValueError for an unusable
-    list."""
+    """Return, by suite, the SHA-256 of its packed file, as ``SHA256SUMS`` lists it."""
     lines = (SHIPPED_FOLDER / HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
     return {name.removesuffix(PACKED): digits for digits, name in pairs}

@@ -142,8 +142,8 @@ class Store:
     # The plan.
 
     def begin_as(self, other: Store) -> bool:
-        """Become a copy of another store, and return True, if this store has no run; else return
-        False."""
+        """Become a copy of another store if this store has no run; return True if it has become
+        a copy."""
         if empty := not self.ids():
             other._db.backup(self._db)
         return empty
@@ -180,8 +180,8 @@ class Store:
 
     def plan(self) -> list[Job]:
         """Return the plan of the folder, the jobs of its last suite; their methods have no
-        ``where``. Raises CoarticError if no plan is stored yet, or if the plan is not as it was
-        written."""
+        ``where``. Raises CoarticError if no plan is stored yet, or if another program changed
+        it."""
         with explain_errors(self.folder):
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
@@ -241,7 +241,7 @@ class Store:
         return int(self._one(query)[0])
 
     def others(self) -> Counter[int]:
-        """Return the number of runs that the plan does not ask for, with stale runs, by suite
+        """Return the number of runs, stale ones too, that the plan does not ask for, by suite
         seed."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
@@ -269,7 +269,7 @@ class Store:
                     ) from None
 
     def run(self, run_id: str) -> Run:
-        """Return a run by its id, without ``suite`` of its job and ``where`` of its method. Raises
+        """Return a run by its id; its job has no ``suite``, its method no ``where``. Raises
         CoarticError if the folder has no such run, or if the id belongs to another run."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
@@ -312,8 +312,7 @@ class Store:
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``, the plan's runs in its order, as a data frame with nullable
-        types."""
+        """Return view ``runs``, the runs of the plan in order, as a data frame (nullable types)."""
         return self._frame("runs")
 
     def solutions(self) -> pd.DataFrame:
@@ -347,8 +346,8 @@ class Store:
     # Rows.
 
     def _suite(self) -> Any:
-        """Return the row of the last suite, with its environment. Raises CoarticError without
-        one."""
+        """Return the row of the last suite, with its environment. Raises CoarticError if there is
+        none."""
         row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
         if row is None:
             raise CoarticError("it is not finished; repeat the `coartic run` command")
@@ -377,8 +376,8 @@ class Store:
             self._insert("learning", {"result_id": result, "rewards": blob})
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
-        """Return a cell from its row. Raises ValueError or TaskError for a row that coartic cannot
-        have written."""
+        """Return a cell from its row. Raises ValueError or TaskError if coartic cannot have written
+        the row."""
         method = {name: row[name] for name in _OF_METHOD} | {
             "name": row["method"],
             "defaults": json.loads(row["defaults"]),
@@ -410,8 +409,8 @@ class Store:
         return self._id_of("environments", row, "content")
 
     def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
-        """Return the id of the row with the values of these keys; insert the row if there is
-        none."""
+        """Return the id of the row with the values of these keys; insert the row if it is
+        missing."""
         condition = " AND ".join(f"{key} = ?" for key in keys)
         query = f"SELECT id FROM {table} WHERE {condition}"
         stored = self._one(query, *(row[key] for key in keys))
