@@ -62,7 +62,7 @@ def check_method(
 ) -> list[Law]:
     """Check every law of a method by runs on tasks, and return the laws in order, kept and broken.
     ``tasks`` are the shipped tasks by default; those to which the method does not apply are left
-    out: if none is left, law ``solution`` is broken, the last one. ``verbose`` shows what the
+    out: without any task left, law ``solution`` is broken, the last one. ``verbose`` shows what the
     method prints and logs, and the tracebacks of its crashes."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]

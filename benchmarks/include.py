@@ -111,8 +111,7 @@ def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of sources that are unfinished, or have fewer runs of a cell than the plan asks for of
-    its own cells. By digest, ``asked`` has the numbers of runs asked for, ``jobs`` the joined
-    plan."""
+    its own cells; ``asked`` has the numbers of these runs, ``jobs`` the joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()

@@ -46,8 +46,7 @@ def _task_or_name(value: Any) -> Task | str:
 
 
 def _runs_asked(value: Any) -> int | range | None:
-    """Return a number of runs, a range of runs (step 1) or None. Raises an error for other
-    things."""
+    """Return a number of runs, a range (step 1) or None. Raises an error for any other value."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:

@@ -107,7 +107,7 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     """Return the ids of the methods that a name stands for, in the order of ``registered``: ``EC1``
     for a condition of the learner, ``optimum/*`` for all ids that match, in the same case.
 
-    Raises CoarticError if there is none.
+    Raises CoarticError if no id matches.
     """
     name = f"{METHOD_PREFIX}{name}" if name in EVERY_CONDITION else name
     named = [method for method in registered if fnmatchcase(method, name)]

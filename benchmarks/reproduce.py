@@ -85,8 +85,7 @@ def trajectory_of(run: Run) -> Trajectory:
 
 
 def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
-    """Perform jobs of one method in order in one new process; yield the runs, scored, not
-    stored."""
+    """Perform jobs of one method in order in one new process; yield the scored runs, not stored."""
     for job, outcomes in Local(1, verbose=verbose).perform(jobs):
         yield from score(job, outcomes)
 

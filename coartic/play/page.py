@@ -73,8 +73,8 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """Return a preset with one first goal before two others, to which ``others`` are
-    alternatives."""
+    """Return a preset of two tasks with one first goal; ``others``: the second task's other
+    goals."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 

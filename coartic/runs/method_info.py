@@ -180,8 +180,7 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 def load_file(path: Path) -> ModuleType:
     """Import a method file, also one that was imported before, and return the module; an error of
-    the file is raised as it is. Its folder is added to ``sys.path``, so that it can import from
-    there."""
+    the file is raised as it is. Its folder is added to ``sys.path``, for modules from there."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

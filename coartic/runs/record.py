@@ -131,8 +131,7 @@ class Run:
 
     @property
     def initial(self) -> Score:
-        """Score of a learner's first trial; blank if it or the run failed, and for other
-        methods."""
+        """Score of a learner's first trial; blank if it or the run failed, or for other methods."""
         return self.scores.get("initial", Score())
 
     @property

@@ -180,8 +180,7 @@ class Store:
 
     def plan(self) -> list[Job]:
         """Return the plan of the folder, the jobs of its last suite; their methods have no
-        ``where``. Raises CoarticError if no plan is stored yet, or if another program changed
-        it."""
+        ``where``. Raises CoarticError if no plan is stored yet, or if it was changed since."""
         with explain_errors(self.folder):
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
@@ -241,8 +240,8 @@ class Store:
         return int(self._one(query)[0])
 
     def others(self) -> Counter[int]:
-        """Return the number of runs, stale ones too, that the plan does not ask for, by suite
-        seed."""
+        """Return the number of runs, stale runs too, that the plan does not ask for, by the seed of
+        their suite."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
         return Counter(dict(self._rows(query)))
