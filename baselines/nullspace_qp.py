@@ -43,8 +43,9 @@ class HandController(Controller):
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
     ) -> tuple[Solution, Array, Array]:
-        """Solve for a control step from ``q`` that moves the hand straight to its goal, and the
-        joints as near to what they prefer as that allows; results of :meth:`Controller.step`."""
+        """Return the solution for a control step from ``q`` that moves the hand straight to its
+        goal, and the joints as near to what they prefer as that allows; the changes that they
+        prefer, shape ``(joints,)``; and ``memory``, unchanged. ``first`` is not used."""
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)

@@ -174,11 +174,12 @@ def cheapest_chains(
     most: int = BEAM_WIDTH,
     spread: bool = False,
 ) -> Iterator[Chain]:
-    """Yield the cheapest chains, hands and configurations ``(G, dof)``, of ``graphs`` random graphs
+    """Yield hands and configurations ``(G, dof)`` of the cheapest chain of each hand sequence, at
+    most ``most`` a graph in alphabetical order (:func:`chains_of`), of ``graphs`` random graphs
     with ``nodes`` postures per goal and hand, then of more graphs until at least ``chains`` are
-    yielded; ``most`` as in :func:`chains_of`. With ``spread`` and two hands each chain is followed
-    by its :func:`move_other_arm`, which is not one of the ``chains``. The session counts the
-    evaluations. Raises MethodError if a goal has no posture in a graph."""
+    yielded. With ``spread`` and two hands each chain is followed by its :func:`move_other_arm`,
+    which is not one of the ``chains``. The session counts the evaluations. Raises MethodError if a
+    goal has no posture in a graph."""
     yielded = 0
     for number in itertools.count(1):
         layers, spent = sample_layers(task, nodes, rng)

@@ -46,10 +46,10 @@ class Dask:
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with its outcomes, in the order in which jobs finish. If a worker dies,
-        another worker performs its jobs.
+        another worker performs its jobs; a job on which worker after worker dies has crashed.
 
-        Raises CoarticError if the scheduler is missing or lost, or if its workers lack this version
-        of coartic.
+        Raises CoarticError if the scheduler is missing or lost or has no worker for 10 minutes, and
+        if its workers lack this version of coartic, or this machine the extra ``cluster``.
         """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed
@@ -112,7 +112,8 @@ _kept = threading.local()
 
 
 def _remote(job: Job) -> list[Outcome]:
-    """Perform a job on the machine of a Dask worker, in a process that ends at its time limit."""
+    """Perform a job on the machine of a Dask worker, in a process that ends at its time limit.
+    Raises CoarticError if the method has other code on this machine."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.cell.method
     here = current_code(method.where, method.name)

@@ -39,7 +39,8 @@ def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
 
 
 def files_of(method: Path) -> set[Path]:
-    """Return the file of a method and all other files that its runs execute."""
+    """Return the file of a method and all other files that its runs execute, of its folder or
+    package and of coartic; other packages do not count."""
     root = next(folder for folder in method.parents if not (folder / "__init__.py").exists())
     within = root if "site-packages" not in root.parts else root / method.relative_to(root).parts[0]
     places = {(root, within)}
@@ -54,9 +55,9 @@ def files_of(method: Path) -> set[Path]:
 
 
 def _imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[Path]:
-    """Yield the files that a module imports, and those of the packages around them, but for the
-    packages of coartic; a pair of ``places`` is a root of imports and the folder in which files
-    count."""
+    """Yield the files that a module imports, and the ``__init__.py`` of the packages around them,
+    except coartic's; a file can come twice. A pair of ``places`` is a root of imports and the
+    folder in which files count."""
     for level, module, names in syntax(path.read_bytes())[1]:
         for root, within in places:
             base = os.path.join(path.parents[level - 1] if level else root, *module.split("."))
@@ -74,7 +75,8 @@ def _imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator
 @cache
 def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
     """Return the code of a module as text (:mod:`coartic.benchmarks.syntax`), and its imports:
-    level, module and names."""
+    level (0 for an absolute import), module and names; the name ``""`` is the module itself. Raises
+    SyntaxError or ValueError for content that is no Python."""
     tree, imports = ast.parse(content), []
     for node in statements_in(tree):
         of_api = list[str]()

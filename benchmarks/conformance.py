@@ -60,9 +60,10 @@ def _law(name: str, problems: Iterable[str], finding: str) -> Law:
 def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
-    """Check every law of a method by runs on tasks, and return the laws in order. ``tasks`` are the
-    shipped tasks by default; those to which the method does not apply are left out. ``verbose``
-    shows what the method prints and logs, and the tracebacks of its crashes."""
+    """Check every law of a method by runs on tasks, and return the laws in order, kept and broken.
+    ``tasks`` are the shipped tasks by default; those to which the method does not apply are left
+    out: without any task left, law ``solution`` is broken, the last one. ``verbose`` shows what the
+    method prints and logs, and the tracebacks of its crashes."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
@@ -97,7 +98,7 @@ def check_method(
 def _laws_of_runs(
     info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
 ) -> Iterator[Law]:
-    """Yield the laws that the runs of a method keep or break; ``runs`` holds the runs by kind and
+    """Yield the laws on the runs of a method, kept or broken; ``runs`` holds the runs by kind and
     task, ``checked_with`` names the parameters in words."""
 
     def of_kind(kind: str) -> dict[str, Outcome]:
@@ -188,8 +189,8 @@ def _laws_of_runs(
 
 
 def _laws_of_declaration(info: MethodInfo) -> list[Law]:
-    """Check the declaration of a method: title and citation are there; parameters survive JSON, are
-    validated and cannot be changed."""
+    """Return laws ``declaration`` (title and citation are there) and ``parameters`` (they survive
+    JSON, are validated and cannot be changed) of a method."""
     parameters, config = info.complete({}), info.rules()["config"]
     again, problems = info.complete(parameters), []
     if again != parameters:

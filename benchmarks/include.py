@@ -30,15 +30,15 @@ from coartic.runs.store import Store, open_store, writing
 
 
 def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
-    """Copy the runs of other folders into ``out``, and return the plan of all these runs.
+    """Copy the runs of other folders into ``out``; store there, and return, the plan of all runs.
 
     ``shipped`` names the shipped results. To perform the returned plan in ``out`` makes only those
     runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has.
     A warning names an unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
-    Raises CoarticError if the folders do not go together, if a stored solution does not score as
-    stored, and if two folders have different results of a run. Then nothing is copied but shipped
-    results.
+    Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
+    at 0, if the folders do not go together, if a stored solution does not score as stored, and if
+    two folders have different results of a run. Then only shipped results may have been copied.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -72,11 +72,10 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
 
 
 def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
-    """Return the plan with the cells of the sources. A cell has the runs that the plan asks for,
-    and the runs that follow in the sources without a gap.
+    """Return the plan with the cells of the sources, its own cells first. A cell has the runs that
+    the plan asks for, and the runs that follow in the sources without a gap.
 
-    Raises CoarticError if sources contradict each other, or contradict the plan about runs that no
-    source has.
+    Raises CoarticError if sources contradict each other, or the plan about runs that no source has.
     """
     plans = {name: source.plan() for name, source in sources.items()}
     held = {
@@ -111,8 +110,8 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of unfinished sources, and of sources that have fewer runs of a cell than the plan asks
-    for of its own cells; ``asked`` has the numbers of these by digest."""
+    """Warn of sources that are unfinished, or have fewer runs of a cell than the plan asks for of
+    its own cells; ``asked`` has the numbers of these runs, ``jobs`` the joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
@@ -172,11 +171,10 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
-    """Copy the runs of a source's plan that the target lacks, each scored again. ``origin`` names
-    the folder of each run of the target by run id.
+    """Copy the runs of a source's plan that the target lacks, each scored again unless shipped.
+    ``origin`` gives the folder of each run of the target by run id, and gets the copied runs.
 
-    Raises CoarticError if a run does not score as stored, or if the target has another result of
-    the run.
+    Raises CoarticError if a run does not score as stored, or if the target has another result.
     """
     there = target.runs().set_index("run_id").result.to_dict()
     for _, cell in source.runs().groupby(["task", "method", "setting"], sort=False):

@@ -33,8 +33,9 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """Start a process that imports a method file, and return a function that asks the process about
     a method. ``shown`` is the name of the file in messages. The function takes the id of a method,
     a question of :class:`MethodInfo` and its arguments; the question ``methods``, with an empty id,
-    gives the infos of all methods as dictionaries. It raises CoarticError if the process gives no
-    answer or an error. The process, with all processes that it starts, ends with this process."""
+    is the first: it imports the file, and gives the infos of all methods as dictionaries. The
+    function raises CoarticError for an error, and for no answer in 5 minutes. The process, with all
+    processes that it starts, ends with this process. Raises CoarticError if no process begins."""
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, path, shown
@@ -74,7 +75,8 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
 
 
 def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
-    """Answer questions until the pipe is closed."""
+    """Answer questions (:func:`begin_reader`) that come through a pipe as JSON, by ``answer`` or by
+    a sentence ``error``, until the pipe is closed."""
     begin_worker()
     methods: dict[str, type[Method]] = {}
     while True:
@@ -113,8 +115,8 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
 def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
-    """Yield the infos of a module's methods, with their code. Raises CoarticError if the module
-    defines no method."""
+    """Yield the infos of a module's methods, with their code. Raises CoarticError for no method, a
+    wrong declaration (:func:`_check_declaration`), and a file that cannot be read."""
     for method in methods:
         _check_declaration(method, origin)
         try:
@@ -141,9 +143,8 @@ def _methods_of_module(
 
 
 def _check_declaration(method: type[Method], origin: str) -> None:
-    """Check the declaration of a method but for its id, which the registry checks; ``origin`` is
-    the name of its file in messages. Raises CoarticError if a required attribute is missing or
-    wrong."""
+    """Check the declaration of a method except its id, which the registry checks; ``origin`` is the
+    name of its file in messages. Raises CoarticError for a missing or wrong attribute."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)

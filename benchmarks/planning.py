@@ -39,14 +39,14 @@ from coartic.tasks.task import address_of, check_task
 
 
 def _task_or_name(value: Any) -> Task | str:
-    """Return a task, or its name or path as a text."""
+    """Return a task, or its name or path as a text. Raises an error for any other value."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise sentence_error(f"{value!r} is no task; it should be a name, a path or a task")
 
 
 def _runs_asked(value: Any) -> int | range | None:
-    """Return a number of runs, a range of runs, or None."""
+    """Return a number of runs, a range (step 1) or None. Raises an error for any other value."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
@@ -118,7 +118,9 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     Raises
     ------
     CoarticError
-        A name is unknown, a number is out of bounds, or options contradict each other.
+        A name is unknown, a number is out of bounds, options contradict each other or have no
+        effect, a task or method that is named has no run, or a method does not apply to a task of
+        its block (without a wildcard; otherwise, and for added tasks and methods, it is left out).
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):
@@ -127,12 +129,13 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
 
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
-    """Return the jobs that a request asks for, one for each cell; ``registered`` has all known
-    methods.
+    """Return the jobs that a request asks for, one for each cell that has runs; ``registered`` has
+    all known methods. In a block with a wildcard, and for tasks and methods that the request adds,
+    a method is left out where it does not apply.
 
-    Raises CoarticError for unknown names, for a task whose name is taken, for parameters that a
-    method does not take, for more than :data:`MOST_CELLS` cells, and for a name or an option
-    without effect.
+    Raises CoarticError for unknown names, for a task whose name is taken, for other methods that do
+    not apply, for parameters that a method does not take, for two numbers of runs of a cell, for
+    more than :data:`MOST_CELLS` cells, and for a task, a method or an option without effect.
     """
     asked = {name: methods_named(name, registered) for name in request.methods}
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
@@ -257,8 +260,8 @@ def _suite_jobs(
     """Yield the jobs of a suite, each from ``job``, which is :func:`_job_of` for the suite and the
     request; ``own`` names the tasks that the request brings.
 
-    Raises CoarticError for a method that is unknown or does not apply to a task, and for parameters
-    that a method does not take.
+    Raises CoarticError for a method that is unknown, or that does not apply to a task of a block
+    without wildcards, and for parameters that a method does not take.
     """
     for block in suite.blocks:
         ids = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
@@ -283,9 +286,9 @@ def _extra_jobs(
     methods: Sequence[MethodInfo],
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods that the suite
-    does not have on the tasks of the suite, and all methods on the tasks that the request
-    brings."""
+    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods new to the
+    suite on the tasks of the suite, and all methods on the tasks that the request brings, where
+    they apply."""
     of_suite = {each.cell.method.name for each in jobs}
     there = {(each.cell.task.name, each.cell.label) for each in jobs}
     new = [method for method in methods if method.name not in of_suite]
@@ -306,8 +309,8 @@ def _job_of(
     runs: int | None = None,
 ) -> Job:
     """Return the job of a method with parameters on a task. Numbers of the request go before
-    ``runs``, the number of a block, before ``parameters``, and before the numbers of the suite. Of
-    a range of runs, a method that is not stochastic has run 0, if it is in the range."""
+    ``runs``, the number of a block, before ``parameters``, and before the numbers of the suite. A
+    method that is not stochastic has run 0 alone; no run if a range begins later."""
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)
@@ -333,7 +336,7 @@ def _why_nothing_runs(
 
 
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
-    """Return the jobs, one for each cell.
+    """Return the first job of each cell.
 
     Raises CoarticError for two numbers of runs of a cell, and for too many trials.
     """

@@ -79,8 +79,8 @@ class Local:
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish. One process performs
-        jobs of one method in order.
+        """Yield each job with its outcomes, in the order in which jobs finish; a job whose process
+        ends has ``timeout`` or ``crashed``. One process performs jobs of one method in order.
 
         Raises CoarticError if process after process ends before its first job, and if answers
         cannot be written.
@@ -165,8 +165,8 @@ class Workers:
                 worker.end()
 
     def worker_for(self, jobs: Sequence[Job]) -> Worker:
-        """Return the waiting worker if it has performed the method of these jobs, and a new worker
-        otherwise."""
+        """Return the waiting worker if it has performed the method of these jobs; otherwise end it,
+        and return a new worker, which is not started."""
         method, waits = jobs[0].cell.method.key, self._idle
         self._idle = None
         if waits is not None and waits.method == method:
@@ -202,8 +202,8 @@ class Worker:
         self._theirs = theirs
 
     def give(self, jobs: Sequence[Job]) -> None:
-        """Send jobs to the process, and start it if it is new; a process that cannot start has
-        ended."""
+        """Send jobs to the process, and start it if it is new; if it cannot start, nothing is
+        raised and :attr:`exit_code` is 1."""
         self.jobs.extend(jobs)
         self.since_s = math.inf
         (self._folder / _BEGUN).unlink(missing_ok=True)
@@ -221,14 +221,13 @@ class Worker:
 
     @property
     def exit_code(self) -> int | None:
-        """Exit code, or minus the number of the signal that ended the process; None while it
-        runs."""
+        """Exit code, or minus the number of the signal that ended the process; None while it runs,
+        1 before it has started."""
         return 1 if self.process.pid is None else self.process.exitcode
 
     @property
     def is_late(self) -> bool:
-        """True if the current job has exceeded its limit of wall time. The worker must have a
-        job."""
+        """True if the current job, which must exist, has exceeded its limit of wall time."""
         return time.monotonic() > self.since_s + self.wall_limit_s
 
     @property
@@ -249,7 +248,7 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """The end of the process in words, and the last lines that it printed."""
+        """Words on how the process ended, and the last lines that it wrote."""
         text, code = b"", self.exit_code or 0
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
@@ -280,8 +279,9 @@ class Worker:
 
 
 def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
-    """Perform the jobs that come through a pipe, in this worker process, and write answers into
-    ``folder``."""
+    """Perform the jobs that come through a pipe, lists of jobs, in this worker process, and write
+    answers into ``folder``, files ``0``, ``1`` and so on; end when the pipe is closed, or when no
+    job has come for a minute."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:
@@ -321,7 +321,8 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
 
 
 def _answer_to(job: Job, folder: Path) -> bytes:
-    """Perform a job within its limit of CPU time, and return its answer."""
+    """Perform a job, and return its outcomes as JSON, crashed ones if JSON cannot hold them; the
+    system ends this process at the job's limit of CPU time. Empties the log in ``folder`` first."""
     with contextlib.suppress(OSError):  # the file is missing
         os.truncate(folder / _SAID, 0)
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
@@ -335,8 +336,8 @@ def _answer_to(job: Job, folder: Path) -> bytes:
 
 
 def _limit_cpu_time(limit_s: float) -> None:
-    """Let the system end this process after ``limit_s`` more seconds of CPU time, by SIGPROF, or by
-    SIGXCPU if a method has turned SIGPROF off. A limit of 0 lifts the limit."""
+    """Let the system end this process after ``limit_s`` more seconds of CPU time (not on Windows),
+    by SIGPROF, or by SIGXCPU if a method has turned SIGPROF off. A limit of 0 lifts the limit."""
     if not hasattr(signal, "setitimer"):
         return
     import resource

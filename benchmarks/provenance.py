@@ -58,21 +58,20 @@ def current_environment() -> dict[str, Any]:
 
 
 def now() -> str:
-    """Return date and time, UTC, to the second."""
+    """Return date and time, UTC, to the second, as ISO 8601 text."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def made_with() -> dict[str, Any]:
-    """Return the environment of this process with its command line (``a notebook`` in a notebook)
-    and the date."""
+    """Return the environment of this process with its ``command``, a list of words (``a notebook``
+    in a notebook), and the ``date``."""
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}
 
 
 def process_peak_mb() -> float | None:
-    """Return the most memory that this process has had so far, MiB; None if the system does not
-    count it."""
+    """Return the most memory of this process so far, MiB; None if the system does not count it."""
     try:
         import resource
     except ImportError:  # Windows
@@ -82,8 +81,8 @@ def process_peak_mb() -> float | None:
 
 
 def _commit_of_checkout() -> dict[str, Any] | None:
-    """Return the commit of the checkout that the code runs from, with True if files were changed
-    since; None for an installed package."""
+    """Return the commit of the checkout that the code runs from, as ``id``, and as ``dirty``
+    whether files were changed since; None for an installed package or without Git."""
     # A GIT_DIR of the caller, such as a hook, must not replace this checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
 

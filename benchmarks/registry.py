@@ -38,10 +38,10 @@ _INFOS = TypeAdapter(list[MethodInfo])
 
 
 def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> dict[str, MethodInfo]:
-    """Return every known method by id; ``with_code`` as in :func:`built_in`.
+    """Return every known method by id, built-in ones first; ``with_code`` as in :func:`built_in`.
 
-    Raises CoarticError for a file that cannot be loaded or holds no method, and as
-    :func:`check_id` does.
+    Raises CoarticError for a file that cannot be loaded or holds no method, and as :func:`check_id`
+    does.
     """
     infos = dict(built_in(with_code=with_code))
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
@@ -53,10 +53,10 @@ def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> di
 
 @cache
 def built_in(*, with_code: bool = True) -> Mapping[str, MethodInfo]:
-    """Return the built-in methods by id.
+    """Return the built-in methods by id: always the same mapping, not to be changed.
 
-    ``with_code``: with the hash of their code, which takes half a second. Runs need it, lists of
-    methods do not.
+    ``with_code``: with the hash of their code, which takes half a second, otherwise with ``""``.
+    Runs need it, lists of methods do not.
     """
     infos: dict[str, MethodInfo] = {}
     for name in MODULES:
@@ -73,7 +73,7 @@ _parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
 
 def current_code(where: str, name: str) -> str:
     """Return the hash of the present code of a method that is imported from ``where``; ``none`` if
-    the method is gone."""
+    its file no longer defines it. Raises CoarticError for a file that cannot be used."""
     with _parsing:
         if where.endswith(".py"):
             if where not in READERS:  # a reader imports the file again for every question
@@ -104,10 +104,10 @@ def check_id(name: str, origin: str, registered: Registry) -> None:
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
-    """Return the ids of the methods that a name stands for: ``EC1`` for a condition of the learner,
-    ``optimum/*`` for all ids that match.
+    """Return the ids of the methods that a name stands for, in the order of ``registered``: ``EC1``
+    for a condition of the learner, ``optimum/*`` for all ids that match, in the same case.
 
-    Raises CoarticError for an unknown name.
+    Raises CoarticError if no id matches.
     """
     name = f"{METHOD_PREFIX}{name}" if name in EVERY_CONDITION else name
     named = [method for method in registered if fnmatchcase(method, name)]
@@ -118,8 +118,7 @@ def methods_named(name: str, registered: Registry) -> list[str]:
 
 def _methods_of_file(path: Path) -> Iterator[MethodInfo]:
     """Yield a MethodInfo for each method of a file, which a separate process imports; ``READERS``
-    keeps the function that asks this process. Raises CoarticError for a file that cannot be
-    used."""
+    keeps the function that asks this process. Raises CoarticError for an unusable file."""
     shown = plain(str(path), LONGEST_LINE)
     check_file(path)
     if path.suffix != ".py":

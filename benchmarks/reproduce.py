@@ -85,7 +85,7 @@ def trajectory_of(run: Run) -> Trajectory:
 
 
 def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
-    """Yield the runs of these jobs of one method, performed in order in one new process."""
+    """Perform jobs of one method in order in one new process; yield the scored runs, not stored."""
     for job, outcomes in Local(1, verbose=verbose).perform(jobs):
         yield from score(job, outcomes)
 
@@ -158,8 +158,8 @@ def doubts_of(run: Run) -> Iterator[str]:
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:
-    """Return the differences between the results of two runs, in words, none for equal results;
-    times and environments do not count."""
+    """Return the differences between the results of two runs, in words, an empty list for equal
+    results. Times and environments do not count, nor rewards that one run does not keep."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     first, second = a.to_row(), b.to_row()

@@ -170,14 +170,17 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    An interruption keeps finished runs; the next call performs the missing runs. A warning names
-    runs that waited without computing. For each method of a file, a run is made again after a run
-    with another seed; a warning says if the results differ, or if targets may be meant in degrees.
+    The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
+    that fail are stored and counted, and raise nothing; those that crashed, or timed out under a
+    lower limit, are performed again by the next call. An interruption keeps finished runs. Runs
+    that waited without computing are not kept; a warning names them. For each method of a file, a
+    run is made again after a run with another seed; a warning says if the results differ, or if
+    targets may be meant in degrees.
 
     Parameters
     ----------
     plan : sequence of Job
-        Jobs from :func:`plan_suite`.
+        Jobs from :func:`plan_suite`, at least one.
     folder : str or Path
         Results folder, which is made if it is missing.
     executor : Local or Dask, optional
@@ -195,7 +198,8 @@ def perform(
     Raises
     ------
     CoarticError
-        The folder holds something else or cannot be written, or another process writes into it.
+        The folder holds something else or cannot be written, another process writes into it, or
+        a method with missing runs has no code here.
     """
     folder, clock = folder_named(folder), time.perf_counter()
     watch = watch or (lambda progress, cell: None)
@@ -246,7 +250,7 @@ def _has_waited(run: Run) -> bool:
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan, a job for each cell, and count the runs that are there.
+    """Return the missing runs of the plan, a job for each cell; count others in ``progress``.
 
     A run that crashed is performed again, and so is a run that timed out under a lower time limit,
     unless the code of the method is not here. Raises CoarticError if runs are missing whose method

@@ -14,8 +14,8 @@ from coartic.tasks.task import Task, hands_of
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
-    """Return the runs of a job from its outcomes, executing all parts side by side. A run that is
-    ok has a score for each of its parts."""
+    """Return the runs of a job from its outcomes, in their order, executing all parts side by side.
+    A run that is ok has a score for each of its parts, other runs have no scores."""
     task = job.cell.task
     executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
     runs = []
@@ -36,7 +36,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
 
 
 def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
-    """Return the score of a part that completed the task."""
+    """Return the score of a part that completed the task; corrections and travel for a solution."""
     assert isinstance(execution, Execution)
     result = Score(execution.reward, execution.hands, execution.movements)
     if part != "solution":
@@ -46,8 +46,8 @@ def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return status and reason of a run: the outcome's, unless a part cannot be executed, misses a
-    goal, or is missing."""
+    """Return status and reason of a run: the outcome's, unless a part misses a goal
+    (``infeasible``) or cannot be executed, or the solution is missing (``solver-failed``)."""
     for execution in parts.values():
         if isinstance(execution, Exception):
             return "solver-failed", f"the solution cannot be executed: {execution}"

@@ -33,7 +33,7 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter. Raises an error for any other value."""
+    """Return the value of a parameter, a list as a tuple. Raises an error for any other value."""
     numbers = value if isinstance(value, list | tuple) else [value]
     if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
         return value if value is numbers[0] else tuple(map(float, numbers))
@@ -86,8 +86,7 @@ class _Block(FileData):
 
     @model_validator(mode="after")
     def says_everything_once(self) -> _Block:
-        """Refuse a parameter that stands in both tables, and a value that stands twice in the
-        grid."""
+        """Refuse a parameter in both tables, and a value that stands twice in the grid."""
         for name, values in self.grid.items():
             if name in self.parameters:
                 raise sentence_error(
@@ -150,7 +149,7 @@ def kind_of(name: str) -> str:
 @checked_arguments
 def check_kind(name: str, *kinds: str) -> None:
     """Check that what is named, if it has a kind (:func:`kind_of`), is of one of these kinds.
-    Raises CoarticError, which names the command for its kind."""
+    Raises CoarticError, which names the command for its kind; without ``kinds`` for every kind."""
     kind = kind_of(name)
     if kind and kind not in kinds:
         raise CoarticError(f"{name} is a {kind}: {_TAKEN_BY[kind].format(quote(name))}")
@@ -192,9 +191,10 @@ def _read_suite(path: Path) -> Suite:
 def tasks_of(
     suite: Suite, block: _Block, own: Collection[str], task_named: TaskNamed
 ) -> Iterator[Task]:
-    """Yield the tasks of a block, with a freed base or a moved goal where the block asks for it.
-    ``own`` has the names of the user's tasks, ``task_named`` returns a task by name. A block for
-    all tasks (``*``) is for the user's tasks as well, and moves none of their goals."""
+    """Yield the tasks of a block that have a number of goals that it allows, with a freed base or a
+    moved goal where the block asks for it. ``own`` has the names of the user's tasks,
+    ``task_named`` returns a task by name. A block for all tasks (``*``) is for the user's tasks as
+    well, unless it moves a goal."""
     every = [*builtin_tasks(), *own]
     names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):
@@ -206,8 +206,9 @@ def tasks_of(
 
 
 def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
-    """Return the tasks that a block makes of a task: the task with a free base, or a task for each
-    place of the moved goal."""
+    """Return the tasks that a block makes of a task: the task, with a free base if the block asks
+    for it, or in its place a task for each place of the moved goal. Raises CoarticError if the base
+    is free already, or if there is no such goal."""
     source = f"suite {suite.name!r}"
 
     def changed(name: str, difference: str, **changes: Any) -> Task:

@@ -25,7 +25,7 @@ def text_of(node: Any) -> str:
 
 
 def statements_in(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield the statements below a node, which ``ast.walk`` yields with all expressions."""
+    """Yield the statements, handlers and match cases below a node, each before those within it."""
     for value in _fields_of(node).values():
         for child in value if isinstance(value, list) else ():
             if isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):

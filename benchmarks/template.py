@@ -13,7 +13,8 @@ class Mine(Optimiser):
     citation = "I. Rechenberg (1973). Evolutionsstrategie."  # what others cite
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise the cost of a trial; this ends when no trial is left; the best counts."""
+        """Minimise the cost of a trial, until ``objective`` raises BudgetError, as no trial is
+        left: do not catch it. The best point counts."""
         # Draw from rng alone. A point has the joints of all goals; units: length, rad.
         x = objective.x0  # the postures of the corrective process
         best = objective(x)  # ticks

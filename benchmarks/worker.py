@@ -50,7 +50,7 @@ def fail(
     cpu_s: float | None = None,
 ) -> list[Outcome]:
     """Return an outcome for each run of a job whose worker gave no answer. ``wall_s`` and ``cpu_s``
-    are times of the whole job, which its runs share."""
+    are the times of the job, which its runs share."""
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.numbers]
@@ -97,7 +97,8 @@ _generators = list[str]()
 
 @contextmanager
 def _seeing_generators(sees: bool) -> Iterator[None]:
-    """Note the generators of random numbers that are made in this block, if ``sees``."""
+    """Note in ``_generators``, emptied first, the generators of random numbers that are made in
+    this block, if ``sees``."""
     _generators.clear()
     with ExitStack() as stack:
         for module, name in _MAKERS if sees else ():
@@ -217,8 +218,8 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
-    """Check a method's result, and return its movements and details as keywords of
-    :class:`Outcome`. Raises SolutionError for a result that cannot be stored."""
+    """Check a method's result, and return its movements, ``parts``, and ``details`` as keywords of
+    :class:`Outcome`. Raises SolutionError for a result that cannot be stored, or breaks a rule."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     try:

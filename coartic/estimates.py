@@ -93,8 +93,8 @@ def slices(count: int, most: int) -> Iterator[slice]:
 
 @checked_arguments
 def varies(values: Array) -> Array:
-    """Return whether values differ along the first axis by more than rounding
-    (:data:`NEGLIGIBLE`)."""
+    """Return whether values differ along the first axis by more than rounding (:data:`NEGLIGIBLE`),
+    a bool for each entry of the other axes."""
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 
@@ -120,7 +120,8 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
 def difference_of_means(
     first: ArrayLike, second: ArrayLike, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """Return the mean of ``first`` less the mean of ``second``, two independent samples."""
+    """Return the mean of ``first`` less the mean of ``second``, two independent samples, with its
+    interval, as :func:`mean` does."""
     return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
 
 

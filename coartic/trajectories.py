@@ -59,7 +59,7 @@ class Trajectory:
 
     @property
     def ticks(self) -> int:
-        """Number of control ticks."""
+        """Number of control ticks, the rows of ``configurations``."""
         return self.execution.ticks
 
     @property
@@ -83,7 +83,7 @@ class Trajectory:
         return self.configurations[first : self.hits[goal - 1] + 1]
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the movement as a table, a row for each control tick.
+        """Return the movement as a table, a row for each control tick (index ``tick``, from 0).
 
         ``goal`` is the number of the goal that the robot moves to, ``hand`` the hand that is to hit
         it. Then the configuration (``base_x``, ``base_y`` in length units, ``left_1`` and so on in
@@ -146,7 +146,7 @@ class Trajectory:
         Raises
         ------
         CoarticError
-            The file cannot be written.
+            The file cannot be written, or is there and ``replace`` is False.
         """
         from coartic.film import write_film
 

@@ -28,7 +28,7 @@ def file_or_folder(metavar: str, what: str, *names: str) -> Any:
 
 
 def option(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for text, or for files that are read later, as :func:`file_or_folder`."""
+    """Return an option for text, or for files that are read later; see :func:`file_or_folder`."""
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
@@ -71,8 +71,8 @@ def value_in(text: str) -> Any:
 
 
 def asked(name: str, what: str, unit: str = "N") -> Any:
-    """Return an option for the field ``name`` of a request, a number that the request checks. Its
-    flag is the name without ``_s``, such as ``--time-limit``."""
+    """Return an option for the field ``name`` of a request, a number; a wrong number raises
+    CoarticError. Its flag is the name without ``_s``, such as ``--time-limit``."""
     option = f"--{name.removesuffix('_s').replace('_', '-')}"
 
     def read(text: str) -> Any:
@@ -102,8 +102,7 @@ def _id_named(name: str, names: Mapping[str, str]) -> str:
 
 
 def tasks_meant(names: Sequence[str]) -> list[str]:
-    """Return the ids of tasks from their ids or titles, in small or capital letters; other names
-    are returned unchanged."""
+    """Return the ids of tasks from their ids or titles, in any case; other names stay unchanged."""
     from coartic import builtin_tasks, load_task
 
     known = {name: load_task(name).label for name in builtin_tasks()}
@@ -111,7 +110,8 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
 
 
 def method_names(registered: Registry) -> Mapping[str, str]:
-    """Return the names that people use for methods, by id; empty for a method without a name."""
+    """Return the names that people use for methods, by id; empty for a method without a name and
+    for the learner's conditions, such as ``EC4``."""
     from coartic.analysis.methods import title_of
     from coartic.learner.conditions import EVERY_CONDITION
 

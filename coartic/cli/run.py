@@ -180,7 +180,7 @@ def list_(
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
-    """Yield title, size, tasks and methods of a suite; ``name`` is its name or its file."""
+    """Yield pairs of word and text: title, size, tasks, methods of a suite, by its name or file."""
     from coartic import builtin_tasks
     from coartic.analysis.words import number
 
@@ -197,7 +197,7 @@ def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
 
 
 def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
-    """Yield goals, hands and base of a task; ``name`` is its name or its file."""
+    """Yield pairs of word and text: goals, hands and base of a task, by its name or file."""
     yield "Task", f"{name} ({task.label}): {task.description}"
     yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
     yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
@@ -207,14 +207,14 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
 
 
 def _describe_family(family: Family) -> Iterator[tuple[str, str]]:
-    """Yield description and instances of a family."""
+    """Yield pairs of word and text: description and instances of a family."""
     yield "Family", f"{family.name}: {family.description}"
     yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
     yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield declaration, parameters and tasks of a method."""
+    """Yield pairs of word and text: declaration, parameters and tasks of a method."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words

@@ -180,7 +180,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``.
 
     By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q (-inf), and
-    ``target``, q* (NaN).
+    ``target``, q*, ``dof`` entries of NaN and then zeros up to :func:`width_of`.
     """
     learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), learned)

@@ -130,8 +130,9 @@ def aim(run: Any, target: Any) -> None:
 @inlined
 def move(count: int, robot: Any, batch: Any) -> None:
     """Move each of the first ``count`` runs of a batch (records of robots) to its target, or check
-    whether its hand is in the goal, as its ``action`` says: phase 3, *move*. ``q``, ``hit`` and
-    ``ticks`` change in place; a run without a movement takes 0 ticks."""
+    whether its hand is in the goal, as its ``action`` says (:data:`IDLE`): phase 3, *move*. A
+    movement ends on a hit, too. ``q``, ``hit``, ``ticks`` and ``acting`` change in place, and
+    ``evaluations`` grows; a run without a movement takes 0 ticks."""
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action

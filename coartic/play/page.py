@@ -20,7 +20,7 @@ UP_OR_DOWN = ("ascending", "descending")
 
 
 def play_page(task: Task | None = None) -> str:
-    """The page as HTML; it begins with a task, or with one first goal before two others."""
+    """Return the page as HTML; it begins with ``task``, by default with :func:`up_or_down`."""
     presets = [preset_of(each) for each in shipped_tasks().values()]
     if task is None:
         presets.insert(0, up_or_down())
@@ -39,8 +39,8 @@ def play_page(task: Task | None = None) -> str:
 
 
 def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
-    """The figure as a part of a page, which has the styles of ``play.css`` and defines the colours
-    that these name.
+    """Return the figure as HTML for a page, which has the styles of ``play.css`` and defines the
+    colours that these name.
 
     ``presets`` are what it offers (:func:`preset_of`). ``more`` is for the scripts: the ``page`` to
     which links lead, None for none; ``first``, what is chosen at first; ``folder`` with the stored
@@ -62,7 +62,7 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
 
 
 def preset_of(task: Task) -> dict[str, Any]:
-    """Return a task as the figure offers it, with its proven optimum, or None."""
+    """Return a task as the figure offers it: label, task, and proven optimum (reward) or None."""
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
@@ -73,19 +73,20 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """Return a preset with one first goal before two others."""
+    """Return a preset of two tasks with one first goal; ``others``: the second task's other
+    goals."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 
 
 def part_of_page(name: str) -> str:
-    """Return the text of a file beside this one, without a first line ``"use strict";``."""
+    """Return the text of a file next to this one, without a first line ``"use strict";``."""
     return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
 
 
 @cache
 def templates() -> Environment:
-    """The templates beside this file."""
+    """Return the environment of the templates next to this file, always the same."""
     return Environment(
         loader=FileSystemLoader(FOLDER),
         undefined=StrictUndefined,

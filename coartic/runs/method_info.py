@@ -54,17 +54,17 @@ class MethodInfo:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Place, id and, as a method file may change, code: the arguments of
-        :func:`load_method`."""
+        """Place, id and, for a method file, code: the arguments of :func:`load_method`."""
         return self.where, self.name, "" if self.is_ours else self.code
 
     def load(self) -> type[Method]:
-        """Import the method; each process imports a method once, until its code changes."""
+        """Import the method and return its class; a process imports it once for each ``code``, and
+        notices no change of the file. Raises CoarticError if the method is not there."""
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
-        """Import the method and return it with these parameters, and defaults for the others.
-        Raises ValueError for wrong parameters."""
+        """Import the method and return an instance with these parameters, and defaults for the
+        others. Raises ValueError for wrong parameters."""
         method = self.load()
         return method(method.Parameters(**parameters))
 
@@ -153,9 +153,9 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 @cache
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
-    """Return a method from its module or file. Raises CoarticError if the method is not there.
+    """Return the class of a method from its module or file. Raises CoarticError if it is not there.
 
-    A change of ``code``, the hash of a file, makes the process import the file again.
+    Another ``code``, the hash of a file, makes the process import the file again.
     """
     is_file = where.endswith(".py")
     module = load_file(Path(where)) if is_file else importlib.import_module(where)
@@ -179,8 +179,8 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 
 def load_file(path: Path) -> ModuleType:
-    """Import a method file anew, whatever it raises. Its folder is added to ``sys.path``, so that
-    it can import modules from there."""
+    """Import a method file, also one that was imported before, and return the module; an error of
+    the file is raised as it is. Its folder is added to ``sys.path``, for modules from there."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

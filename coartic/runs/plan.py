@@ -86,8 +86,8 @@ class Job:
     """Name of the suite that asks for the runs."""
 
     def run_id(self, number: int) -> str:
-        """Return the id of a run: a hash of cell, seed and number, then the hash of the method's
-        code."""
+        """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and
+        the hash of the method's code."""
         text = f"{self.cell.digest} {self.seed} {number}"
         return f"{hashlib.sha256(text.encode()).hexdigest()[:16]}-{self.cell.method.code}"
 
@@ -105,8 +105,8 @@ def cell_of(
 ) -> Cell:
     """Return the cell of a method with these parameters and defaults for all others.
 
-    ``trials`` replaces the default number of trials if the method has this parameter. Raises
-    CoarticError for parameters that the method does not take.
+    ``trials`` becomes the default number of trials if the method has this parameter; a number in
+    ``parameters`` goes before it. Raises CoarticError for parameters that the method does not take.
     """
     if trials is not None and "trials" in method.defaults:
         method = replace(method, defaults=method.defaults | {"trials": trials})

@@ -126,17 +126,17 @@ class Run:
 
     @property
     def solution(self) -> Score:
-        """Score of the solution; a blank score if the run has no solution."""
+        """Score of the solution; a blank score if the run is not ok."""
         return self.scores.get("solution", Score())
 
     @property
     def initial(self) -> Score:
-        """Score of the first trial of a learner; a blank score for other methods."""
+        """Score of a learner's first trial; blank if it or the run failed, or for other methods."""
         return self.scores.get("initial", Score())
 
     @property
     def replay(self) -> Score:
-        """Score of the greedy trial after learning; a blank score for other methods."""
+        """Score of the greedy trial after learning; blank as for :attr:`initial`."""
         return self.scores.get("replay", Score())
 
     @property
@@ -153,7 +153,7 @@ class Run:
     @property
     def early_corrections(self) -> int | None:
         """Corrective movements in the first tenth of a learner's trials after trial 0; None for
-        other methods."""
+        other methods and failed runs."""
         return self._corrections(1)
 
     @property
@@ -163,7 +163,7 @@ class Run:
 
     def _corrections(self, place: int) -> int | None:
         """Return the corrective movements of a learner in trial 0 (place 0) or in a tenth of the
-        other trials (places 1 to 10)."""
+        other trials (places 1 to 10; -1 is the last); None if they were not counted."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         return counts[place] if isinstance(counts, list) and len(counts) == 11 else None
 
@@ -174,8 +174,8 @@ class Run:
         return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
 
     def downsample(self) -> Run:
-        """Return the run with the rewards of its best trial and of the trials that were better than
-        all earlier trials, and None for other trials. The run then takes a tenth of the space."""
+        """Return a copy of the run with the rewards of its best trial and of the trials that were
+        better than all earlier trials, and None for other trials. It takes a tenth of the space."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best
@@ -284,9 +284,9 @@ def movement_data(movement: Movement) -> list[Any]:
     """Return a movement as a list of goal, hand, kind, ticks and path: the form in which workers
     send, hashes count and folders store movements.
 
-    The path is JSON: the target, or the waypoints of a movement of kind ``path``. Adding 0.0 drops
-    the sign of -0.0. Raises TypeError, ValueError or AttributeError for a movement that has no such
-    form.
+    The path is JSON: the target, or the waypoints of a movement of kind ``path``; ticks or a target
+    that are missing are None. Adding 0.0 drops the sign of -0.0. Raises TypeError, ValueError or
+    AttributeError for a movement that has no such form.
     """
     m, place = movement, movement.target
     if m.waypoints is not None:

@@ -179,8 +179,8 @@ class Store:
             self._db.execute("UPDATE suite SET plan_hash = ?", (self._plan_hash(),))
 
     def plan(self) -> list[Job]:
-        """Return the plan of the folder, the jobs of its last suite. Raises CoarticError if no plan
-        is stored yet."""
+        """Return the plan of the folder, the jobs of its last suite; their methods have no
+        ``where``. Raises CoarticError if no plan is stored yet, or if it was changed since."""
         with explain_errors(self.folder):
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
@@ -228,7 +228,7 @@ class Store:
 
     def present(self) -> list[tuple[int, int, str, float | None]]:
         """Return the runs of the plan that the folder has: for each run the position of its job in
-        the plan, its number, its status and its time limit in s."""
+        the plan, its number, its status and its time limit in s, None for no limit."""
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def stale(self) -> int:
@@ -240,7 +240,8 @@ class Store:
         return int(self._one(query)[0])
 
     def others(self) -> Counter[int]:
-        """Return the number of runs that the plan does not ask for, by the seed of their suite."""
+        """Return the number of runs, stale runs too, that the plan does not ask for, by the seed of
+        their suite."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
         return Counter(dict(self._rows(query)))
@@ -267,8 +268,8 @@ class Store:
                     ) from None
 
     def run(self, run_id: str) -> Run:
-        """Return a run by its id. Raises CoarticError if the folder has no such run, or if the id
-        belongs to another run."""
+        """Return a run by its id; its job has no ``suite``, its method no ``where``. Raises
+        CoarticError if the folder has no such run, or if the id belongs to another run."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
@@ -310,18 +311,16 @@ class Store:
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs`` as a data frame, with nullable types."""
+        """Return view ``runs``, the runs of the plan in order, as a data frame (nullable types)."""
         return self._frame("runs")
 
     def solutions(self) -> pd.DataFrame:
-        """Return view ``solutions`` as a data frame, with nullable types."""
+        """Return view ``solutions``, a row for each movement, as a data frame (nullable types)."""
         return self._frame("solutions")
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of a part (:data:`PREFIXES`) of runs that are ok, by run id.
-
-        Of each cell only the first ``most`` of these runs count.
-        """
+        """Return the movements of a part (:data:`PREFIXES`) by run id, of the first ``most`` ok
+        runs of each cell of the plan; runs without the part are left out."""
         query = """SELECT run_id, goal, hand, kind, ticks, path FROM
             (SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
             FROM asked WHERE status = 'ok') AS solved
@@ -395,8 +394,7 @@ class Store:
         return cell
 
     def _plan_hash(self) -> str:
-        """Return the hash of the folder's last suite: settings, command, date, environment,
-        cells."""
+        """Return the hash of the last suite: settings, command, date, environment, cells."""
         return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:
@@ -596,9 +594,8 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
 
 
 def _check_files(folder: Path) -> None:
-    """Raise CoarticError if ``runs.sqlite``, or a file that SQLite keeps beside it, is a
-    symbolic link, through which SQLite would change another file, or a folder, pipe or device.
-    Missing files pass."""
+    """Raise CoarticError if ``runs.sqlite``, or a file that SQLite keeps next to it, is a symbolic
+    link, through which SQLite would change another file, or no regular file; missing files pass."""
     for ending in ("", "-journal", "-wal", "-shm"):
         path = folder / f"{RUNS_FILE}{ending}"
         if path.is_symlink():
