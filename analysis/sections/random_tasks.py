@@ -31,9 +31,10 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 @cached
 def on_instances(study: Study) -> pd.DataFrame:
-    """Return the runs of compared methods on those instances of families on which the method
-    solved every run, with the label of the row of the method in column ``method``, sorted by column
-    ``place``, the number of the instance, from 0 through all families."""
+    """Return the runs of compared methods on instances of families that have a best known reward
+    and on which the method solved every run, with the label of the row of the method in column
+    ``method`` (a run stands again in the row of a joined learner), sorted by column ``place``, the
+    number of the instance, from 0 through all families. Do not change the frame: it is kept."""
     parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
              for method, runs in compared(study).items()}  # fmt: skip
     every = together(study, parts)
@@ -60,7 +61,8 @@ def list_family_gaps(study: Study) -> Rows:
     """List gaps to the best known reward over families with two arms, and in each family, with
     intervals about other tasks.
 
-    A method with a failed run on an instance of a family has no gap there, as in the ranking.
+    A method that did not solve every run of every instance of a family has gap NaN in the family,
+    and over families with two arms if the family has two, as in the ranking.
     ``instances``: on how many it solved every run, and ``missing``: how many others there are, of
     families with two arms, or of all families on which it ran if they have one arm.
     """

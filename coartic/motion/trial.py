@@ -205,8 +205,9 @@ def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
 @inlined
 def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
     """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
-    for each of the first ``count`` runs that missed it; no run moves. ``converged`` of a run
-    becomes True if **A** found a target."""
+    for each of the first ``count`` runs that missed it, goes on and may be corrected; no run moves.
+    ``converged`` of a run becomes True if **A** found a target; it, ``ticks`` and ``iterations`` of
+    all these runs are set to 0 before."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -666,7 +667,7 @@ def ranked_sequences(
     by reward, the best first and failed trials last. An entry has the sequence, the reward (None if
     the trial failed), the reason of the failure (or empty), and the counts of the trial by
     :data:`COUNTED`. Of equal rewards the sequence with the fewest changes of hand comes first, then
-    the sequence given first."""
+    the sequence given first. ``outside`` as in :func:`count_trials`."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets, outside=outside)
