@@ -330,7 +330,7 @@ def _hand_jerks(
 ) -> Any:
     """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
     The joints follow quintics between the end states, as for minimum jerk: ``steps``, shape
-    ``(dof, G)``, are their changes, ``rates`` their velocities and accelerations at start and goals,
+    ``(dof, G)``, are their changes, ``rates`` velocities and accelerations at start and goals,
     ``(dof, G + 1)`` each."""
     powers = np.arange(6)
     q = [casadi.SX.sym(f"q{d}", robot.dof) for d in range(4)]  # and its derivatives
