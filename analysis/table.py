@@ -137,16 +137,15 @@ def _rows_of(study: Study, table: Table) -> pd.DataFrame:
 def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table.
 
-    ``title``: function that returns the title of a task, family or method, or None (pandas copies a
-    dict with every column that is taken); ``under``: the method of each setting and ablation, by
-    label; ``own``: labels of methods from files; ``best_known``: True if a best known reward does
-    not come from this folder alone.
+    ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
+    and ablation, by label; ``own``: labels of methods from files; ``best_known``: True if a best
+    known reward does not come from this folder alone.
     """
     methods, tasks = study.methods, study.tasks
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
     marks = {name: marked(task) for name, task in tasks.items()}
     return {
-        "title": {**families, **marks, **methods.title}.get,
+        "titles": {**families, **marks, **methods.title},
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
         "best_known": any(not best.only_here for best in study.optima.values()),

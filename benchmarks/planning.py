@@ -243,8 +243,9 @@ def _asked_tasks(
             )
         names[task.name] = None
     of_suite = {name for block in suite.blocks for each in block.tasks for name in named_by(each)}
-    files = [load_task(name) for name in of_suite if name.endswith(".toml")]
-    own = {name: task for name, task in own.items() if task not in files}
+    if own:
+        there = [t for block in suite.blocks for t in tasks_of(suite, block, (), task_named)]
+        own = {name: task for name, task in own.items() if task not in there}
     brought = (name for name in names if name not in of_suite and address_of(name))
     own |= {name: task_named(name) for name in brought}
     return names, own, task_named

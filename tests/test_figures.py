@@ -119,6 +119,14 @@ def test_names_and_looks_tell_methods_apart():
     assert both["mine"] != both["theirs"]
 
 
+def test_a_picture_leaves_its_figure_as_it_was():
+    figure = Figure(layout="constrained")
+    before = figure.canvas, figure.get_layout_engine()
+    for ending in FORMATS:
+        picture(figure, ending)
+    assert (figure.canvas, figure.get_layout_engine()) == before
+
+
 def test_a_date_of_the_environment_changes_no_picture(traced, monkeypatch):
     plot = FIGURES["postures"](traced)
     before = [picture(plot.figure, ending) for ending in FORMATS], for_page(plot)

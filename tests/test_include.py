@@ -130,6 +130,11 @@ def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, left, tmp_pa
     assert check_runs(tmp_path / "more").wrong == check_runs(tmp_path / "less").wrong == []
 
 
+def test_runs_of_a_cell_under_two_limits_are_included(parts, left, tmp_path):
+    edit(left, f"UPDATE results SET time_limit_s = 50.0 WHERE id = {OF_EC1}")
+    assert joined([left], tmp_path / "whole", LEFT).present == 3
+
+
 def test_a_folder_is_read_in_one_state(left):
     with open_store(left) as store:
         before = store.ids()

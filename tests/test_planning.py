@@ -12,6 +12,7 @@ from coartic.benchmarks.planning import plan, plan_suite, request_for
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import load_suite
+from coartic.tasks.task import task_text
 from tests.support.suites import ROOT, InProcess, suite_of
 
 MINE = Path(template.__file__).read_text(encoding="utf-8")
@@ -129,6 +130,25 @@ def test_the_command_outranks_a_grid_and_a_block(tmp_path):
     assert trials == [5, 50, 500]
     (job,) = plan_suite(tmp_path / "own.toml", trials=7)
     assert job.cell.parameters["trials"] == 7
+
+
+def test_a_task_file_of_a_suite_is_added_where_the_suite_has_another_form_of_it(tmp_path):
+    """Where a block has the task itself, its methods alone run on it."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text(task_text(load_task("ascending").model_copy(update={"name": "mine"})))
+    block = f'tasks = ["{mine}"]\nmethods = ["corrective-alone/given"]\n'
+    other = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
+    alone, learner = "corrective-alone/given", "dual-process/EC1"
+    for form, methods in (
+        ("", [alone]),
+        ("move = { goal = 1, by = [[0.1, 0.0]] }\n", [alone, learner]),
+        ("goals = [9]\n", [learner]),
+    ):
+        suite_of(tmp_path, block + form, other)
+        jobs = plan_suite(tmp_path / "own.toml", tasks=[str(mine)])
+        assert [(job.cell.task.name, job.cell.method.name) for job in jobs] == [
+            ("mine", method) for method in methods
+        ]
 
 
 @pytest.mark.parametrize(

@@ -139,13 +139,17 @@ def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
     """Return a figure as the bytes of a file, with settings of Matplotlib and arguments of
     ``Figure.savefig``, which without this layout would draw the figure twice to place its parts."""
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
-    with rc_context(settings), environment(_NO_DATE):
-        if layout is not None:
-            FigureCanvasSVG(drawing)  # its fonts are measured
-            layout.execute(drawing)
-            drawing.set(layout_engine=None, dpi=dpi)
-        drawing.savefig(stream, **how)
-    drawing.set_layout_engine(layout)
+    canvas = drawing.canvas
+    try:
+        with rc_context(settings), environment(_NO_DATE):
+            if layout is not None:
+                FigureCanvasSVG(drawing)  # its fonts are measured
+                layout.execute(drawing)
+                drawing.set(layout_engine=None, dpi=dpi)
+            drawing.savefig(stream, **how)
+    finally:
+        drawing.set_canvas(canvas)
+        drawing.set_layout_engine(layout)
     return stream.getvalue()
 
 

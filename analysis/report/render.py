@@ -59,14 +59,14 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
 
     A task goes by its title, with † where it is reconstructed.
     """
-    headers, title = {}, frame.attrs.get("title", {}.get)
+    headers, titles = {}, frame.attrs.get("titles", {})
     names = [name for name in frame.columns if not _is_end(table, frame, name)]
     for name in names:
         column = table.column(name)
         if not column.header:
             continue
         what = name.removeprefix(column.name)
-        header = column.header.replace("{}", title(what, what))
+        header = column.header.replace("{}", titles.get(what, what))
         if header == "gap (%)" and not frame.attrs.get("best_known", True):
             header = "gap to the best of this folder (%)"
         if _is_end(table, frame, f"{name}_sd"):
@@ -93,8 +93,8 @@ def _is_number(values: pd.Series) -> bool:
 def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
     """Return the values of column ``name`` as text, with their SDs and intervals, row by row."""
     if not _is_number(frame[name]):
-        title = frame.attrs.get("title", {}.get)
-        shown = {each: title(each) or one_line(str(each)) for each in frame[name].unique()}
+        titles = frame.attrs.get("titles", {})
+        shown = {each: titles.get(each) or one_line(str(each)) for each in frame[name].unique()}
         return [NONE if pd.isna(each) else shown[each] or NONE for each in frame[name]]
     _, _, header, digits = table.column(name)
     decimals, is_p = int(digits) if digits.isdigit() else None, digits == "p"

@@ -141,4 +141,5 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     style.letters(panels)
     first = data.drop_duplicates(["method", "family"]).dropna(subset="mean")
     means = spoken(study, first, "{title}, {family}: {mean:.1%}")
-    return drawing, data, f"Gaps of instances by method and family. {means}.", ()
+    words = f" {means}." if means else ""
+    return drawing, data, f"Gaps of instances by method and family.{words}", ()
