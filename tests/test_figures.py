@@ -121,6 +121,7 @@ def test_names_and_looks_tell_methods_apart():
 
 def test_a_picture_leaves_its_figure_as_it_was():
     figure = Figure(layout="constrained")
+    figure.add_subplot()
     before = figure.canvas, figure.get_layout_engine()
     for ending in FORMATS:
         picture(figure, ending)
