@@ -382,9 +382,8 @@ def _check_rewards(row: Any) -> bytes:
 
 
 def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
-    """Return the movements of a run by part (solution, initial, replay; empty if it lacks one),
-    and a list of all movements as stored, part by part, which the hash of the result covers. Raises
-    ValueError for a missing or malformed movement."""
+    """Return the movements of a run by part (empty where it has none), and all as stored, part by
+    part, which the result's hash covers. Raises ValueError for a missing or malformed one."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
     stored: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
