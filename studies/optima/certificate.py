@@ -180,7 +180,7 @@ class ProofSearch:
         if problem.moves >= self._claim:
             return
         root = self.relaxation(problem.hands, problem.merged)
-        # A hundredth may be the tick that is missing, but gives more nodes before.
+        # A gap of a hundredth saves iterations, but may hide the last tick that a proof needs.
         is_near = parent > _NEAR * self.longest(problem.moves)
         relaxed = root.solve(problem.box, 1e-5 if is_near else 1e-2)
         self.nodes += 1
