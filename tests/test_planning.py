@@ -123,6 +123,17 @@ def test_a_method_file_that_is_named_runs():
     assert methods("own.toml") == ["first"]
 
 
+def test_a_part_of_one_run_has_the_run_of_a_method_without_a_seed():
+    alone = {"tasks": ["ascending"], "methods": ["corrective-alone/given"]}
+    assert plan_suite("paper", **alone, runs=range(1)) == plan_suite("paper", **alone)
+
+
+def test_a_method_file_may_declare_its_encoding(tmp_path):
+    text = "# coding: latin-1\n# \u00fc\n" + MINE.replace("NAME", "first")
+    (tmp_path / "mine.py").write_text(text, encoding="latin-1")
+    assert "first" in registry([tmp_path / "mine.py"])
+
+
 def test_the_command_outranks_a_grid_and_a_block(tmp_path):
     ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
     suite_of(tmp_path, ec1 + "grid = { trials = [5, 50] }", ec1 + "parameters = { trials = 500 }")
