@@ -77,12 +77,17 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 
 @checked_arguments
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the parameters ``base`` and ``other_arm``, which restrict movements, of each run, as
-    columns by the index of ``runs``; for methods without them ``task`` and ``free``."""
+    """Return the parameters ``base`` and ``other_arm`` of each run, with which searches for the
+    optimum restrict movements, as columns by the index of ``runs``; ``task`` and ``free`` for other
+    methods, whose parameters may have the same names."""
     default = {"base": BASE, "other_arm": "free"}
-    asked = {text: default | json.loads(text) for text in runs.parameters.unique()}
+    pairs = [*zip(runs.method, runs.parameters, strict=True)]
+    asked = {
+        (method, text): default | (json.loads(text) if method in SEARCHES else {})
+        for method, text in {*pairs}
+    }
     return pd.DataFrame(
-        {name: [asked[text][name] for text in runs.parameters] for name in default}, runs.index
+        {name: [asked[pair][name] for pair in pairs] for name in default}, runs.index
     )
 
 

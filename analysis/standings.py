@@ -1,7 +1,6 @@
 """Standings of methods: compared methods, compared tasks, and their gaps and shares.
 
-Searches for the optimum are references and are not compared; neither are runs that lock the base,
-which solve another problem.
+Searches for the optimum are references and are not compared.
 """
 
 from __future__ import annotations
@@ -30,8 +29,8 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs, also failed ones, of every method except searches for the optimum, by label
-    of the row in :attr:`.Study.methods`. Runs on tasks without a best known reward, and runs that
-    lock the base, are left out, and so are methods without other runs."""
+    of the row in :attr:`.Study.methods`. Runs on tasks without a best known reward are left out,
+    and so are methods without other runs."""
     return by_row(study, study.runs[study.runs.best_known.notna()])
 
 

@@ -254,10 +254,10 @@ class Study:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
         Further columns: ``label``, the method with its setting; ``family``, ``split``, number of
-        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing for runs with
-        another base) and :attr:`corrective_best`; ``gap``, a share of the best known reward; and a
-        column for each parameter of methods, unless its name is taken: ``trials`` is the number of
-        trials made, ``hands`` the hands of the solution.
+        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing for a search
+        with another base) and :attr:`corrective_best`; ``gap``, a share of the best known reward;
+        and a column for each parameter of methods, unless its name is taken: ``trials`` is the
+        number of trials made, ``hands`` the hands of the solution.
         """
         runs, tasks = self.stored, self.tasks
         parameters = {text: json.loads(text) for text in runs.parameters.unique()}

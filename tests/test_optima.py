@@ -9,7 +9,7 @@ from tests.support.made_up import row, study_of
 
 
 def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
-    """Also of runs that are no search; not of another base, and not of one method alone."""
+    """Also of runs that are no search; not of a search on another base, nor of one method alone."""
     search, drawn = "optimum/search", "one-armed/v1/i901"
 
     def run(task, method, reward, setting="", **parameters):
@@ -18,10 +18,11 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
 
     rows = [
         run("ascending", search, -290),
-        run("ascending", "other", -200, base=""),  # another task
+        run("ascending", search, -200, base="xy"),  # another task
         run("descending", "other", -309),
         *(run(drawn, search, -300), run(drawn, "other", -290)),
-        *(run("mine", search, -290), run("mine", "other", -288, setting="b=2")),
+        run("mine", search, -290),
+        run("mine", "other", -288, setting="base=EC1", base="EC1"),  # of a learner, not the robot
         run("yours", "other", -290),  # to be compared with itself
         run("searched", search, -290),
         *(run("free", "one", -301), run("free", "one", -300, setting="b=2")),
@@ -36,7 +37,7 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
         "ascending": (-290, -292, search, "ascending -290"),
         **{name: (of.reward, of.bound, "shipped", "") for name, of in shipped.items()},
         drawn: (-290, None, "other", f"{drawn} -290"),
-        "mine": (-288, None, "other b=2", "mine -288"),
+        "mine": (-288, None, "other base=EC1", "mine -288"),
         "searched": (-290, None, search, "searched -290"),
         "free": (-300, None, "one b=2", "free -300"),
     }
