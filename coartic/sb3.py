@@ -37,11 +37,14 @@ class RobotEnvs(VecEnv):
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin a trial in each of N environments; return the first observations, ``(N, O)``."""
+        """Begin a trial in each of N environments; return the first observations, ``(N, O)``.
+        Raises ValueError for options (``set_options``), of which there are none."""
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
+        options = next(filter(None, self._options), None)
         self._reset_seeds()
+        self._reset_options()
         self._lost[:], self._steps[:] = 0, 0
-        observations: NDArray[np.float32] = self._envs.reset(seed=seeds)[0]
+        observations: NDArray[np.float32] = self._envs.reset(seed=seeds, options=options)[0]
         return observations
 
     def step_async(self, actions: Array) -> None:
