@@ -464,3 +464,7 @@ def test_robots_for_stable_baselines():
               for each, info in zip(rewards, infos, strict=True)
               if info and info["episode"]["r"] <= -FAILED}  # fmt: skip
     assert failed == {-2.0}
+    fails.set_options({"goals": 2})
+    with pytest.raises(ValueError, match="reset takes no options, but {'goals': 2} are given"):
+        fails.reset()
+    fails.reset()
