@@ -303,8 +303,9 @@ def _linearise_far(
     """Keep at the beginning of ``far`` (indices of postures), in place, those whose hand is farther
     than ``tolerance`` from (x, y), and return their number.
 
-    For each of these, in order, fill ``wanted`` with the step that the hand is to make, length
-    unit, and ``jacobian`` with the columns of the arm's joints.
+    For each of these, in order, fill a row of ``wanted`` with the step that the hand is to make
+    towards (x, y), at most ``_LONGEST`` far, and of ``jacobian`` with the columns of the arm's
+    joints. ``xs`` and ``ys``, an entry for each joint and the hand, are work space.
     """
     tip = len(arm.links)
     left = 0

@@ -55,9 +55,10 @@ class Rounding:
         self._step = session.model.step
 
     def nearest(self, plan: PathPlan) -> TickPlan | None:
-        """Return the plan with the length of each segment but the last rounded to the nearest whole
-        number of steps, the last rounded up; None if a solve fails. At a shortest path the total
-        does not change with the division to first order, so this has nearly always fewest ticks."""
+        """Return the plan solved again with each segment but the last at the nearest whole number
+        of steps, and the last, as short as it then can be, rounded up; None if a solve fails. At a
+        shortest path the total does not change, to first order, with its division into segments, so
+        of all roundings (:meth:`every`) this has nearly always fewest ticks."""
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 

@@ -240,7 +240,8 @@ def perform(
 
 
 def _has_waited(run: Run) -> bool:
-    """Return whether a run was ended by its limit of wall time, which is no result. Warns of it."""
+    """Return whether a run waited, without using its CPU time, until its limit of wall time ended
+    it. That is no result: the run is not stored, and a warning says to repeat the command."""
     times = run.outcome.times
     if run.outcome.status != "crashed" or times.wall_s is None or times.cpu_s is not None:
         return False

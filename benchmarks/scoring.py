@@ -46,8 +46,8 @@ def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return status and reason of a run: the outcome's, unless a part misses a goal
-    (``infeasible``) or cannot be executed, or the solution is missing (``solver-failed``)."""
+    """Return status and reason of a run: ``infeasible`` if a part misses a goal, ``solver-failed``
+    if a part cannot be executed or an outcome that is ok has no solution, else the outcome's."""
     for execution in parts.values():
         if isinstance(execution, Exception):
             return "solver-failed", f"the solution cannot be executed: {execution}"

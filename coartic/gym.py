@@ -241,7 +241,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def infos(self) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
-        and ``is_success``, True where the robot has hit all goals of its trial."""
+        and ``is_success``, True where the robot has hit all goals of its trial. After :meth:`step`
+        a trial that ended has started again: what it ended with is in the step's ``final_info``."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
@@ -585,8 +586,9 @@ def _options_of(env: Any) -> dict[str, Any]:
 
 def _without_wrappers(env: Any, name: str, known: Any = None) -> Any:
     """Return the environment inside its wrappers: those that Gymnasium and Stable-Baselines3 add by
-    themselves (:data:`ADDED`), and the wrapper ``known``, if given. Raises TypeError for any other
-    wrapper; the message calls the environment ``name``."""
+    themselves (:data:`ADDED`), and the wrapper ``known``, the object itself, if given. Raises
+    TypeError for any other wrapper, whose changes would be left out; the message calls the
+    environment ``name``."""
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
         if env is not known and type(env).__name__ not in ADDED:
             raise TypeError(

@@ -379,8 +379,9 @@ class Session:
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
-        """Run the corrective process (**A**) from ``q`` with a hand for a goal (from 1), and return
-        the configuration that it finds; no movement is made. Count its iterations, Jacobians and
+        """Run the corrective process from ``q`` with a hand for a goal (from 1), and return the
+        configuration that it finds; if the result is not ``converged``, that is its last iterate,
+        and no error is raised. No movement is made. Count its iterations, Jacobians and
         evaluations. Needs ``corrective process``."""
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
@@ -505,9 +506,10 @@ class Session:
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """Return the hand sequence of the first trial, such as ``"RRRR"``: the sequence that the
-        task names, or, if it names a policy, the one found by trials of the corrective process with
-        ``hands`` (by default all of the robot). Needs ``corrective process`` and ``reward by
-        trial``.
+        task names, whatever ``hands``, or, if it names a policy (``"best-single-hand"`` or
+        ``"best-of-all"``), the sequence of ``hands`` (by default all of the robot) with which the
+        corrective process alone gets the highest reward. Needs ``corrective process`` and ``reward
+        by trial``.
 
         Trials of this search are counted as ``initial_trials``, not among the method's trials or in
         its budget. Raises NotApplicableError if no sequence completes the task, or too many exist.

@@ -276,9 +276,10 @@ class Objective:
         takes as many ticks as the point costs. No trial is counted.
 
         ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
-        default ``hands`` of this problem. Each movement has a target of all joints: a joint that
-        has no entry in the point has the value at which it keeps still. Raises UndeclaredError in
-        a method, which has :attr:`solution`, and ValueError if the point or the hands do not fit.
+        default ``hands`` of this problem. A movement has a target of all joints (a joint that has
+        no entry in the point has the value at which it keeps still), or none where the entries of
+        its goal are NaN. Goals that are missed are corrected by ``execute``. Raises UndeclaredError
+        in a method, which has :attr:`solution`, and ValueError if point or hands do not fit.
         """
         task, point = self.task, real_array("x", x)
         if point.shape != (self.dim,):

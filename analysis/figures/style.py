@@ -108,7 +108,8 @@ def is_narrow() -> bool:
 def panels(
     shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure with panels, fewer side by side in a figure of a chosen narrower width.
+    """Make a figure with panels; in a block of :func:`drawn_at`, of the width chosen there, with
+    fewer panels side by side, and taller, where they would be too narrow.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ def panels(
     Returns
     -------
     (Figure, list of Axes)
-        The figure, and its panels row by row.
+        The figure, and the panels used, row by row.
     """
     used = used or shape[0] * shape[1]
     if (width := _width.get()) is not None:

@@ -214,8 +214,9 @@ def draw_ranking(study: Study) -> Parts | None:
 
 
 def name_in_figure(study: Study, line: Any) -> str:
-    """Return the name left of a line of the figure, with ``…`` for its middle beyond 44 letters (22
-    in a narrow figure). ``line`` is a heading, a text, or a dict with the label ``method``."""
+    """Return the name left of a line of the ranking, with ``…`` for its middle beyond 44 letters
+    (22 in a narrow figure). ``line`` is a heading (a text, its own name), or the dict of a row,
+    whose label ``method`` the study gives a name (:func:`.shown_name`)."""
     name = line if isinstance(line, str) else shown_name(study, line["method"])
     longest = _LONGEST_NAME // 2 if style.is_narrow() else _LONGEST_NAME
     if len(name) > longest:  # its end may say on how many tasks

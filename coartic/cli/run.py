@@ -214,7 +214,7 @@ def _describe_family(family: Family) -> Iterator[tuple[str, str]]:
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: declaration, parameters and tasks of a method."""
+    """Yield pairs of word and text: title, declaration, parameters, tasks, source of a method."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words

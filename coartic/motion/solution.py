@@ -253,8 +253,9 @@ def _has_path(plan: Plan) -> bool:
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
     """Return the movements to a goal before the first movement without a target, for the kernel.
 
-    The corrective process makes that movement; movements after it are not made. None comes first
-    if the first movement is corrective: the kernel then checks whether the hand is in the goal.
+    The corrective process makes that movement; movements after it are not made. If the first
+    movement is corrective, with or without a target, None precedes all that is returned: there the
+    kernel makes no movement, and only checks whether the hand is in the goal.
     """
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:

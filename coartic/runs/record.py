@@ -309,10 +309,11 @@ def movement_from(data: Sequence[Any]) -> Movement:
 
 
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
-    """Return the rewards of trials as bytes.
+    """Return the rewards of trials as bytes, four a number; the caller packs them.
 
-    The numbers are the best reward, then for each trial by how much it is worse, plus 1; 0 stands
-    for None. All lowest bytes of the numbers come first, then all next bytes: so they pack best.
+    The numbers are the best reward, signed (0 if all are None), then for each trial by how much it
+    is worse, plus 1; 0 stands for None. All lowest bytes of the numbers come first, then all next
+    bytes: so they pack best.
     """
     values = np.array(rewards, np.float64)  # None becomes NaN
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)

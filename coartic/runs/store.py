@@ -398,7 +398,8 @@ class Store:
         return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:
-        """Return the id of the row of an environment; insert the row if it is missing."""
+        """Return the id of the row of an environment, the versions, platform and commit of a
+        process (``current_environment``); insert the row if it is missing."""
         commit = content.get("commit")
         row = {
             "content": json.dumps(content, ensure_ascii=False, sort_keys=True),
