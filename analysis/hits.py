@@ -69,8 +69,9 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
 
 
 def _read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]]:
-    """Return headings, rows of as many texts, and the number of the line of each row, from 1.
-    Raises CoarticError for a file that is no table of text separated by commas."""
+    """Return headings, rows of as many texts, and the number of the last line of each row, from 1;
+    blank lines and lines that begin with ``#`` are left out. Raises CoarticError for a file that
+    cannot be read or is no table of text separated by commas."""
     try:
         content = Path(path).read_bytes()
         text = content.decode("utf-8-sig")

@@ -29,8 +29,9 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs, also failed ones, of every method except searches for the optimum, by label
-    of the row in :attr:`.Study.methods`. Runs on tasks without a best known reward are left out,
-    and so are methods without other runs."""
+    of the row in :attr:`.Study.methods`; a row that joins conditions of the learner has their runs
+    again (:func:`by_row`). Runs on tasks without a best known reward are left out, and so are
+    methods without other runs."""
     return by_row(study, study.runs[study.runs.best_known.notna()])
 
 

@@ -90,8 +90,9 @@ class Beginning(NamedTuple):
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
-    """Sample at most ``count`` nodes (postures, ``(n, dof)``), or none, for each goal and hand;
-    return them by goal (from 0) and hand, and the ``forward_kinematics`` and ``jacobians`` counted.
+    """Sample at most ``count`` nodes (postures with the hand in the goal, ``(n, dof)``), or none,
+    for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the
+    ``forward_kinematics`` and ``jacobians`` counted.
 
     Half of the nodes are sampled around the nodes of the goal before, by whichever hand: of 40
     one-armed random tasks the best path known was then found more often on 23, less often on 11.

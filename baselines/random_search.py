@@ -106,7 +106,8 @@ class RandomSearch(RandomSearchHands):
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials with one hand sequence until none is left; return the movements of the best
+        """Make trials with one hand sequence, parameter ``hands`` or by default the one with which
+        the corrective process alone does best, until none is left; return the movements of the best
         trial. Raises MethodError if there is no trial to make, or if the corrective process alone
         misses a goal."""
         parameters: RandomSearchParameters = self.parameters

@@ -180,9 +180,10 @@ def movements(
     """Return a movement for each goal of an instance, to ``configurations``, shape ``(G, dof)``.
 
     Joints that are held on the way to a goal stay where they are, even if an earlier movement ended
-    by a hit short of its target. With ``steps`` (a number of steps per goal, 0 for no movement) the
-    target of a movement lies beyond the rim, on the same line, so that it hits after that many
-    steps; if no such target does, it is the configuration given. The session counts the effort.
+    by a hit short of its target. With ``steps``, a number per goal, the target of a movement lies
+    beyond the rim of the goal's disc, on the same line, so that it hits after at most that many;
+    if no such target does, it is the configuration given. For 0 steps it is a corrective movement,
+    which is not made where the hand is in the goal already. The session counts the effort.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model

@@ -110,8 +110,9 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of sources that are unfinished, or have fewer runs of a cell than the plan asks for of
-    its own cells; ``asked`` has the numbers of these runs, ``jobs`` the joined plan, by digest."""
+    """Warn of sources with runs in their plan that the joined plan ``jobs`` lacks, and with cells
+    of stochastic methods, not ``asked`` for, of which it has fewer runs than are asked for of some
+    cell. ``asked`` (numbers of runs) and ``jobs`` are by digest, ``plans`` by name of source."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()

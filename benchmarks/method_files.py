@@ -143,8 +143,9 @@ def _methods_of_module(
 
 
 def _check_declaration(method: type[Method], origin: str) -> None:
-    """Check the declaration of a method except its id, which the registry checks; ``origin`` is the
-    name of its file in messages. Raises CoarticError for a missing or wrong attribute."""
+    """Check that a method declares its name, title and citation, texts of one line, and its
+    information; ``origin`` is the name of its file in messages. Raises CoarticError for a missing
+    or wrong one. What else an id must be, the registry checks."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)

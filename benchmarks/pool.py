@@ -232,7 +232,8 @@ class Worker:
 
     @property
     def wall_limit_s(self) -> float:
-        """Limit of wall time for the current job, s."""
+        """Limit of wall time for the current job, which must exist, s: three times its limit of CPU
+        time, a day without one, and ``timeout_s``."""
         return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
@@ -280,8 +281,9 @@ class Worker:
 
 def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
     """Perform the jobs that come through a pipe, lists of jobs, in this worker process, and write
-    answers into ``folder``, files ``0``, ``1`` and so on; end when the pipe is closed, or when no
-    job has come for a minute."""
+    an answer to each into ``folder``, files ``0``, ``1`` and so on. File ``begun`` appears when the
+    kernels of a list are loaded: then the clock of its first job starts. End when the pipe is
+    closed, or when no job has come for a minute."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:

@@ -494,7 +494,8 @@ class Session:
         self, codes: Hands, targets: Configs, *, until: ArrayLike | None = None
     ) -> Accounts:
         """Make and count N trials, with hands 0 or 1, ``(N, G)``, and targets ``(N, G, dof)``, and
-        return their accounts. ``until`` as in :meth:`trials`. Arguments are not checked."""
+        return their accounts. ``until`` as in :meth:`trials`. Neither arguments nor the budget are
+        checked: the caller does so, and holds ``lock``."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]
@@ -645,7 +646,8 @@ class Method(ABC):
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the method does not apply to a task; None if it applies."""
+        """Return a sentence on why the method does not apply to a task; None if it applies, which
+        every method does whose class does not override this."""
         return None
 
     @abstractmethod

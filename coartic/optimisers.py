@@ -205,10 +205,10 @@ class Objective:
     @property
     def best_known(self) -> int | None:
         """Lowest cost known of the task, ticks: of any hand sequence, also with goals that are hit
-        without a movement.
+        without a movement. Raises UndeclaredError in a method, which cannot see its task.
 
-        None where no cost is shipped: for a task of your own, for instances after the first 40 of a
-        family's test split, and for another model than the paper's.
+        None where no cost is shipped: for a task of your own, for instances of a family except the
+        first 40 of its test split, and for another model than the paper's.
         """
         known = self._known
         return None if known is None else -known.reward

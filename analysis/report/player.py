@@ -72,11 +72,12 @@ def player(study: Study) -> str:
 
 
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
-    """Return the methods with solved runs on all of these tasks, with a film for each task.
+    """Return the methods with solved runs on all of these tasks, in the form of ``model.js``: label
+    ``id``, title ``name``, and ``films``, a film for each task.
 
     A film has the movements of the run nearest the median reward; films of several tasks also have
-    the postures of all runs at goal 1, which the tasks share. Methods that follow paths are left
-    out, because the script moves straight.
+    the postures of the first 500 solved runs at goal 1, which the tasks share. Methods that follow
+    paths are left out, because the script moves straight.
     """
     runs = []
     for label in study.methods.index:

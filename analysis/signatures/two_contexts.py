@@ -159,6 +159,7 @@ class TwoContexts:
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:
-        """Return the random generator of a test, the same in every folder."""
+        """Return a new random generator for a test, seeded by the test, the goal, the hand and the
+        second task: the same in every folder and for every method."""
         where = f"goal {self.goal}, {self.hand} hand, against {self.second.task.name}"
         return np.random.default_rng([SEED, zlib.crc32(f"{test} {where}".encode())])

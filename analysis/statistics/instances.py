@@ -22,7 +22,6 @@ from numpy.typing import ArrayLike
 from coartic import estimates
 from coartic.estimates import FEWER_RESAMPLES, Estimate
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import real_array
 from coartic.robot import Array
 
 Scores = Mapping[str, Sequence[Array]]
@@ -54,7 +53,7 @@ def other_tasks(scores: Scores) -> Estimate:
     Raises
     ------
     ValueError
-        A family has no instance, or there is no family.
+        There is no family, a family has no instance, or an instance no run.
 
     Examples
     --------
@@ -68,15 +67,13 @@ def other_tasks(scores: Scores) -> Estimate:
     A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, as the
     bootstrap underestimates the spread of a mean by this factor. The interval is a little too wide
     for few runs with much noise, which the means of instances contain already, and does not exceed
-    the least and greatest means of the runs. No interval for a family with fewer than three
-    instances.
+    the means over families of the least and of the greatest score of a run. Families have the same
+    weight, and so have the instances of a family. No interval (NaN) if any family has fewer than
+    three instances.
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
-    scores = {
-        family: [real_array("runs", runs) for runs in instances]
-        for family, instances in scores.items()
-    }
+    scores = {family: [*map(estimates.vector, instances)] for family, instances in scores.items()}
     values = {
         family: np.array([runs.mean() for runs in instances])
         for family, instances in scores.items()

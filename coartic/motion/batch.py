@@ -260,8 +260,8 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return a bound on the absolute angle of every link of the arm in a slot, rad: the sum of the
-    absolute angles of its joints."""
+    """Return a bound on the absolute angle of every link of the arm in a slot (column of ``q``),
+    rad: the sum of the absolute angles of its joints."""
     total = 0.0
     for k in range(len(q) - BASE_DOF):
         total += abs(q[BASE_DOF + k, slot])
