@@ -101,8 +101,11 @@ def test_what_a_session_shows_cannot_be_written(methods):
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
 
 
-OUTSIDE = {"objective": 6, "learn": 9, "execute": 1, "session": 4, "environments in a thread": 5}
-"""Trials that each way around a session makes."""
+OUTSIDE = {
+    "objective": 6, "learn": 9, "execute": 1, "session": 4, "initial hands": 1,
+    "environments in a thread": 5,
+}  # fmt: skip
+"""Trials that each way around a session makes, in every run."""
 
 
 @pytest.mark.parametrize("means", OUTSIDE)
@@ -111,8 +114,9 @@ def test_trials_outside_the_session_stop_a_run(methods, means):
     if "environment" in means:
         pytest.importorskip("gymnasium")
     cell = cell_on(load_task("ascending"), methods["test/outsider"], means=means)
-    (outcome,) = perform_job(Job(cell, 0, (0,)))
+    outcome, again = (perform_job(Job(cell, 0, (0,)))[0] for _ in range(2))
     assert outcome.status == "crashed"
+    assert again.reason == outcome.reason
     made = "1 trial" if OUTSIDE[means] == 1 else f"{OUTSIDE[means]} trials"
     assert f"made {made} outside its session" in outcome.reason
 

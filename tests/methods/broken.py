@@ -169,6 +169,9 @@ class Outsider(Good):
             own = Session(task, 0, Information)
             own.trial(by_correction(session, ["right"] * 3))
             own.trials("RRR", np.zeros((3, 3, own.dof)))
+        elif self.parameters.means == "initial hands":
+            found = task.model_dump() | {"initial_hands": "best-single-hand"}
+            coartic.initial_hands(coartic.Task(**found))
         elif self.parameters.means == "environments in a thread":
             from coartic.gym import TaskVectorEnv
 
