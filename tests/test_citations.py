@@ -96,6 +96,7 @@ def test_methods_of_others_cite_themselves():
     assert not any("@" in comment for comment in comments)  # BibTeX would read on there
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_command(tmp_path, coartic):
     methods = registry([BROKEN])
     names = "corrective-alone/given", "test/good"

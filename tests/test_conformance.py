@@ -1,6 +1,5 @@
 """The conformance kit: every built-in method passes, every broken one fails its law."""
 
-import multiprocessing
 import re
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -10,6 +9,7 @@ import pytest
 from coartic import load_task
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
+from coartic.benchmarks.pool import CONTEXT
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import OWN_GENERATOR, perform_job
 from coartic.runs.plan import Job
@@ -59,9 +59,10 @@ def methods():
 
 
 @pytest.fixture(scope="module")
-def another_process():
-    """One for all methods: each of them would take long to begin its."""
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+def another_process(methods):
+    """One for all methods, from the server that the processes of their file come from: each of them
+    would take long to begin its."""
+    with ProcessPoolExecutor(1, mp_context=CONTEXT) as pool:
         yield pool
 
 
@@ -94,8 +95,14 @@ def test_methods_that_keep_every_law(methods, name):
     assert all(int(reward) <= OPTIMUM.get(task, -1) for task, reward in printed)
 
 
+def outcome_of(method, **parameters):
+    """The outcome of a run on task ``ascending``."""
+    (outcome,) = perform_job(Job(cell_on(load_task("ascending"), method, **parameters), 0, (0,)))
+    return outcome
+
+
 def test_what_a_session_shows_cannot_be_written(methods):
-    (outcome,) = perform_job(Job(cell_on(load_task("ascending"), methods["test/forger"]), 0, (0,)))
+    outcome = outcome_of(methods["test/forger"])
     assert outcome.meter.trials == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
@@ -113,8 +120,7 @@ def test_trials_outside_the_session_stop_a_run(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
     if "environment" in means:
         pytest.importorskip("gymnasium")
-    cell = cell_on(load_task("ascending"), methods["test/outsider"], means=means)
-    outcome, again = (perform_job(Job(cell, 0, (0,)))[0] for _ in range(2))
+    outcome, again = (outcome_of(methods["test/outsider"], means=means) for _ in range(2))
     assert outcome.status == "crashed"
     assert again.reason == outcome.reason
     made = "1 trial" if OUTSIDE[means] == 1 else f"{OUTSIDE[means]} trials"
@@ -156,17 +162,14 @@ def test_a_solution_without_targets_is_asked_about(methods):
     assert "another seed gives the same result as well" in laws["determinism"].finding
 
 
-@pytest.mark.parametrize("maker", ["RandomState", "Random", "subclass", "seed", "scipy"])
-def test_generators_of_a_method_that_draws_nothing_are_seen(methods, maker):
-    cell = cell_on(load_task("ascending"), methods["test/own-generator"], maker=maker)
-    (outcome,) = perform_job(Job(cell, 0, (0,)))
-    assert (outcome.status, outcome.used[-1]) == ("ok", OWN_GENERATOR)
-
-
-def test_generators_of_a_method_that_draws_are_its_own_affair(methods):
-    method = replace(methods["test/own-generator"], stochastic=True)
-    (outcome,) = perform_job(Job(cell_on(load_task("ascending"), method), 0, (0,)))
-    assert outcome.used == ("corrective process",)
+@pytest.mark.parametrize(
+    "maker", ["RandomState", "Random", "subclass", "seed", "scipy", "default_rng"]
+)
+def test_generators_are_seen_of_a_method_that_draws_nothing(methods, maker):
+    draws = maker == "default_rng"
+    method = replace(methods["test/own-generator"], stochastic=draws)
+    outcome = outcome_of(method, maker=maker)
+    assert (outcome.status, OWN_GENERATOR in outcome.used) == ("ok", not draws)
 
 
 @pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)

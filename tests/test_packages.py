@@ -55,17 +55,6 @@ def built(tmp_path_factory):
     return sdist, wheel
 
 
-@pytest.fixture(scope="module")
-def libraries(tmp_path_factory, built):
-    """An environment with the wheel and what it depends on, of the versions that are pinned."""
-    _, wheel = built
-    folder = tmp_path_factory.mktemp("environment")
-    do(sys.executable, "-m", "venv", folder, cwd=folder)
-    pins = ROOT / "constraints.txt"
-    do(folder / "bin" / "python", "-m", "pip", "install", "-q", "-c", pins, wheel, cwd=folder)
-    return folder
-
-
 def works(environment, place):
     """A task, a method and a report, from a folder with things of the user's own."""
     for name in OWN:
@@ -82,12 +71,17 @@ def works(environment, place):
     assert version.startswith("coartic ")
 
 
-def test_wheel(libraries, tmp_path):
-    works(libraries, tmp_path)
-
-
 PYTHONS = [paths[-1] for minor, paths in sorted(pythons().items()) if minor >= 11]
 DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+
+
+def installed(python, tmp_path, *what):
+    """An environment with what pip installs, and an empty folder to work in."""
+    environment, place = tmp_path / "environment", tmp_path / "place"
+    place.mkdir()
+    do(python, "-m", "venv", environment, cwd=tmp_path)
+    do(environment / "bin" / "python", "-m", "pip", "install", "-q", *what, cwd=tmp_path)
+    return environment, place
 
 
 @pytest.mark.parametrize("python", PYTHONS, ids=lambda path: path.name)
@@ -97,13 +91,8 @@ def test_the_lowest_and_the_newest_versions(built, tmp_path, python, versions):
     some there is no file for newer ones."""
     if versions == "lowest" and python != PYTHONS[0]:
         pytest.skip("the lowest versions have files for the oldest Python alone")
-    _, wheel = built
-    lowest = [text.replace(">=", "==") for text in DEPENDENCIES]
-    environment, place = tmp_path / "environment", tmp_path / "place"
-    place.mkdir()
-    do(python, "-m", "venv", environment, cwd=tmp_path)
-    install = (environment / "bin" / "python", "-m", "pip", "install", "-q", wheel)
-    do(*install, *(lowest if versions == "lowest" else ()), cwd=tmp_path)
+    lowest = [text.replace(">=", "==") for text in DEPENDENCIES] if versions == "lowest" else []
+    environment, place = installed(python, tmp_path, built[1], *lowest)
     works(environment, place)
     coartic = environment / "bin" / "coartic"
     for command in ("run", "report", "verify", "list"):
@@ -112,19 +101,11 @@ def test_the_lowest_and_the_newest_versions(built, tmp_path, python, versions):
     assert len([*(place / "results" / "report").rglob("*.tex")]) > 3
 
 
-def test_source_distribution(built, libraries, tmp_path):
-    """Installed by its own build, beside the libraries that are there already."""
-    sdist, _ = built
-    environment, place = tmp_path / "environment", tmp_path / "place"
-    place.mkdir()
-    do(sys.executable, "-m", "venv", environment, cwd=tmp_path)
-    (site,) = (environment / "lib").glob("python*/site-packages")
-    (others,) = (libraries / "lib").glob("python*/site-packages")
-    python = environment / "bin" / "python"
-    do(python, "-m", "pip", "install", "-q", "--no-deps", sdist, cwd=tmp_path)
-    (site / "libraries.pth").write_text(f"{others}\n")  # after its own
+def test_the_source_distribution_with_the_pinned_versions(built, tmp_path):
+    pins = ROOT / "constraints.txt"
+    environment, place = installed(sys.executable, tmp_path, "-c", pins, built[0])
     where = "import coartic; print(coartic.__file__)"
-    assert str(environment) in do(python, "-c", where, cwd=place)
+    assert str(environment) in do(environment / "bin" / "python", "-c", where, cwd=place)
     works(environment, place)
 
 

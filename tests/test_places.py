@@ -3,13 +3,11 @@
 import json
 import os
 import shutil
-import sqlite3
 import subprocess
 import sys
 
 import pytest
 
-from coartic import CoarticError
 from coartic.runs import store
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import ROOT, paper_cells, run_and_write
@@ -132,17 +130,3 @@ def test_a_place_that_cannot_be_used_gets_a_sentence(said, place):
         assert words.startswith("Error: "), command
         assert len(words.splitlines()) == 1, words
         assert len(words) < 1200, command
-
-
-def test_a_connection_that_fails_gets_a_sentence(tmp_path, monkeypatch):
-    folder = run_and_write(
-        tmp_path / "good", paper_cells(tasks=["ascending"]), runs=1, trials=5
-    ).folder
-
-    def fail(*_, **__):
-        raise sqlite3.OperationalError("unable to open database file")
-
-    monkeypatch.setattr(sqlite3, "connect", fail)
-    for door in (store.open_store, store.writing):
-        with pytest.raises(CoarticError, match="cannot use .*runs.sqlite: unable"), door(folder):
-            pass

@@ -42,26 +42,17 @@ from tests.support.suites import (
     suite_of,
 )
 
-
-class Nobody(InProcess):
-    """Its processes end wherever runs are performed side by side."""
-
-    def perform(self, jobs):
-        for job, outcomes in super().perform(jobs):
-            lost = len(job.numbers) > 1
-            yield job, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
-
-
 LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
 ALONE = cell_on(load_task("ascending"), KNOWN["corrective-alone/given"])
 
 
-class Forges(InProcess):
-    """Has two of many runs state what is no solution."""
+class Spoils(InProcess):
+    """Of many runs, the process of one ends, and two state what is no solution."""
 
     def perform(self, jobs):
         for job, outcomes in super().perform(jobs):
             if len(outcomes) == SLOTS:
+                outcomes[2:3] = fail(replace(job, numbers=(2,)), "crashed", "exit code 9", 1.0)
                 fifth, seventh = (outcomes[run].parts["solution"] for run in (5, 7))
                 fifth[0] = replace(fifth[0], target=fifth[0].target[1:])
                 seventh.pop()
@@ -69,18 +60,16 @@ class Forges(InProcess):
 
 
 def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
-    """Where processes end all runs are, and what is no solution is that of one run alone."""
-    options = {"runs": SLOTS + 2, "trials": 3}
-    honest, lost, forged = (
-        run_and_write(tmp_path / each.__name__, [LEARNER, ALONE], executor=each(), **options).runs
-        for each in (InProcess, Nobody, Forges)
+    honest, spoilt = (
+        run_and_write(
+            tmp_path / each.__name__, [LEARNER, ALONE], executor=each(), runs=SLOTS + 2, trials=3
+        ).runs
+        for each in (InProcess, Spoils)
     )
-    assert (honest.status == "ok").all()
-    assert (forged.status == "ok").all()
-    assert honest.result.tolist() == lost.result.tolist() == forged.result.tolist()
-    assert [set(runs.together) for runs in (honest, lost)] == [{1, 2, SLOTS}, {1}]
-    again = forged.together == 1
-    assert again[again].index.tolist() == [5, 7, len(forged) - 1]  # the last is the planner's
+    assert (spoilt.status == "ok").all()
+    assert honest.result.tolist() == spoilt.result.tolist()
+    again = spoilt.together == 1
+    assert again[again].index.tolist() == [2, 5, 7, len(spoilt) - 1]  # the last is the planner's
 
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
@@ -128,18 +117,16 @@ def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
 
 
 def test_seeds_are_paired_by_task_and_run(results):
-    seeds = results.runs.groupby(["task", "run"]).seed.nunique()
-    assert (seeds == 1).all()
-    assert results.runs.seed.nunique() == 8  # 4 tasks x 2 runs
-    first = results.runs[results.runs.task == "ascending"].set_index("run").seed
-    assert first.loc[[0, 1]].tolist() == [8100969740339433741, 8329115429701909987]
-    for root, task in ((0, "ascending"), (1, "ascending"), (2**40 + 5, "x"), (2**63 - 1, "é")):
+    of_runs = results.runs[["task", "run", "seed"]].drop_duplicates()
+    assert len(of_runs) == 8  # 4 tasks x 2 runs
+    roots, numbers = (1, 2**40 + 5, 2**63 - 1), range(0, 10**5, 9973)
+    others = [(root, "é", number) for root in roots for number in numbers]
+    seeds = [((0, task, run), seed) for task, run, seed in of_runs.itertuples(index=False)]
+    for (root, task, run), seed in [*seeds, *((each, run_seed(*each)) for each in others)]:
         digest = hashlib.sha256(task.encode()).digest()
         words = [int.from_bytes(digest[4 * k : 4 * k + 4], "little") for k in range(4)]
-        for run in range(0, 10**5, 9973):
-            sequence = np.random.SeedSequence(root, spawn_key=(*words, run))
-            drawn = int(sequence.generate_state(1, np.uint64)[0])
-            assert run_seed(root, task, run) == drawn >> 1
+        sequence = np.random.SeedSequence(root, spawn_key=(*words, run))
+        assert seed == int(sequence.generate_state(1, np.uint64)[0]) >> 1
 
 
 def test_run_ids_name_what_the_run_depends_on():
@@ -178,11 +165,7 @@ def test_failures_are_kept_as_data(tmp_path):
 
 @pytest.mark.parametrize(
     ("goals", "policy", "searched", "budget"),
-    [
-        (3, "best-of-all", 8, None),
-        (3, "best-single-hand", 2, 11),
-        (13, "best-single-hand", 2, 11),
-    ],
+    [(3, "best-of-all", 8, None), (13, "best-single-hand", 2, 11)],
 )
 def test_every_method_makes_the_trials_that_it_is_told(
     methods, tmp_path, goals, policy, searched, budget
@@ -261,20 +244,18 @@ def test_ten_thousand_movements_are_not_too_many():
     assert "10001 movements" in str(too_long(task, [move] * 10_001))
 
 
-def test_some_runs_of_every_cell_are_performed_again(results, monkeypatch):
-    monkeypatch.setattr(reproduce, "Local", InProcess)
+@pytest.mark.usefixtures("in_this_process")
+def test_some_runs_of_every_cell_are_performed_again(results):
     again = dict(reproduce.perform_some_again(results.folder, len(results.cells), KNOWN))
     assert not any(again.values())
     cells = results.runs[results.runs.run_id.isin(again)].groupby(["task", "method", "setting"])
     assert len(cells) == len(again) == len(results.cells)
 
 
-def test_a_folder_of_another_suite_is_refused(tmp_path):
-    cells = paper_cells(tasks=["ascending"], methods=["EC1"])
-    plan = planned(cells, runs=1, trials=5)
-    perform(plan, tmp_path, executor=InProcess())
+def test_a_folder_of_another_suite_is_refused(results):
+    plan = [replace(job, suite="quick") for job in planned()]
     with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
-        perform([replace(job, suite="quick") for job in plan], tmp_path, executor=InProcess())
+        perform(plan, results.folder, executor=InProcess())
 
 
 DOUBTS = {
@@ -289,12 +270,10 @@ DOUBTS = {
 }
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("name", DOUBTS)
-def test_runs_of_a_method_file_warn_of_what_a_check_would_find(
-    methods, name, tmp_path, monkeypatch
-):
+def test_runs_of_a_method_file_warn_of_what_a_check_would_find(methods, name, tmp_path):
     """Once for a method, whatever the number of its runs and tasks; the results stay."""
-    monkeypatch.setattr(reproduce, "Local", InProcess)
     tasks = [load_task("ascending"), load_task("two-armed-1")]
     plan = planned([cell_on(task, methods[name]) for task in tasks])
     with warnings.catch_warnings(record=True) as said:

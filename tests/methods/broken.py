@@ -17,11 +17,11 @@ SEEN = []
 AT_IMPORT = random.random()
 
 
-def by_correction(session, hands=None):
+def by_correction(session):
     """A plain solution: every goal by the corrective process, the last hand first."""
-    session.correct(session.q0, session.hands[-1], 1)
-    hands = hands or [session.hands[-1]] * session.goals_count
-    return tuple(Movement(k, hand, "corrective") for k, hand in enumerate(hands, 1))
+    hand = session.hands[-1]
+    session.correct(session.q0, hand, 1)
+    return tuple(Movement(k, hand, "corrective") for k in range(1, session.goals_count + 1))
 
 
 class Good(Method):
@@ -32,7 +32,10 @@ class Good(Method):
     stochastic = False
 
     def solve(self, session):
-        return Result(by_correction(session))
+        return Result(by_correction(session), self.details(session) or {})
+
+    def details(self, session):
+        """What it does besides, and says of it."""
 
 
 class Uncited(Good):
@@ -59,42 +62,39 @@ class Unexecutable(Good):
 class Random(Good):
     name = "test/random"
 
-    def solve(self, session):
-        return Result(by_correction(session), {"drawn": random.random()})
+    def details(self, session):
+        return {"drawn": random.random()}
 
 
 class Local(Good):
     name = "test/local"
 
-    def solve(self, session):
-        return Result(by_correction(session), {"drawn_at_import": AT_IMPORT})
+    def details(self, session):
+        return {"drawn_at_import": AT_IMPORT}
 
 
 class Remembers(Good):
     name = "test/remembers"
 
-    def solve(self, session):
+    def details(self, session):
         SEEN.append(session.seed)
-        return Result(by_correction(session), {"seen": len(set(SEEN))})
+        return {"seen": len(set(SEEN))}
 
 
 class Spendthrift(Good):
     name = "test/spendthrift"
     information = CORRECTIVE | {Information.REWARD_BY_TRIAL}
 
-    def solve(self, session):
-        solution = by_correction(session)
+    def details(self, session):
         for _ in range(20):
-            session.trial(solution)
-        return Result(solution)
+            session.trial(by_correction(session))
 
 
 class Peeks(Good):
     name = "test/peeks"
 
-    def solve(self, session):
+    def details(self, session):
         session.jacobian(session.q0, session.hands[0])
-        return Result(by_correction(session))
 
 
 class Overdeclares(Good):
@@ -105,10 +105,9 @@ class Overdeclares(Good):
 class Unhelpful(Good):
     name = "test/unhelpful"
 
-    def solve(self, session):
+    def details(self, session):
         if session.goals_count == 1:
             raise ZeroDivisionError("no goal is that far")
-        return Result(by_correction(session))
 
 
 class Taker(Good):
@@ -116,8 +115,8 @@ class Taker(Good):
 
     name = "test/taker"
 
-    def solve(self, session):
-        return Result((), {"goals": len(session.reveal(Information.CORRECTIVE_PROCESS).goals)})
+    def details(self, session):
+        return {"goals": len(session.reveal(Information.CORRECTIVE_PROCESS).goals)}
 
 
 class Freeloader(Good):
@@ -138,17 +137,15 @@ class Forger(Good):
     name = "test/forger"
     information = CORRECTIVE | {Information.REWARD_BY_TRIAL}
 
-    def solve(self, session):
-        solution = by_correction(session)
-        session.trial(solution)
+    def details(self, session):
+        session.trial(by_correction(session))
         session.meter.trials = 0
         session.rewards.append(10**6)
         session.q0[:] = 9.0
         try:
             session.spend(trials=-1)
         except ValueError as error:
-            return Result(solution, {"said": str(error)})
-        return Result(solution)
+            return {"said": str(error)}
 
 
 class MeansParameters(Parameters):
@@ -159,29 +156,28 @@ class Outsider(Good):
     name = "test/outsider"
     Parameters = MeansParameters
 
-    def solve(self, session):
-        task = load_task("ascending")
-        if self.parameters.means == "objective":
-            coartic.objective(task, "RRR").many([[0.0] * 18] * 5)
-        elif self.parameters.means == "learn":
-            coartic.learn(task, "EC1", seed=0, trials=9)
-        elif self.parameters.means == "session":
-            own = Session(task, 0, Information)
-            own.trial(by_correction(session, ["right"] * 3))
-            own.trials("RRR", np.zeros((3, 3, own.dof)))
-        elif self.parameters.means == "initial hands":
-            found = task.model_dump() | {"initial_hands": "best-single-hand"}
-            coartic.initial_hands(coartic.Task(**found))
-        elif self.parameters.means == "environments in a thread":
-            from coartic.gym import TaskVectorEnv
+    def details(self, session):
+        task, correction = load_task("ascending"), by_correction(session)
+        own = Session(task, 0, Information)
+        searched = task.model_copy(update={"initial_hands": "best-single-hand"})
+        means = {
+            "objective": lambda: coartic.objective(task, "RRR").many([[0.0] * 18] * 5),
+            "learn": lambda: coartic.learn(task, "EC1", seed=0, trials=9),
+            "execute": lambda: coartic.execute(task, correction),
+            "session": lambda: (own.trial(correction), own.trials("RRR", np.zeros((3, 3, 10)))),
+            "initial hands": lambda: coartic.initial_hands(searched),
+            "environments in a thread": lambda: step_in_a_thread(task),
+        }
+        means[self.parameters.means]()
 
-            env = TaskVectorEnv(5, task)
-            env.reset()
-            with ThreadPoolExecutor(1) as pool:
-                pool.submit(env.step, env.action_space.sample()).result()
-        else:
-            coartic.execute(task, by_correction(session, ["right"] * 3))
-        return Result(by_correction(session))
+
+def step_in_a_thread(task):
+    from coartic.gym import TaskVectorEnv
+
+    env = TaskVectorEnv(5, task)
+    env.reset()
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(env.step, env.action_space.sample()).result()
 
 
 class Lucky(Good):
@@ -189,8 +185,15 @@ class Lucky(Good):
 
     name = "test/lucky"
 
-    def solve(self, session):
-        return Result(by_correction(session), {"drawn": session.rng.random()})
+    def details(self, session):
+        return {"drawn": session.rng.random()}
+
+
+class Draws(Lucky):
+    """Draws as it should."""
+
+    name = "test/draws"
+    stochastic = True
 
 
 class OwnGeneratorParameters(Parameters):
@@ -203,7 +206,7 @@ class OwnGenerator(Good):
     name = "test/own-generator"
     Parameters = OwnGeneratorParameters
 
-    def solve(self, session):
+    def details(self, session):
         makers = {
             "default_rng": lambda: np.random.default_rng(7),
             "RandomState": lambda: np.random.RandomState(7).uniform(),
@@ -214,7 +217,6 @@ class OwnGenerator(Good):
         }
         makers[self.parameters.maker]()
         assert isinstance(np.random.mtrand._rand, np.random.RandomState)
-        return Result(by_correction(session))
 
 
 class OwnRandom(random.Random):
@@ -243,16 +245,6 @@ class NoTarget(Good):
         by_correction(session)
         targets = np.full((session.goals_count, session.dof), np.nan)
         return Result(movements_of("R" * session.goals_count, targets))
-
-
-class Draws(Good):
-    """Draws as it should."""
-
-    name = "test/draws"
-    stochastic = True
-
-    def solve(self, session):
-        return Result(by_correction(session), {"drawn": session.rng.random()})
 
 
 class Undrawn(Good):

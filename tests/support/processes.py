@@ -47,17 +47,24 @@ def comes(condition):
     return False
 
 
-def apart(what, *arguments):
-    """What a function of a module returns, in a fork of this process, which has imported already
-    what takes longest (a fresh one where there are none). Raises ChildProcessError where it fails,
-    after its traceback."""
+def started(what, *arguments):
+    """A fork of this process, which has imported already what takes longest (a fresh one where
+    there are none), that calls a function with an end of a pipe and these arguments; and the other
+    end."""
     how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     received, answers = how.Pipe(duplex=False)
-    process = how.Process(target=_say, args=(answers, what, arguments))
+    process = how.Process(target=what, args=(answers, *arguments))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of threads, which a fork does not have
         process.start()
     answers.close()
+    return process, received
+
+
+def apart(what, *arguments):
+    """What a function of a module returns in a process of its own (:func:`started`). Raises
+    ChildProcessError where it fails, after its traceback."""
+    process, received = started(_say, what, arguments)
     try:
         return received.recv()
     except EOFError:
