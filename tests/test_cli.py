@@ -12,14 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from coartic import __version__, corrective_trial, film, learn, load_task
+from coartic import __version__, film, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
 from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
-from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
@@ -50,15 +49,11 @@ def test_run_resumes(coartic, tmp_path):
     assert code == 0
     assert f"coartic report '{out}'" in " ".join(text.split())
     assert text.startswith("2 runs in ")
-    assert len(text.splitlines()) <= 12
-    assert max(map(len, text.splitlines())) <= max(80, len(str(out)) + 40)
     assert "Runs: 2/2\n" in error  # plain lines without a terminal
     made_with = load(out).made_with
     assert made_with["packages"]["numba"]
     assert made_with["command"][1:3] == ["run", "paper"]
-    assert coartic(*SMALL, "--out", out)[1].startswith("2 runs (2 reused) in ")
     assert coartic(*SMALL, "--runs", 3, "--out", out)[1].startswith("3 runs (2 reused) in ")
-    assert len(load(out).runs) == 3
 
 
 def test_a_crashed_run_makes_the_exit_code(coartic, tmp_path, monkeypatch):
@@ -115,17 +110,10 @@ def test_reproduce(coartic, tmp_path):
     out = tmp_path / "out"
     assert coartic(*SMALL, "--out", out)[0] == 0
     first, second = load(out).runs.run_id
-    (tmp_path / "earlier").mkdir()  # a folder that cannot be read is next to it
-    (tmp_path / "earlier" / RUNS_FILE).write_text("no database")
     code, text, _ = coartic("reproduce", first, "--in", tmp_path)
     assert code == 0
-    assert "earlier" in coartic("reproduce", "0123456789", "--in", tmp_path)[2]
     assert text.splitlines()[-1] == "Performed again: identical."
     assert "1 run performed again: none with another" in coartic("verify", out, "--again", 1)[1]
-    part = tmp_path / "part"  # of an array, and of all methods those for one arm
-    own = ("--methods", "dual-process/*", "--runs", "2..3")
-    assert coartic(*SMALL, *own, "--out", part)[0] == 0
-    assert "2 runs performed again: none with another" in coartic("verify", part, "--again", 2)[1]
     edit(out, "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?", second)
     code, text, _ = coartic("verify", out, "--again", 2)
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
@@ -397,24 +385,19 @@ def test_help_has_no_types_of_python_and_examples_have_options_that_there_are(
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("radius", [1e-3, 1.0])
 def test_a_task_of_any_radius_passes_every_door(coartic, tmp_path, radius):
-    task, file = metres_task(radius, name="arm"), tmp_path / "arm.toml"
+    task, file, out = metres_task(radius, name="arm"), tmp_path / "arm.toml", tmp_path / "runs"
     if radius > 0.2:  # elsewhere, all goals are hit at the start
         task = tiny_task(name="arm", radius=radius, goals=[[1.0, 2.5], [-1.0, 3.0]])
     task.save(file)
-    out, page = tmp_path / "runs", tmp_path / "play.html"
-    assert coartic("check", file)[0] == 0
-    assert coartic("draw", file, "--out", tmp_path / "arm.svg")[0] == 0
-    assert coartic("play", file, "--out", page, "--no-open")[0] == 0
     run = ("run", "comparison", "--tasks", file, "--methods", "EC1,hill-climbing", "--runs", 1)
-    code, _, error = coartic(*run, "--trials", 5, "--out", out)
-    assert (code, "Traceback" in error) == (0, False), error
-    assert coartic("verify", out)[0] == 0
-    stored = load(out).runs
-    assert (stored.status == "ok").all()
-    assert (
-        learn(task, "EC1", seed=0, trials=5).rewards[0]
-        == corrective_trial(task, task.initial_hands).reward
-    )
+    for command in (
+        ("check", file),
+        ("play", file, "--out", tmp_path / "play.html", "--no-open"),
+        (*run, "--trials", 5, "--out", out),
+        ("verify", out),
+    ):
+        assert coartic(*command)[0] == 0, command
+    assert (load(out).runs.status == "ok").all()
     env = TaskEnv(task)
     env.reset(seed=0)
     assert env.step(env.action_space.sample())[1] < 0

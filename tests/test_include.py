@@ -95,9 +95,6 @@ def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
     )
     assert coartic(*command, "--runs", 4, "--out", places[3])[0] == 0
     same_results(load(places[2]), load(places[3]))
-    assert coartic(*command, "--runs", "0..3", "--out", places[1])[1].startswith(
-        "5 runs (2 reused)"
-    )
 
 
 def test_what_no_folder_has_is_performed(parts, left, tmp_path):

@@ -52,14 +52,15 @@ FILES = {
 def code_with(folder, **changed):
     """What the method's code is known by, with some files changed."""
     for name, text in (FILES | changed).items():
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     return code_of(folder / "mine.py", (folder / "w",))
 
 
 def test_what_counts_as_the_code_of_a_method(tmp_path):
-    """Numbers in it and in what it imports and reads."""
+    """Numbers in it and in what it imports and reads, wherever the file is."""
     first = code_with(tmp_path)
+    assert code_with(tmp_path / "elsewhere") == first
     assert registry([tmp_path / "mine.py"])["nearest-hand"].code == first
     changes = (
         {"mine_helper.py": "STEP = 2"},
@@ -107,24 +108,6 @@ def test_what_a_file_does_when_it_is_imported_is_no_matter_here(done, coartic, t
     assert AT_IMPORT[done] in error
     assert len(error.splitlines()) == (1 if AT_IMPORT[done] else 0)
     assert ("reluctance=0.0" in text) == (not AT_IMPORT[done])
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_a_file_is_the_same_method_wherever_it_is(coartic, tmp_path, monkeypatch):
-    summaries = []
-    for place, path, text in (
-        ("here", "mine.py", TEXT),
-        ("there", "other.py", TEXT),
-        ("there", "other.py", TEXT.replace("** 0.5", "** 0.25")),
-    ):
-        (tmp_path / place).mkdir(exist_ok=True)
-        monkeypatch.chdir(tmp_path / place)
-        Path(path).write_text(text, encoding="utf-8")
-        summaries.append(coartic(
-            "run", "paper", "--methods", "nearest-hand", "--method-file", path,
-            "--tasks", "ascending", "--out", tmp_path / "out",
-        )[1].partition(" in ")[0])  # fmt: skip
-    assert summaries == ["1 run", "1 run (1 reused)", "1 run"]
 
 
 def test_the_pages_show_the_example_as_it_is():

@@ -6,14 +6,12 @@ from pathlib import Path
 import pytest
 
 from coartic import CoarticError, load_task
-from coartic.analysis.study import load
-from coartic.benchmarks import pool, template
+from coartic.benchmarks import include, runner, template
 from coartic.benchmarks.planning import plan, plan_suite, request_for
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import load_suite
 from coartic.tasks.task import task_text
-from tests.support.suites import ROOT, InProcess, suite_of
+from tests.support.suites import ROOT, suite_of
 
 MINE = Path(template.__file__).read_text(encoding="utf-8")
 FAMILY = (ROOT / "coartic" / "tasks" / "families" / "long.v1.toml").read_text(encoding="utf-8")
@@ -29,20 +27,20 @@ def here(tmp_path, monkeypatch):
     Path("strips.v1.toml").write_text(FAMILY, encoding="utf-8")
 
 
-def test_every_argument_of_run_suite_has_an_effect(tmp_path):
-    seen = []
+def test_run_suite_hands_on_its_arguments(tmp_path, monkeypatch):
+    def perform(plan, folder, **options):
+        return plan, folder, options
 
-    class Watched(InProcess):
-        def perform(self, jobs):
-            seen.append("executor")
-            return super().perform(jobs)
-
-    watch = {"executor": Watched(), "watch": lambda progress, cell: seen.append("watch")}
-    assert {*inspect.signature(run_suite).parameters} == {*watch, "suite", "folder", "options"}
-    options = {"tasks": ["ascending"], "methods": ["EC1"], "runs": 2, "trials": 20}
-    run_suite("quick", tmp_path, **watch, **options)
-    assert {*seen} == {"executor", "watch"}
-    assert load(tmp_path).suite == "quick"
+    monkeypatch.setattr(runner, "perform", perform)
+    given, options = {"executor": 1, "watch": 2}, {"tasks": ["ascending"], "runs": 2}
+    assert {*inspect.signature(runner.run_suite).parameters} == {
+        *given,
+        "suite",
+        "folder",
+        "options",
+    }
+    due = plan_suite("quick", **options), tmp_path, given
+    assert runner.run_suite("quick", tmp_path, **given, **options) == due
 
 
 OPTIONS = {
@@ -58,48 +56,43 @@ OPTIONS = {
     "time_limit_s": ("--time-limit", "5"),
     "trial_budget": ("--trial-budget", "7"),
     "include": ("--include", "before"),
-    "jobs": ("--jobs", "2"),
-    "scheduler": ("--scheduler", "127.0.0.1:1", "--jobs", "2"),
+    "jobs": ("--jobs", "97"),
+    "scheduler": ("--scheduler", "127.0.0.1:1"),
 }
 
 
-@pytest.mark.usefixtures("here", "in_this_process")
-def test_a_second_value_of_an_option_of_run_changes_what_it_does(coartic, commands, monkeypatch):
-    known = commands.commands["run"].params
-    assert {parameter.name for parameter in known} == {*OPTIONS, "help"} - {"help"}
+@pytest.mark.usefixtures("here")
+def test_a_second_value_of_an_option_of_run_changes_what_is_performed(
+    coartic, commands, monkeypatch
+):
+    assert {parameter.name for parameter in commands.commands["run"].params} == {*OPTIONS}
     base = {"suite": ("paper",), "folder": ("--out", "out"), "tasks": ("--tasks", "ascending")}
     base |= {"methods": ("--methods", "EC1"), "runs": ("--runs", "2"), "trials": ("--trials", "20")}
-    workers = []
+    asked = []
 
-    class Counted(InProcess):
-        def __init__(self, jobs=1):
-            workers.append(jobs)
+    def perform(plan, folder, *, executor, watch):
+        asked.append((plan, folder, vars(executor).get("address") or executor.workers))
+        raise CoarticError("that is enough")
 
-    monkeypatch.setattr(pool, "Local", Counted)
+    monkeypatch.setattr(runner, "perform", perform)
+    monkeypatch.setattr(include, "include_folders", lambda plan, *folders: (plan, folders))
 
-    def told(name, changed):
-        place = {"folder": ("--out", name)}
-        words = [word for each in (base | place | changed).values() for word in each]
-        before = len(workers)
-        code, _, error = coartic("run", *words)
-        folder = Path((place | changed)["folder"][1])
-        if code:
-            return error
-        study = load(folder)
-        runs = study.runs[["run_id", "time_limit_s"]].to_numpy().tolist()
-        return study.suite, str(folder) if name == "folder" else "", runs, workers[before:]
+    def told(**changed):
+        words = [word for each in (base | changed).values() for word in each]
+        error = coartic("run", *words)[2]
+        return asked.pop() if asked else error
 
-    usual = told("usual", {})
-    assert told("again", {}) == usual
-    assert told(
-        "before", {"methods": ("--methods", "corrective-alone/given"), "runs": (), "trials": ()}
-    )
+    usual = told()
+    assert told() == usual
     for name, words in OPTIONS.items():
-        answer = told(name, {name: words})
+        answer = told(**{name: words})
         assert answer != usual, name
-        assert isinstance(answer, str) == (name in ("family_file", "scheduler")), answer
-        assert name != "family_file" or "strips.v1.toml has no effect: no instance of" in answer
-    assert "--jobs has no effect with --scheduler" in told("x", {"x": OPTIONS["scheduler"]})
+        assert isinstance(answer, str) == (name == "family_file"), answer
+    assert "strips.v1.toml has no effect: no instance of" in told(
+        family_file=OPTIONS["family_file"]
+    )
+    both = {name: OPTIONS[name] for name in ("jobs", "scheduler")}
+    assert "--jobs has no effect with --scheduler" in told(**both)
 
 
 @pytest.mark.usefixtures("here")

@@ -8,8 +8,6 @@ import sqlite3
 import sys
 import zlib
 from contextlib import closing
-from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,74 +15,31 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coartic import PAPER, Movement, execute, learn, load_task, move
+from coartic import PAPER, load_task, move
 from coartic.analysis import verify as checker
 from coartic.motion.movement import follow
-from coartic.motion.solution import other_arm_travel
 from coartic.robot import HANDS
-from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Cell, Job
-from coartic.runs.record import PARTS, Outcome, Run, Score
-from coartic.runs.store import RUNS_FILE, writing
-from coartic.tasks.task import hands_of
+from coartic.runs.store import RUNS_FILE
 from tests.support.processes import python
-from tests.support.strategies import tiny_task, uneven_task
-from tests.support.suites import edit, edit_plan, moved
-
-
-def corrected(*hands):
-    return [Movement(goal, hand, "corrective") for goal, hand in enumerate(hands, 1)]
-
-
-def along_paths(task):
-    """Paths to where the corrective process would end, and beyond, by way of somewhere else."""
-    reached = [task.q0, *execute(task, corrected(*["right"] * 3)).configurations]
-    for goal, (before, after) in enumerate(pairwise(reached), 1):
-        beyond, aside = after + 0.02 * (after - before), (before + after) / 2
-        aside[3] += 0.1
-        yield Movement(goal, "right", "path", waypoints=np.array([aside, beyond]))
-
-
-def run_of(job, number, parts, status="ok"):
-    """A run that made these movements, as it is stored."""
-    task = job.cell.task
-    done = {part: execute(task, movements) for part, movements in parts.items()}
-    scores = {part: Score(e.reward, e.hands, e.movements) for part, e in done.items()}
-    if solution := done.get("solution"):
-        travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
-        scores["solution"] = scores["solution"]._replace(
-            corrections=solution.corrections, other_arm_travel=travel
-        )
-    outcome = Outcome(status, environment={})
-    return Run(replace(job, numbers=(number,)), outcome, scores, "")
+from tests.support.strategies import STUCK, tiny_task, uneven_task
+from tests.support.suites import KNOWN, cell_on, edit, edit_plan, moved, run_and_write
 
 
 @pytest.fixture(scope="module")
 def true_folder(tmp_path_factory):
-    """A folder in which all is true: learners, corrections, paths, and two runs that failed."""
-    folder = tmp_path_factory.mktemp("true") / "results"
-    two_armed, straight = load_task("two-armed-1"), load_task("ascending")
+    """A folder in which all is true: of corrections, a path, a learner, and one that fails."""
     tiny = tiny_task(goals=[[5.0, 1.0], [5.0, 0.98]])  # the second one is hit on the way
-    learners = [learn(two_armed, "EC3", seed=seed, trials=300) for seed in range(2)]
-    parts = [{part: getattr(run, part) for part in PARTS} for run in learners]
-    solved, failed = {"solution": learners[0].solution}, {"status": "timeout"}
-    asked = [
-        (two_armed, {}, [(number, movements, {}) for number, movements in enumerate(parts)]),
-        (tiny, {}, [(0, {"solution": corrected("right", "right")}, {})]),
-        (straight, {}, [(0, {"solution": along_paths(straight)}, {})]),
-        (two_armed, {"other_arm": "free"}, [(0, solved, {})]),
+    cells = [
+        cell_on(load_task("two-armed-1"), KNOWN["dual-process/EC3"]),
+        cell_on(tiny, KNOWN["corrective-alone/given"]),
+        cell_on(load_task("ascending"), KNOWN["posture-qp/current-goal"]),
+        cell_on(STUCK, KNOWN["dual-process/EC1"], noise_sd=0.1),
     ]
-    asked += [(two_armed, {"other": number}, [(0, {}, failed)]) for number in range(2)]
-    method = MethodInfo("method", "", "", (), True, {}, "", "code")
-    plan = [
-        Job(Cell(task, method, each), 0, range(len(runs)), suite="suite")
-        for task, each, runs in asked
-    ]
-    with writing(folder) as store:
-        store.replace_plan(plan, {"command": [], "date": ""})
-        for job, (_, _, runs) in zip(plan, asked, strict=True):
-            store.write(run_of(job, number, made, **more) for number, made, more in runs)
-    return folder
+    return run_and_write(tmp_path_factory.mktemp("true") / "results", cells, trials=60).folder
+
+
+TINY, PATH, LEARNER, OTHER, FAILED = range(1, 6)
+"""Its runs, by the ids of their results."""
 
 
 def edited(true_folder, tmp_path, statement):
@@ -98,7 +53,7 @@ def edited(true_folder, tmp_path, statement):
 def test_a_damaged_file_is_told_from_a_wrong_one(true_folder, tmp_path, coartic, damage):
     whole, size = (true_folder / RUNS_FILE).read_bytes(), 4096
     if damage == "zeros":
-        starts = range(size, len(whole), 2 * size)
+        starts = [at for at in range(size, len(whole), size) if whole[at] in b"\x02\x05\x0a\x0d"]
         damaged = [whole[:at] + bytes(size) + whole[at + size :] for at in starts]
     else:
         damaged = [whole.replace(text, b"\xff" * len(text)) for text in (b"right", b"tiny")]
@@ -115,7 +70,7 @@ def test_a_damaged_file_is_told_from_a_wrong_one(true_folder, tmp_path, coartic,
 def test_nothing_is_wrong_with_what_was_not_edited(true_folder):
     report = checker.check_runs(true_folder)
     assert report.wrong == []
-    assert (report.runs, report.movements > 30) == (7, True)
+    assert (report.runs, report.movements > 30) == (6, True)
     assert report.unchecked[-1] == "Runs without a solution: 2."
 
 
@@ -123,64 +78,64 @@ def test_runs_that_the_plan_does_not_ask_for_are_counted(true_folder, tmp_path):
     folder = shutil.copytree(true_folder, tmp_path / "fewer")
     edit_plan(folder, "DELETE FROM plan WHERE position = 0")
     report = checker.check_runs(folder)
-    assert (report.wrong, report.runs) == ([], 7)
+    assert (report.wrong, report.runs) == ([], 6)
     assert "should ask for 2 other runs, which no report shows" in report.unchecked[-1]
 
 
 def result(run, change):
-    """An edit of the row of a run, by its place among the runs."""
-    return run, f"UPDATE results SET {change} WHERE id = {run + 1}"
+    """An edit of the row of a run, by the id of its result."""
+    return run, f"UPDATE results SET {change} WHERE id = {run}"
 
 
 def movement(run, change, part="solution", order=0):
     """An edit of one of its movements."""
-    where = f"""WHERE result_id = {run + 1} AND part = '{part}' AND "order" = {order}"""
+    where = f"""WHERE result_id = {run} AND part = '{part}' AND "order" = {order}"""
     return run, f"UPDATE movements SET {change} {where}"
 
 
 STANDING = f"path = '{[0.0] * 10}', ticks = 1"
 EDITS = {  # what is said: of which run, and what was edited
-    "reward is ": result(0, "reward = reward + 1"),
-    "best_trial is ": result(0, "best_trial = 301"),
-    "hands is RR, not LL": result(2, "hands = 'LL'"),
-    "solution_corrections is 1": result(2, "solution_corrections = 2"),
-    "other_arm_travel is": result(3, "other_arm_travel = 1e-8"),
-    "status is timeout": result(2, "status = 'timeout', reward = NULL, hands = NULL"),
-    "its cell is not there": (2, "DELETE FROM cells WHERE task = 'tiny'"),
+    "reward is ": result(LEARNER, "reward = reward + 1"),
+    "best_trial is ": result(LEARNER, "best_trial = 301"),
+    "hands is RR, not LL": result(TINY, "hands = 'LL'"),
+    "solution_corrections is 1": result(TINY, "solution_corrections = 2"),
+    "other_arm_travel is": result(PATH, "other_arm_travel = 1e-8"),
+    "status is timeout": result(TINY, "status = 'timeout', reward = NULL, hands = NULL"),
+    "its cell is not there": (TINY, "DELETE FROM cells WHERE task = 'tiny'"),
     "of environments that is not there": (None, "UPDATE results SET environment = 99"),
-    " ticks, not ": movement(0, f"path = {moved('$[7]', 0.02)}", order=1),
-    "other_arm_travel": movement(1, f"path = {moved('$[3]', 0.02)}", order=1),
-    "moves a locked base": movement(1, f"path = {moved('$[1]', 0.02)}", part="replay"),
-    "no number up to": movement(2, f"path = {moved('$[0]', 9e9)}"),
-    "a joint or a trial": movement(1, f"path = {moved('$[9]', 1e-9)}", part="replay"),
-    "is no number": movement(2, "path = json_set(path, '$[0]', NULL)"),
-    "not a number for each joint": movement(2, "path = json_remove(path, '$[0]')"),
-    "has no such points": movement(2, "path = '[]'"),
-    "goal 1 is not hit": movement(2, STANDING),
-    "the left hand, which": movement(3, "hand = 'left'"),
-    "has not one hand": movement(0, "goal = 2"),
-    "out of order": (3, "UPDATE movements SET goal = 4 - goal WHERE kind = 'path'"),
-    "which is no count": movement(1, "ticks = ticks + 0.5"),
-    "is made after goal 2": movement(2, "ticks = 1", order=1),
-    "of no known kind": movement(2, "kind = 'magic'"),
-    "movement 1 is missing": movement(2, 'ticks = 0, "order" = 7', order=1),
-    "'other'": movement(2, "part = 'other'"),
-    "path has no such points": movement(2, "kind = 'path'"),
-    "planned has no such points": movement(3, "kind = 'planned'"),
-    "movement 0 is too long": movement(3, "path = path || hex(zeroblob(6000000))"),
-    "model were changed": (3, "UPDATE cells SET method = 'other' WHERE task = 'ascending'"),
-    "its task is not": (3, "UPDATE cells SET task = 'descending' WHERE task = 'ascending'"),
-    "that its id says": result(6, "run = 60"),
-    "its seed is not": result(2, "seed = seed + 1"),
-    "at least 2 ticks, not 1": movement(2, "ticks = 1"),
-    "no count up to": movement(2, "ticks = 1000000000"),
-    "the rewards of its None trials are damaged": (
-        0,
-        f"INSERT INTO learning VALUES (1, x'{zlib.compress(bytes(8)).hex()}')",
+    " ticks, not ": movement(LEARNER, f"path = {moved('$[7]', 0.02)}", order=1),
+    "other_arm_travel": movement(OTHER, f"path = {moved('$[3]', 1e-4)}", order=1),
+    "moves a locked base": movement(OTHER, f"path = {moved('$[1]', 0.02)}", part="replay"),
+    "no number up to": movement(TINY, f"path = {moved('$[0]', 9e9)}"),
+    "a joint or a trial": movement(OTHER, f"path = {moved('$[9]', 1e-9)}", part="replay"),
+    "is no number": movement(TINY, "path = json_set(path, '$[0]', NULL)"),
+    "not a number for each joint": movement(TINY, "path = json_remove(path, '$[0]')"),
+    "has no such points": movement(TINY, "path = '[]'"),
+    "goal 1 is not hit": movement(TINY, STANDING),
+    "the left hand, which": movement(PATH, "hand = 'left'"),
+    "has not one hand": movement(LEARNER, "goal = 2"),
+    "out of order": (PATH, "UPDATE movements SET goal = 4 - goal WHERE kind = 'path'"),
+    "which is no count": movement(OTHER, "ticks = ticks + 0.5"),
+    "is made after goal 2": movement(TINY, "ticks = 1", order=1),
+    "of no known kind": movement(TINY, "kind = 'magic'"),
+    "movement 1 is missing": movement(TINY, 'ticks = 0, "order" = 7', order=1),
+    "'other'": movement(TINY, "part = 'other'"),
+    "path has no such points": movement(TINY, "kind = 'path'"),
+    "planned has no such points": movement(PATH, "kind = 'planned'"),
+    "movement 0 is too long": movement(PATH, "path = path || hex(zeroblob(6000000))"),
+    "model were changed": (PATH, "UPDATE cells SET method = 'other' WHERE task = 'ascending'"),
+    "its task is not": (PATH, "UPDATE cells SET task = 'descending' WHERE task = 'ascending'"),
+    "that its id says": result(FAILED, "run = 60"),
+    "its seed is not": result(TINY, "seed = seed + 1"),
+    "at least 2 ticks, not 1": movement(TINY, "ticks = 1"),
+    "no count up to": movement(TINY, "ticks = 1000000000"),
+    "the rewards of its 60 trials are damaged": (
+        LEARNER,
+        f"UPDATE learning SET rewards = x'{zlib.compress(bytes(999)).hex()}'",
     ),
-    "rewards of its None trials are damaged": (0, "INSERT INTO learning VALUES (1, 'x')"),
+    "rewards of its 1 trials are damaged": (TINY, "UPDATE learning SET rewards = 'x'"),
     "the task is too long": (
-        2,
+        TINY,
         """UPDATE cells SET definition = json_set(definition,
         '$.title', hex(zeroblob(60000))) WHERE task = 'tiny'""",
     ),
@@ -191,9 +146,9 @@ EDITS = {  # what is said: of which run, and what was edited
         "UPDATE cells SET setting = '' WHERE id = 4",
     ),
     # Of the plan: what it asks for is there.
-    "asks for 7 runs, of which the folder has 6": (None, "DELETE FROM results WHERE id = 2"),
-    "asks for 7 runs, of which the folder has 0": (None, "UPDATE suite SET seed = 1"),
-    "asks for 9 runs, of which the folder has 7": (None, "UPDATE plan SET runs = 4 WHERE runs = 2"),
+    "asks for 6 runs, of which the folder has 5": (None, "DELETE FROM results WHERE id = 2"),
+    "asks for 6 runs, of which the folder has 0": (None, "UPDATE suite SET seed = 1"),
+    "asks for 7 runs, of which the folder has 6": (None, "UPDATE plan SET runs = 3 WHERE cell = 1"),
     **{
         f"The plan is not as it was written{' ' * number}": (None, statement)
         for number, statement in enumerate(
@@ -217,7 +172,7 @@ EDITS = {  # what is said: of which run, and what was edited
 def test_an_edit_is_found(true_folder, tmp_path, words):
     run, statement = EDITS[words]
     with closing(sqlite3.connect(true_folder / RUNS_FILE)) as db:
-        query = "SELECT max(run_id) FROM results WHERE id = ? + 1"
+        query = "SELECT max(run_id) FROM results WHERE id = ?"
         (run_id,) = db.execute(query, [run]).fetchone()
     wrong = checker.check_runs(edited(true_folder, tmp_path, statement)).wrong
     assert any((run_id or "") in sentence and words.strip() in sentence for sentence in wrong), (
