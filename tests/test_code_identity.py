@@ -75,12 +75,6 @@ def test_a_number_counts_where_it_is_executed(after, place, methods):
     assert after(place, line, b"STEP = 3\n" + line) == methods
 
 
-def test_words_for_readers_and_type_checkers_do_not_count(after):
-    assert not after("motion/trial.py", b"Let N arms reach", b"Have N arms reach")
-    type_checking, imports = b"if TYPE_CHECKING:\n", b"if TYPE_CHECKING:\n    import this\n"
-    assert not after("learner/conditions.py", type_checking, imports)
-
-
 def test_names_of_the_package_count_where_they_are_at_home(tmp_path):
     (tmp_path / "mine.py").write_text("import coartic\n\nprint(coartic.learn('ascending', 'EC1'))")
     assert PACKAGE / "learner" / "kernel.py" in files_of(tmp_path / "mine.py")

@@ -67,14 +67,6 @@ def joined(folders, out, cells=WHOLE, **options):
     return perform(whole, out, executor=InProcess())
 
 
-def test_parts_make_a_whole(parts, tmp_path):
-    out = tmp_path / "new" / "whole"
-    assert (joined(parts, out).present, joined(parts, out).done) == (2 + 1 + 2 + 1, 0)
-    same_results(load(out), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
-    assert check_runs(out).wrong == []
-    assert [path.name for path in out.iterdir()] == [RUNS_FILE]
-
-
 def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
     command = ("run", "paper", "--tasks", "ascending", "--trials", 20, "--methods", f"EC1,{ALONE}")
     places = [tmp_path / each for each in ("first", "second", "whole", "once")]
@@ -98,12 +90,16 @@ def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
 
 
 def test_what_no_folder_has_is_performed(parts, left, tmp_path):
+    """Of what both parts have, one is copied."""
     edit(left, f"DELETE FROM results WHERE id = {OF_EC1}")
-    progress = joined([left], tmp_path / "whole")
-    assert (progress.present, progress.done) == (2, 1 + 3)
+    whole = tmp_path / "new" / "whole"
+    progress = joined([left, parts[1]], whole)
+    assert (progress.present, progress.done) == (1 + 1 + 2 + 1, 1)
+    assert check_runs(whole).wrong == []
+    assert [path.name for path in whole.iterdir()] == [RUNS_FILE]
+    same_results(load(whole), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
     assert joined(parts[:1], tmp_path / "more", LEFT, runs=3).done == 1
     assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
-    same_results(load(tmp_path / "whole"), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
     with pytest.warns(UserWarning, match=rf"right has 2 runs of {EC1} on descending; 3 are asked"):
         joined(parts[1:], tmp_path / "few", LEFT, runs=3)
 
@@ -285,23 +281,20 @@ def test_results_are_packed_again_where_they_have_not_changed(
         return pack_shipped.main(), capsys.readouterr().out
 
     before = (tmp_path / "packed" / "SHA256SUMS").read_text()
-    for number, (change, said) in enumerate(
-        {
-            f"DELETE FROM results WHERE id = {OF_EC1}": "is missing",
-            "UPDATE results SET trials = trials + 1": "trials: ",
-        }.items()
+    for name, change, said in (
+        ("fewer", f"DELETE FROM results WHERE id = {OF_EC1}", "is missing"),
+        ("other", "UPDATE results SET trials = trials + 1", "trials: "),
     ):
-        other = shutil.copytree(packed, tmp_path / str(number))
-        edit(other, change)
-        code, text = pack(other)
+        edit(shutil.copytree(packed, tmp_path / name), change)
+        code, text = pack(tmp_path / name)
         assert (code, said in text, "--changed" in text) == (1, True, True)
     assert (tmp_path / "packed" / "SHA256SUMS").read_text() == before
     same = shutil.copytree(packed, tmp_path / "same")
     edit(same, "UPDATE results SET cpu_s = 9")
     assert pack(same) == (0, f"{same}: no differences to what is shipped\n")
-    assert pack(tmp_path / "1", "--changed")[0] == 0
+    assert pack(tmp_path / "other", "--changed")[0] == 0
     with shipped.open_shipped("paper") as store:
-        assert (store.runs().trials == load(tmp_path / "1").runs.trials).all()
+        assert (store.runs().trials == load(tmp_path / "other").runs.trials).all()
     edit_plan(same, "UPDATE cells SET code = '0123456789ab' WHERE method = 'dual-process/EC1'")
     with pytest.raises(SystemExit):  # whatever has changed
         pack(same, "--changed")
@@ -310,20 +303,17 @@ def test_results_are_packed_again_where_they_have_not_changed(
 
 @pytest.mark.usefixtures("in_this_process")
 def test_command(packed, parts, tmp_path, coartic):
-    """A method is written by a command, run beside the shipped results, and there when that is
-    repeated; a colleague includes the folder with another one, without the method's file."""
+    """A method is written by a command and run beside the shipped results; a colleague includes
+    the folder with another one, without the method's file."""
     mine, out = tmp_path / "my_search.py", tmp_path / "out"
-
-    assert coartic("new", "my-search", "--out", mine)[0] == 0
-    command = ("run", "paper", "--method-file", mine, "--include", "shipped", "--out", out)
     small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
-    code, text, _ = coartic(*command, *small)
+    assert coartic("new", "my-search", "--out", mine)[0] == 0
+    own = ("--method-file", mine, "--include", "shipped", "--out", out)
+    code, text, _ = coartic("run", "paper", *own, *small)
     assert (code, text[:16]) == (0, "8 runs (4 reused")
-    assert coartic(*command, *small)[1].startswith("8 runs (8 reused)")
-    study, theirs = load(out), load(packed)
-    assert set(study.runs.method) == {"my-search", *theirs.runs.method}
-    assert set(theirs.runs.run_id) < set(study.runs.run_id)
-    assert coartic("verify", out)[0] == 0
+    theirs = load(packed).runs
+    assert set(load(out).runs.method) == {"my-search", *theirs.method}
+    assert set(theirs.run_id) < set(load(out).runs.run_id)
     both = ("--include", out, "--include", parts[0], "--out", tmp_path / "both", *small)
     code, text, _ = coartic("run", "paper", "--methods", "EC1", *both)
     assert (code, text[:19]) == (0, "10 runs (10 reused)")

@@ -16,7 +16,6 @@ from coartic import (
     initial_hands,
     load_task,
 )
-from coartic.analysis.sections import TABLES
 from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
@@ -157,11 +156,9 @@ def test_failures_are_kept_as_data(tmp_path):
     assert list(study.runs.status) == ["infeasible"] * 4
     assert study.runs.reason.str.len().min() > 20
     assert study.runs.reward.isna().all()
-    assert TABLES["methods"](study)[["runs", "solved"]].to_numpy().tolist() == [[2, 0]] * 2
     assert list(study.runs.failed_trials[:2]) == [5, 5]
     assert [np.isnan(curve).tolist() for _, curve in study.rewards()] == [[True] * 5] * 2
     assert study.solutions.empty
-    assert study.sequences(STUCK.name).reward.isna().all()
 
 
 @pytest.mark.parametrize(

@@ -352,13 +352,7 @@ def behind_a_link(path):
     ("spoil", "words"),
     [
         (sql(f"PRAGMA user_version = {FORMAT + 1}"), "later version.*update coartic"),
-        *(
-            (
-                sql(f"PRAGMA user_version = {n}"),
-                "3.0.0 or earlier: version 3.0.0 reads.*other --out",
-            )
-            for n in (2, FORMAT - 1)
-        ),
+        (sql(f"PRAGMA user_version = {FORMAT - 1}"), "3.0.0 or earlier: .*reads.*other --out"),
         (foreign, "is not a file of coartic"),
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
         (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),
@@ -367,7 +361,6 @@ def behind_a_link(path):
             (change, "its tables and views are not as coartic makes them")
             for change in (
                 sql("DROP VIEW solutions"),
-                sql("DROP TABLE learning"),
                 sql("ALTER TABLE movements ADD COLUMN left_x"),
                 sql(
                     "CREATE TRIGGER t AFTER INSERT ON results BEGIN "
