@@ -7,12 +7,13 @@ import signal
 import subprocess
 import sys
 from collections import Counter
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
 from coartic import __version__, film, load_task
+from coartic.analysis.report import build
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
 from coartic.benchmarks.runner import Progress
@@ -27,7 +28,6 @@ from tests.support.suites import (
     KNOWN,
     ROOT,
     Failing,
-    InProcess,
     cell_on,
     edit,
     edit_plan,
@@ -205,26 +205,17 @@ def call_apart(place, command, temporary):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_path, monkeypatch):
-    out, words = tmp_path / "out", []
-    assert coartic(*SMALL, "--methods", "EC1", "--out", out)[0] == 0
+    out, sentences = tmp_path / "out", []
+    assert coartic(*SMALL, "--out", out)[0] == 0
 
-    @contextmanager
     def interruptible(sentence):
-        try:
-            yield
-        except KeyboardInterrupt:
-            words.append(sentence())
-            raise
-
-    def interrupted(*_):
-        raise KeyboardInterrupt
+        sentences.append(sentence)
+        return nullcontext()
 
     monkeypatch.setattr("coartic.cli.run.interruptible", interruptible)
-    monkeypatch.setattr(InProcess, "perform", interrupted)
-    code, text, error = coartic(*SMALL, "--methods", "EC1", "--out", out, "--seed", 7)
-    assert (code, text) != (0, "")
-    assert f"{out} holds 2 runs of seed 0" in error
-    assert "To report 2 runs of seed 0 there, repeat the earlier command" in words[0]
+    error = coartic(*SMALL, "--out", out, "--seed", 7)[2]
+    assert f"{out} holds 2 runs of seed 0" in error.partition("Runs: ")[0]
+    assert "To report 2 runs of seed 0 there, repeat the earlier command" in sentences[0]()
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -233,8 +224,8 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
 ):
     """A folder may have the name of a suite, and is none."""
     monkeypatch.chdir(tmp_path)
-    assert coartic(*SMALL, "--methods", "EC1", "--out", "paper")[0] == 0
-    assert coartic(*SMALL, "--methods", "EC1", "--out", "out")[0] == 0
+    assert coartic(*SMALL, "--out", "paper")[0] == 0
+    assert coartic(*SMALL, "--out", "out")[0] == 0
     assert coartic("new", "my-search")[0] == 0
     for command in ("check", "list", "run"):
         assert "out is a results folder: coartic report out" in coartic(command, "out")[2]
@@ -444,6 +435,8 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(film, "HOLD_S", 0.0)  # films end at once
     monkeypatch.setattr(film, "PAUSE_S", 0.0)
+    monkeypatch.setattr(build, "for_page", lambda _: "")
+    monkeypatch.setattr(build, "picture", lambda *_: b"")
     Path("near.toml").write_text(NEAR, "utf-8")
     near = paper_cells(tasks=["near.toml"], methods=["EC1"])
     study = run_and_write(tmp_path / "out", near, runs=1, trials=5)

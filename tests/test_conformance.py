@@ -38,15 +38,13 @@ ONE_GOAL = [
 """For searches that take seconds on any shipped task; tests/test_optimum.py has those."""
 TWO_GOALS = [tiny_task(hands=["right"]), ONE_GOAL[0]]
 """For programmes that are solved for one goal in another way."""
-SHORT_TASKS = [load_task("ascending"), tiny_task(goals=[[4.5, 1.0]])]
-"""For searches that take seconds on two hands and four goals."""
 TASKS = {
     "optimum/": ONE_GOAL,
     "receding-horizon": TWO_GOALS,
     "cma-es/bandit": FEW_TASKS,  # of both hands, as it chooses among hand sequences
-    "nullspace-qp/": SHORT_TASKS,
-    "posture-qp/": SHORT_TASKS,
-    "posture-based/": SHORT_TASKS,
+    "nullspace-qp/": FEW_TASKS,
+    "posture-qp/": FEW_TASKS,
+    "posture-based/": FEW_TASKS,
     "trajectory-optimisation/path-length": TWO_GOALS,
     "trajectory-optimisation/": ONE_GOAL,  # the same programme for other costs
 }
@@ -68,12 +66,13 @@ def another_process(methods):
 
 @pytest.fixture(autouse=True)
 def quick_checks(monkeypatch, another_process):
-    """Of few trials; all runs of a check but the one that is to be in another process are there."""
+    """Of few trials; all runs of a check are there but the one that is to be in another process,
+    for methods that draw nothing: tests/test_short_runs.py has a run of each other one."""
 
     class HereAndThere(InProcess):
         def perform(self, jobs):
-            performed = (another_process.map if len(jobs) > 1 else map)(perform_job, jobs)
-            return zip(jobs, performed, strict=True)
+            here = len(jobs) > 1 or jobs[0].cell.method.stochastic
+            return zip(jobs, (map if here else another_process.map)(perform_job, jobs), strict=True)
 
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(reproduce, "Local", HereAndThere)

@@ -201,11 +201,11 @@ def test_other_work_on_the_core_changes_no_outcome(tmp_path):
         end = time.process_time() + self.seconds
         while time.process_time() < end: pass
         return Result(corrected(session))"""
-    short, long = (burn.replace("self.seconds", seconds) for seconds in ("0.3", "99"))
+    short, long = (burn.replace("self.seconds", seconds) for seconds in ("0.15", "99"))
     cells = cells_of(tmp_path, short=short, long=long, longer=long)
-    study = run_and_write(tmp_path / "out", cells, executor=Local(3), runs=1, time_limit_s=0.6)
+    study = run_and_write(tmp_path / "out", cells, executor=Local(3), runs=1, time_limit_s=0.3)
     assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 2
-    assert set(study.runs.reason[1:]) == {"CPU time limit of 0.6 s exceeded"}
+    assert set(study.runs.reason[1:]) == {"CPU time limit of 0.3 s exceeded"}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test looks into /proc")

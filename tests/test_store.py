@@ -12,7 +12,6 @@ import warnings
 import zlib
 from contextlib import closing
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -109,16 +108,15 @@ def test_what_is_written_is_read_back(written):
         np.testing.assert_array_equal(rewards, kept)
     with closing(sqlite3.connect(study.folder / RUNS_FILE)) as plain_sql:
         for run_id, run in handed.items():
-            of_run = partial(read_values, plain_sql, run_id)
-            assert of_run("reward FROM runs WHERE run_id = ?") == [run.solution.reward]
+
+            def values(query, run_id=run_id):
+                return [value for (value,) in plain_sql.execute(f"SELECT {query}", (run_id,))]
+
+            assert values("reward FROM runs WHERE run_id = ?") == [run.solution.reward]
             solution = run.scores["solution"].movements if run.scores else ()
-            paths = of_run('path FROM solutions WHERE run_id = ? ORDER BY "order"')
+            paths = values('path FROM solutions WHERE run_id = ? ORDER BY "order"')
             points = [m.target if m.waypoints is None else m.waypoints for m in solution]
             assert [*map(json.loads, paths)] == [each.tolist() for each in points]
-
-
-def read_values(plain_sql, run_id, query):
-    return [value for (value,) in plain_sql.execute(f"SELECT {query}", (run_id,))]
 
 
 def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
@@ -126,8 +124,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     movements = (Movement(1, "left", "path", edges, 3, np.array([edges / 7, edges])),)
     solution = Score(-3, "L", movements)
     first = next(iter(written[0].values()))
-    outcome = replace(first.outcome, environment={"commit": {"id": "c0de", "dirty": True}})
-    run = replace(first, scores={"solution": solution, "replay": solution}, outcome=outcome)
+    run = replace(first, scores={"solution": solution, "replay": solution})
 
     def some():
         yield run
@@ -146,8 +143,6 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
             store.write([unlike])
     with open_store(tmp_path) as store:
         assert plain(store.run(run.id)) == plain(run)
-    with closing(sqlite3.connect(tmp_path / RUNS_FILE)) as plain_sql:
-        assert read_values(plain_sql, run.id, '"commit" FROM runs WHERE run_id = ?') == ["c0de+"]
 
 
 MANY = {"runs": 30, "trials": 30}
