@@ -95,8 +95,7 @@ def test_the_lowest_and_the_newest_versions(built, tmp_path, python, versions):
     environment, place = installed(python, tmp_path, built[1], *lowest)
     works(environment, place)
     coartic = environment / "bin" / "coartic"
-    for command in ("run", "report", "verify", "list"):
-        assert "Usage: coartic" in do(coartic, command, "--help", cwd=place)
+    assert "Usage: coartic" in do(coartic, "run", "--help", cwd=place)
     do(coartic, "report", "results", "--for-paper", cwd=place)
     assert len([*(place / "results" / "report").rglob("*.tex")]) > 3
 

@@ -6,7 +6,6 @@ import shutil
 import signal
 import sqlite3
 import sys
-import threading
 import time
 import warnings
 import zlib
@@ -52,6 +51,10 @@ CELLS = [
 ONE = paper_cells(tasks=["ascending"])
 FEW = {"runs": 9, "trials": 20}
 PLAN = planned(ONE, **FEW)
+
+
+def perform_here(folder):
+    return perform(PLAN, folder, executor=InProcess())
 
 
 @pytest.fixture(scope="module")
@@ -195,52 +198,37 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     same_results(resumed, whole)
 
 
-def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path):
-    busy = r"another `coartic run` is at work.*wait"
-
-    def watch(progress, _):
-        if progress.done == 9:  # before the last one is seen
-            with pytest.raises(CoarticError, match=busy):
-                perform(PLAN, tmp_path, executor=InProcess())
-            with pytest.raises(CoarticError, match=busy):
-                load(tmp_path)
-
-    perform(PLAN, tmp_path, executor=InProcess(), watch=watch)
-    same_results(load(tmp_path), undisturbed)
+def test_one_writes_and_nobody_else_meanwhile(undisturbed):
+    with writing(undisturbed.folder):
+        for use in (load, perform_here):
+            with pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait"):
+                use(undisturbed.folder)
 
 
 @pytest.mark.filterwarnings("always:another program has .* open. waiting")
 @pytest.mark.parametrize("begin", ["BEGIN", "BEGIN EXCLUSIVE"])
-def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, begin, monkeypatch):
-    """Also where its program keeps the file, in the middle of a transaction, until the run says
-    that it waits."""
-    held, said = [], threading.Event()
+def test_a_run_waits_for_a_reader_and_the_reader_reads(written, tmp_path, begin, monkeypatch):
+    """Where its program keeps the file, in the middle of a transaction, until the run says that it
+    waits."""
+    counts = []
     monkeypatch.setattr(store_module, "WAIT_S", 0.05)
-    monkeypatch.setattr(warnings, "showwarning", lambda *_: said.set())
-
-    def read():
+    with writing(tmp_path) as store:
+        store.replace_plan(planned(CELLS, trials=40), made_with())
         reader = sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)
+
+        def count(*_):
+            counts.extend(reader.execute("SELECT count(*) FROM results").fetchone())
+            if counts[1:]:
+                reader.rollback()
+
+        monkeypatch.setattr(warnings, "showwarning", count)
         reader.execute(begin)
-        held.append(reader.execute("SELECT count(*) FROM results").fetchall())
-        said.wait(60)
-        held.append(reader.execute("SELECT count(*) FROM results").fetchall())
+        count()
+        store.write(written[0].values())
+        count()
         reader.close()
-
-    class Read(InProcess):
-        def perform(self, jobs):
-            for pair in super().perform(jobs):
-                said.clear()
-                program = threading.Thread(target=read)
-                program.start()
-                while len(held) % 2 == 0:
-                    time.sleep(0.01)
-                yield pair
-                program.join()
-
-    perform(PLAN, tmp_path, executor=Read(2))
-    assert held == [[(0,)], [(0,)], [(8,)], [(8,)]]
+    assert counts == [0, 0, 3]
     assert [path.name for path in tmp_path.iterdir()] == [RUNS_FILE]
-    same_results(load(tmp_path), undisturbed)
 
 
 def replace_by_a_copy(folder):
@@ -293,7 +281,7 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     (cell,) = ONE
     other = replace(cell, method=replace(cell.method, code="0" * 12))
     run_and_write(tmp_path, [other], **FEW)
-    report = perform(PLAN, tmp_path, executor=InProcess())
+    report = perform_here(tmp_path)
     assert (report.stale, report.present, report.done) == (9, 0, 9)
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
     same_results(load(tmp_path), undisturbed)
@@ -377,7 +365,7 @@ def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words)
 
     spoil(copied)
     before = content()
-    for use in (load, lambda folder: perform(PLAN, folder, executor=InProcess())):
+    for use in (load, perform_here):
         with pytest.raises(CoarticError, match=words) as caught:
             use(tmp_path)
         assert str(tmp_path) in str(caught.value)
@@ -395,7 +383,7 @@ def test_what_other_programs_add_does_no_harm(copied, undisturbed, tmp_path, sta
         db.execute(statement)
     same_results(load(tmp_path), undisturbed)
     assert check_runs(tmp_path).wrong == []
-    assert perform(PLAN, tmp_path, executor=InProcess()).done == 0
+    assert perform_here(tmp_path).done == 0
 
 
 def read_all(folder):
