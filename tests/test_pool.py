@@ -9,7 +9,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from coartic import CoarticError, load_task
@@ -59,10 +58,6 @@ TASK = load_task("ascending")
 PLAN = planned([cell_on(TASK, KNOWN["dual-process/EC1"])])
 HONEST = -319  # what these movements are worth
 HANDLED = {
-    "hangs_once": ("if not os.path.exists(__file__ + '.slept'):\n"
-                   "            open(__file__ + '.slept', 'w').close()\n"
-                   "            time.sleep(999)\n"
-                   "        return Result(corrected(session))", "ok", ""),
     "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 0.5 s exceeded"),
     "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
                        "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
@@ -140,31 +135,24 @@ def cells_of(folder, **bodies):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Of runs in the same workers, then others, then this project's; wall time ends one run, and
-    CPU time all others, however long they have to wait for it."""
+def study(tmp_path_factory):
+    """Runs in the same workers, others, and this project's; CPU time ends each, however long it has
+    to wait for it."""
 
     def make(folder):
         folder.mkdir()
         does, again = entries(folder, **{name: body for name, (body, _, _) in HANDLED.items()})
-        once, *others = [cell_on(TASK, does, what=name) for name in HANDLED]
-        others += [cell_on(TASK, again), cell_on(TASK, KNOWN["corrective-alone/given"])]
-        for name, cells, timeout_s, limit_s in (
-            ("hangs", [once], 0.5, 0.3),
-            ("others", others, 600.0, 0.5),
-        ):
-            run_and_write(
-                folder / name, cells, executor=Local(2, timeout_s=timeout_s), runs=1,
-                time_limit_s=limit_s, trial_budget=3,
-            )  # fmt: skip
+        cells = [cell_on(TASK, does, what=name) for name in HANDLED]
+        cells += [cell_on(TASK, again), cell_on(TASK, KNOWN["corrective-alone/given"])]
+        options = {"runs": 1, "time_limit_s": 0.5, "trial_budget": 3}
+        run_and_write(folder / "out", cells, executor=Local(2, timeout_s=600.0), **options)
 
-    return made_once(tmp_path_factory, "pool", make)
+    return load(made_once(tmp_path_factory, "pool", make) / "out")
 
 
 @pytest.fixture(scope="module")
-def runs(folder):
-    both = [load(folder / name).runs for name in ("hangs", "others")]
-    runs = pd.concat([runs.astype(object) for runs in both])
+def runs(study):
+    runs = study.runs.astype(object)
     return runs.set_index((runs.method + " " + runs.setting).str.strip())
 
 
@@ -182,16 +170,19 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
 
 
 def test_a_run_that_waits_is_no_result_and_is_performed_again(tmp_path):
-    body = """if not os.path.exists(__file__ + '.ready'):
+    """One that waits twice by the next command."""
+    body = """if not os.path.exists(__file__ + '.NAME'):
+            open(__file__ + '.once', 'w').close()
             time.sleep(999)
         return Result(corrected(session))"""
-    cells = cells_of(tmp_path, waits=body)
+    twice, once = (body.replace("NAME", name) for name in ("ready", "once"))
+    cells = cells_of(tmp_path, twice=twice, once=once)
     options = {"executor": Local(1, timeout_s=0.5), "runs": 1, "time_limit_s": 0.3}
-    words = "run 0 of test/does what=waits on ascending is not kept: wall time limit of 1.4 s"
-    with pytest.warns(UserWarning, match=words), pytest.raises(CoarticError, match="has 0 of 1"):
+    words = "run 0 of test/does what=twice on ascending is not kept: wall time limit of 1.4 s"
+    with pytest.warns(UserWarning, match=words), pytest.raises(CoarticError, match="has 1 of 2"):
         run_and_write(tmp_path / "out", cells, **options)
     (tmp_path / "mine.py.ready").touch()
-    assert run_and_write(tmp_path / "out", cells, **options).runs.status.tolist() == ["ok"]
+    assert run_and_write(tmp_path / "out", cells, **options).runs.status.tolist() == ["ok"] * 2
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test chooses the core of processes")
@@ -323,9 +314,9 @@ def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_other_methods_and_the_parent_notice_nothing(folder, runs):
+def test_other_methods_and_the_parent_notice_nothing(study, runs):
     assert runs.reward["test/again"] == runs.reward["corrective-alone/given"] == HONEST
-    assert not list(folder.glob("*.run"))
+    assert not list(study.folder.parent.glob("*.run"))
 
 
 def test_workers_that_cannot_begin_get_a_sentence():
