@@ -66,7 +66,6 @@ def test_what_plans_stores_reads_and_shows_runs_does_not_count():
         ("baselines/trajectory_problem.py", PLANNERS),
         ("learner/kernel.py", WITH_TRIALS),
         ("motion/trial.py", {*FILES}),
-        ("robot.py", {*FILES}),
         ("benchmarks/worker.py", {*FILES}),
     ],
 )
