@@ -211,11 +211,9 @@ def test_the_runs_of_a_batch_are_scored():
         [3, "solver-failed", *nothing, 1, None, None],
         [0, "timeout", *nothing, 4, 2.0, None],
     ]
-    unfit = runs[3].outcome.reason
-    reasons = ["", "", "it reported ok, but returned no solution", unfit, "too slow"]
-    assert [run.outcome.reason for run in runs] == reasons
-    assert "movements for goals [1], wanted [1, 2, 3]" in runs[3].outcome.reason
-    assert runs[3].scores == {}
+    reasons = [run.outcome.reason for run in runs]
+    assert "movements for goals [1], wanted [1, 2, 3]" in reasons.pop(3)
+    assert reasons == ["", "", "it reported ok, but returned no solution", "too slow"]
     better = replace(runs[0].outcome, rewards=[None, -310, -319, -319])  # than the solution
     downsampled = replace(runs[0], outcome=better).downsample()
     assert downsampled.outcome.rewards == [None, -310, -319, None]

@@ -131,23 +131,6 @@ class Freeloader(Good):
         return Result(tuple(Movement(goal, hand, "corrective") for goal in goals))
 
 
-class Forger(Good):
-    """Writes into what it is shown."""
-
-    name = "test/forger"
-    information = CORRECTIVE | {Information.REWARD_BY_TRIAL}
-
-    def details(self, session):
-        session.trial(by_correction(session))
-        session.meter.trials = 0
-        session.rewards.append(10**6)
-        session.q0[:] = 9.0
-        try:
-            session.spend(trials=-1)
-        except ValueError as error:
-            return {"said": str(error)}
-
-
 class MeansParameters(Parameters):
     means: str = "objective"
 
