@@ -175,8 +175,8 @@ def test_a_run_that_waits_is_no_result_and_is_performed_again(tmp_path):
             open(__file__ + '.once', 'w').close()
             time.sleep(999)
         return Result(corrected(session))"""
-    twice, once = (body.replace("NAME", name) for name in ("ready", "once"))
-    cells = cells_of(tmp_path, twice=twice, once=once)
+    once, twice = (body.replace("NAME", name) for name in ("once", "ready"))
+    cells = cells_of(tmp_path, once=once, twice=twice)
     options = {"executor": Local(1, timeout_s=0.5), "runs": 1, "time_limit_s": 0.3}
     words = "run 0 of test/does what=twice on ascending is not kept: wall time limit of 1.4 s"
     with pytest.warns(UserWarning, match=words), pytest.raises(CoarticError, match="has 1 of 2"):

@@ -20,10 +20,11 @@ from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.runner import perform
-from coartic.benchmarks.worker import fail
+from coartic.benchmarks.scoring import score
+from coartic.benchmarks.worker import fail, perform_job
 from coartic.runs import store as store_module
 from coartic.runs.record import Score
-from coartic.runs.store import FORMAT, RUNS_FILE, Store, explain_errors, open_store, writing
+from coartic.runs.store import FORMAT, RUNS_FILE, explain_errors, open_store, writing
 from tests.support.processes import started
 from tests.support.strategies import failing_task, tiny_task
 from tests.support.suites import (
@@ -59,16 +60,13 @@ def perform_here(folder):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Runs as they were returned, and a study of them."""
-    handed, write_runs = {}, Store.write
-
-    def write(store, runs):
-        handed.update((run.id, run) for run in runs)
-        write_runs(store, runs)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Store, "write", write)
-        return handed, run_and_write(tmp_path_factory.mktemp("written"), CELLS, trials=40)
+    """Runs as they were written, by their ids, and a study of them."""
+    folder, plan = tmp_path_factory.mktemp("written"), planned(CELLS, trials=40)
+    runs = [run for job in plan for run in score(job, perform_job(job))]
+    with writing(folder) as store:
+        store.replace_plan(plan, made_with())
+        store.write(runs)
+    return {run.id: run for run in runs}, load(folder)
 
 
 @pytest.fixture(scope="module")
