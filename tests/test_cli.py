@@ -139,6 +139,7 @@ import coartic.__main__
 moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 sys.argv[1:] = sys.argv[4:]
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # where tests run under nohup it is ignored
+signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())  # as some starters do
 
 def interrupt():
     for _ in range(times):
@@ -259,7 +260,7 @@ os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and streams of POSIX")
 def test_a_command_ends_well_whatever_started_it(tmp_path):
-    """With all signals blocked, and without input, output and errors; and whatever a method's file
+    """With all signals blocked, and without input, output and errors, whatever a method's file
     starts. Modules that a stranger has put into the working folder are imported by no process of a
     command that is installed."""
     for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
