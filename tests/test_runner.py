@@ -16,7 +16,6 @@ from coartic import (
     initial_hands,
     load_task,
 )
-from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
@@ -33,7 +32,6 @@ from tests.support.suites import (
     KNOWN,
     InProcess,
     cell_on,
-    made_once,
     paper_cells,
     planned,
     run_and_write,
@@ -76,10 +74,7 @@ EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    def make(folder):
-        run_and_write(folder / "deep" / "er")
-
-    return load(made_once(tmp_path_factory, "results", make) / "deep" / "er")
+    return run_and_write(tmp_path_factory.mktemp("results") / "deep" / "er")
 
 
 @pytest.fixture(scope="module")
