@@ -261,6 +261,8 @@ def test_packed_results_say_the_same(packed, tmp_path):
     for name in ("learning", "ranking", "methods", "runtimes"):
         assert TABLES[name](full).equals(TABLES[name](downsampled))
     assert full.runs.best_trial.equals(downsampled.runs.best_trial)
+    with open_store(tmp_path) as store:
+        assert store.run(full.runs.query("trials > 1").run_id.iloc[0]).is_downsampled
 
 
 def test_results_are_packed_again_where_they_have_not_changed(

@@ -340,7 +340,7 @@ def script(tmp_path_factory):
     """A process that runs two methods from a script without a guard; the second one never ends."""
     folder = tmp_path_factory.mktemp("script")
     body = """open("working", "w").close()
-        print("what it prints is not shown", flush=True)
+        print("what it prints", file=sys.stderr)  # is not shown
         while self.name == "test/again":
             pass
         return Result(corrected(session))"""
@@ -348,7 +348,12 @@ def script(tmp_path_factory):
     (folder / "script.py").write_text(SCRIPT)
     command = [sys.executable, "script.py"]
     with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
     ) as process:
         yield folder, process
         process.kill()

@@ -35,7 +35,7 @@ def true_folder(tmp_path_factory):
         cell_on(load_task("ascending"), KNOWN["posture-qp/current-goal"]),
         cell_on(STUCK, KNOWN["dual-process/EC1"], noise_sd=0.1),
     ]
-    return run_and_write(tmp_path_factory.mktemp("true") / "results", cells, trials=60).folder
+    return run_and_write(tmp_path_factory.mktemp("true") / "results", cells, trials=300).folder
 
 
 TINY, PATH, LEARNER, OTHER, FAILED = range(1, 6)
@@ -127,7 +127,7 @@ EDITS = {  # what is said: of which run, and what was edited
     "its seed is not": result(TINY, "seed = seed + 1"),
     "at least 2 ticks, not 1": movement(TINY, "ticks = 1"),
     "no count up to": movement(TINY, "ticks = 1000000000"),
-    "the rewards of its 60 trials are damaged": (
+    "the rewards of its 300 trials are damaged": (
         LEARNER,
         f"UPDATE learning SET rewards = x'{zlib.compress(bytes(999)).hex()}'",
     ),
