@@ -140,9 +140,8 @@ class MoveRow(NamedTuple):
 
 
 def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
-    """Return points of a straight movement, from ``q``, as columns, shape ``(dof, points)``, a step
-    of ``model`` apart in joint space, at most ``most`` + 1. The last is the target, even if points
-    before it are left out."""
+    """Return points of a straight movement from ``q``, columns ``(dof, points)``, a step of
+    ``model`` apart in joint space, at most ``most`` + 1; the last is always the target."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
