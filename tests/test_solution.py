@@ -130,7 +130,7 @@ def test_a_goal_is_hit_by_one_hand():
         ("kind", "goal 1: unknown kind .*; known: "),
     ],
 )
-@pytest.mark.parametrize("value", [np.zeros(10), None, [1], {}])
+@pytest.mark.parametrize("value", [np.zeros(10), None, [1]])
 def test_what_is_no_field_of_a_movement_is_named(field, sentence, value):
     movements = corrective_trial("ascending", "RRR").movements
     with pytest.raises(CoarticError, match=sentence):
