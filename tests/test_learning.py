@@ -16,8 +16,8 @@ from coartic import (
     CoarticError,
     ExplorationCondition,
     MotionModel,
-    Movement,
     SolutionError,
+    Start,
     execute,
     learn,
     learn_many,
@@ -157,28 +157,27 @@ INFORMED = [
 
 
 @pytest.mark.parametrize(
-    ("fields", "direction"),
+    ("fields", "direction", "cells"),
     [
-        *((fields, "next-goal") for fields in INFORMED),
-        (INFORMED[4], "stay"),
-        (INFORMED[4], "start"),
+        *((fields, "next-goal", slice(2)) for fields in INFORMED[:4]),
+        (INFORMED[4], "next-goal", slice(5)),
+        *((INFORMED[4], direction, slice(1)) for direction in ("stay", "start")),
     ],
-    ids=str,
 )
-def test_informed_conditions_equal_the_slow_learner_trial_by_trial(fields, direction):
+def test_informed_conditions_equal_the_slow_learner_trial_by_trial(fields, direction, cells):
     """On the tasks of the paper and on an uneven robot with a rail, under EC1, EC3 and EC4."""
     one_hand = {name: value for name, value in fields.items() if name != "hand_exploration"}
     differ = 0
-    for task, condition, fields_of_task in (
-        (load_task("ascending"), "EC1", one_hand),
-        (load_task("two-armed-1"), "EC4", fields),
+    for task, condition, own in [
         (uneven_task(locked_base=["x"]), "EC4", fields),
+        (load_task("two-armed-1"), "EC4", fields),
+        (load_task("ascending"), "EC1", one_hand),
         # Hands alternate: where they do, an arm is idle at the next goal and prefers to stay.
         (load_task("two-armed-1"), "EC3", {**fields, "epsilon": 0.7}),
         # A hand with which the corrective process fails is the farthest.
-        (failing_task(), "EC4", {**fields, "hand_exploration": "nearest-posture", "epsilon": 0.7}),
-    ):
-        rules = replace(CONDITIONS[condition], direction=direction, **fields_of_task)
+        (failing_task(), "EC4", {**fields, "epsilon": 0.7}),
+    ][cells]:
+        rules = replace(CONDITIONS[condition], direction=direction, **own)
         slow = assert_equals_reference(task, rules, trials=4, seed=7)
         plain = learn(task, CONDITIONS[condition], seed=7, trials=4, model=SOON_FAILED)
         differ += not np.array_equal(plain.rewards.data, slow.rewards)
@@ -278,11 +277,8 @@ def test_what_a_policy_spends_is_counted():
     ],
 )  # fmt: skip
 def test_models_no_movement_can_be_made_with(name, value):
-    model = MotionModel(**{name: value})
-    with pytest.raises(ValueError, match="model\\."):
-        learn("ascending", "EC1", seed=0, trials=1, model=model)
-    with pytest.raises(ValueError, match="model\\."):
-        execute("ascending", [], model=model)
+    with pytest.raises(ValueError, match=rf"model\.{name}"):
+        execute("ascending", [], model=MotionModel(**{name: value}))
 
 
 def test_a_trial_that_failed_stays_failed_where_the_hand_is_in_the_next_goal():
@@ -325,13 +321,13 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
         (CoarticError, "the first .* left",
          {"task": "two-armed-1", "start": movements_of("LLLL", [ZERO] * 4)}),
         *((SolutionError, "ovement", {"start": start}) for start in ("x", [1])),
-        *((ValueError, "seed is", {"seeds": [seed]}) for seed in (-1, 1.5, None, True, 2**128)),
+        *((ValueError, "seed is", {"seeds": [seed]}) for seed in (-1, 2**128)),
         *((TypeError, "seeds is .*; it must be", {"seeds": seeds}) for seeds in ("1", 3)),
         (ValueError, "seeds has more than 1,000,000 entries", {"seeds": range(10**9)}),
         (ValueError, "seeds has more than 20,000 entries",
          {"seeds": itertools.count(), "trials": 10_000}),
-        *((ValueError, "trials is", {"trials": most}) for most in (0, 1.5, "5", True, 10**12)),
-        *((ValueError, "jobs is", {"jobs": jobs}) for jobs in (0, 1.5, None, True, 10**9)),
+        *((ValueError, "trials is", {"trials": most}) for most in (0, 10**12)),
+        *((ValueError, "jobs is", {"jobs": jobs}) for jobs in (0, 10**9)),
         *((TypeError, "must be a MotionModel", {"model": model}) for model in (None, {})),
         (ValueError, "model.step is 'x'; it must be", {"model": MotionModel(step="x")}),
         (ValueError, "must be a whole number", {"model": MotionModel(max_iterations=1.5)}),
@@ -358,7 +354,7 @@ def test_a_condition_keeps_its_limits(field, value):
         ({"goals": ((3.0, 1.0),) * 5}, "for each of 5 goals"),
         ({"goals": ((3.0, 1.0),) * 3 + ((3.0, np.nan),)}, "not finite"),
         ({"initial_hands": "L"}, "'L' do not fit task"),
-        ({"robot": Robot(left_links=(1.0,) * 6, right_links=(1.0,) * 6)}, r"needed is \(14,\)"),
+        ({"start": Start(left=(0.0,), right=(0.0,))}, r"needed is \(10,\)"),
         ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"needed is \(4,\)"),
         ({"radius": np.inf}, "radius is inf"),
     ],
@@ -465,10 +461,10 @@ def assert_same(a, b):
 def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
     task = load_task(task)
     seeds = [*range(SLOTS), 17, *range(SLOTS, SLOTS + 3)]  # more than there are slots, one twice
-    for trials in (1, 25):
+    for trials in (1, np.int64(25)):
         options = {"trials": trials, "model": model}
-        together = learn_many(task, condition, seeds=seeds, jobs=1, **options)
-        assert [run.seed for run in together] == seeds
+        together = learn_many(task, condition, seeds=np.uint8(seeds), jobs=1, **options)
+        assert repr([run.seed for run in together]) == repr(seeds)
         some = learn_many(task, condition, seeds=seeds[::-7], jobs=2, **options)
         for run, same in zip(together[::-7], some, strict=True):
             assert_same(run, same)
@@ -486,19 +482,7 @@ def test_a_grid_counts_in_what_applies(tmp_path):
         plan_suite(suite)
 
 
-@pytest.mark.parametrize(
-    "seeds", [np.arange(3), np.array([0, 1, 2], np.uint8), [np.int32(0), 1, 2]]
-)
-def test_seeds_of_numpy_are_shown_and_kept_as_numbers(seeds):
-    runs = learn_many("ascending", "EC1", seeds=seeds, trials=np.int64(3))
-    assert [(type(run.seed), run.seed) for run in runs] == [(int, 0), (int, 1), (int, 2)]
-    due = learn_many("ascending", "EC1", seeds=range(3), trials=3)
-    assert [run.rewards.tolist() for run in runs] == [run.rewards.tolist() for run in due]
-
-
 def test_a_first_solution_in_degrees_is_hinted_at():
-    start = [
-        Movement(goal, "right", "planned", [0, 0, 0, 0, 0, 0, 90, 0, 0, 0]) for goal in (1, 2, 3)
-    ]
+    start = movements_of("RRR", [[0, 0, 0, 0, 0, 0, 90, 0, 0, 0]] * 3)
     with pytest.warns(UserWarning, match="has the angle 90; angles are in rad"):
         learn("ascending", "EC1", seed=0, trials=1, start=start)

@@ -37,7 +37,6 @@ from coartic import (
     learn,
     load_task,
     movements_of,
-    parse_task,
     trajectory,
 )
 from coartic.analysis import ecdf, interval, judge, mean, mean_beyond, means, other_tasks
