@@ -4,8 +4,6 @@ import casadi
 import numpy as np
 import pytest
 
-from coartic.motion.compile import entry, joint_lever
-from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS, Robot
 from tests.support.strategies import UNEVEN
 
@@ -15,46 +13,28 @@ ROBOTS = [PAPER_ROBOT, UNEVEN]
 
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("hand", HANDS)
-def test_forward_kinematics_against_complex_exponentials(robot, hand):
-    rng = np.random.default_rng(1)
-    q = rng.uniform(-4, 4, (50, robot.dof))
+def test_hands_and_jacobians_against_complex_exponentials_and_automatic_derivatives(robot, hand):
+    """Of configurations at once; and of CasADi's symbols, one by one."""
+    q = np.random.default_rng(1).uniform(-20, 20, (4, 10, robot.dof))
     shoulder = complex(*(robot.left_shoulder if hand == "left" else robot.right_shoulder))
     links = np.array(robot.left_links if hand == "left" else robot.right_links)
-    angles = np.cumsum(q[:, robot.joints(hand)], axis=1)
-    tips = q[:, 0] + 1j * q[:, 1] + shoulder + (links * np.exp(1j * angles)).sum(axis=1)
-    position = robot.forward_kinematics(q, hand)
-    np.testing.assert_allclose(position, np.stack([tips.real, tips.imag], axis=1), atol=1e-13)
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("hand", HANDS)
-def test_three_worlds_agree(robot, hand):
-    """NumPy, on all rows at once, CasADi (its own automatic differentiation included) and the
-    kernels."""
+    levers = links * np.exp(1j * np.cumsum(q[..., robot.joints(hand)], axis=-1))
+    places = (q[..., :1] + 1j * q[..., 1:2] + shoulder) + np.cumsum(levers, axis=-1)
+    joints, tips = robot.joint_positions(q, hand), robot.forward_kinematics(q, hand)
+    np.testing.assert_allclose(joints[..., 1:, :] @ (1, 1j), places, atol=1e-12, rtol=0)
+    np.testing.assert_array_equal(joints[..., -1, :], tips)
+    shoulders = q[..., :2] + (shoulder.real, shoulder.imag)
+    np.testing.assert_allclose(joints[..., 0, :], shoulders, atol=1e-12, rtol=0)
+    jacobians = robot.jacobian(q, hand)
+    for one, both in zip(robot.linearised(q, hand), (tips, jacobians), strict=True):
+        np.testing.assert_array_equal(one, both)
     symbol = casadi.SX.sym("q", robot.dof)
     position = robot.symbolic_hand(symbol, hand)
     symbolic = casadi.Function("f", [symbol], [position, casadi.jacobian(position, symbol)])
-
-    @entry
-    def compiled(q, arm, xs, ys, jacobian):
-        joint_chain(q, arm, xs, ys)
-        tip = len(arm.links)
-        for k in range(tip):
-            jacobian[0, arm.first + k], jacobian[1, arm.first + k] = joint_lever(xs, ys, k, tip)
-
-    arm, every = robot.arm(hand), np.random.default_rng(3).uniform(-20, 20, (4, 50, robot.dof))
-    joints, jacobians = robot.joint_positions(every, hand), robot.jacobian(every, hand)
-    tips, again = robot.linearised(every, hand)
-    np.testing.assert_array_equal(tips, robot.forward_kinematics(every, hand))
-    np.testing.assert_array_equal(again, jacobians)
-    for row in np.ndindex(every.shape[:2]):
-        f, automatic = (np.array(value) for value in symbolic(every[row]))
-        np.testing.assert_allclose(f.ravel(), tips[row], atol=1e-12, rtol=0)
+    for row in np.ndindex(q.shape[:2]):
+        tip, automatic = (np.array(value) for value in symbolic(q[row]))
+        np.testing.assert_allclose(tip.ravel(), tips[row], atol=1e-12, rtol=0)
         np.testing.assert_allclose(automatic, jacobians[row], atol=1e-12, rtol=0)
-        places, columns = np.empty((2, len(arm.links) + 1)), np.eye(2, robot.dof)
-        compiled(every[row], arm, *places, columns)
-        np.testing.assert_allclose(places.T, joints[row], atol=1e-12, rtol=0)
-        np.testing.assert_allclose(columns, jacobians[row], atol=1e-12, rtol=0)
 
 
 def test_base_outline():
