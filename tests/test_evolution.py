@@ -16,10 +16,10 @@ COSTS = {
     "a slope": (lambda x: x @ np.arange(1.0, x.shape[1] + 1.0), 2, 6),
     "a bent valley": (
         lambda x: (100.0 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1.0 - x[:, :-1]) ** 2).sum(axis=1),
-        20, 48,
+        8, 20,
     ),
     "a plain": (lambda x: np.zeros(len(x)), 5, 8),
-    "noise": (lambda x: NOISE.standard_normal(len(x)), 5, 8),
+    "noise": (lambda x: NOISE.standard_normal(len(x)), 3, 7),
     "a bowl": (lambda x: (x**2).sum(axis=1), 5, 8),
     "variances 1e12 apart": (lambda x: x**2 @ 10.0 ** np.arange(0.0, 15.0, 3.0), 5, 8),
 }  # fmt: skip

@@ -44,7 +44,7 @@ def stated(rows, least, preferred):
 @pytest.mark.parametrize(("far", "preferred", "bind"), [(0.5, 0.3, False), (4.0, 1.0, True)])
 def test_both_levels_of_a_disc_are_as_another_solver_has_them(far, preferred, bind):
     moved = bound = 0
-    for rows, least, wanted in problems(20, 4, far, preferred):
+    for rows, least, wanted in problems(8, 4, far, preferred):
         short, nearest = stated(rows, least, wanted)
         changes, first, iterations = solve_cascade(rows, least, wanted)
         assert iterations > 0
@@ -54,7 +54,7 @@ def test_both_levels_of_a_disc_are_as_another_solver_has_them(far, preferred, bi
         np.testing.assert_allclose(changes, nearest, atol=1e-4)
         moved += np.linalg.norm(changes - wanted) > 1e-3
         bound += np.abs(changes).max() > LIMIT - 1e-6
-    assert moved > 3
+    assert moved > 1
     assert (bound > 0) == bind
 
 
@@ -86,7 +86,7 @@ def test_a_goal_behind_a_straight_arm_is_reached():
 
 
 def test_an_unreachable_goal_is_infeasible():
-    task = tiny_task().model_copy(
+    task = tiny_task(hands=["left"], initial_hands="LL").model_copy(
         update={"goals": ((3.0, 1.0), (9.0, 3.0)), "locked_base": ("x", "y")}
     )
     with pytest.raises(MethodError, match="goal 2: the left hand ends .* short of it") as caught:

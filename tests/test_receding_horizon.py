@@ -101,7 +101,7 @@ def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view()
     rewards = {horizon: [] for horizon in (0, 1, 9)}
     for name in INSTANCES:
         for horizon, of_horizon in rewards.items():
-            result, execution = solved(name, nodes=100, horizon=horizon)
+            result, execution = solved(name, nodes=60, horizon=horizon)
             of_horizon.append(execution.reward)
             assert execution.corrections == 0
             rounded = execution.ticks - result.details["path_length"] / PAPER.step

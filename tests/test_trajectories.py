@@ -31,7 +31,7 @@ def test_the_table_has_each_tick(mine):
 
 
 def test_a_film_and_a_picture(tmp_path):
-    near = Task(goals=[(4.8, 0.1), (5.1, 0.1)])  # 20 steps along the base, then 30
+    near = Task(goals=[(4.65, 0.1), (4.75, 0.1)])  # 5 steps along the base, then 10
     mine = trajectory(near, corrective_trial(near, "RR").movements)
     mine.animate(tmp_path / "mine.gif", width=200)
     with Image.open(tmp_path / "mine.gif") as film:

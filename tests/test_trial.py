@@ -1,7 +1,6 @@
 """Every way to make a trial makes that of the step-by-step reference."""
 
 import functools
-import json
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -19,24 +18,22 @@ from coartic import (
     load_task,
     trajectory,
 )
-from coartic.analysis import verify as checker
 from coartic.method import Meter, Session
 from coartic.motion.batch import SLOTS
-from coartic.motion.solution import execute_many, other_arm_travel
+from coartic.motion.solution import execute_many
 from coartic.motion.trial import compiled_task
 from coartic.optimisers import OPTIMISER_INFORMATION, explored_joints
 from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import make_trials, sample, uneven_task
 
-TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {"uneven": uneven_task()}
 LIMITS = {  # iterations of the corrective process, spread of the targets
     "ascending": (100, 4.0),
-    "descending": (100, 4.0),
     "two-armed-1": (150, 0.3),
     "two-armed-2": (120, 0.3),
     "uneven": (120, 4.0),
 }
+TASKS = {name: uneven_task() if name == "uneven" else load_task(name) for name in LIMITS}
 MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.items()}
 
 
@@ -106,31 +103,6 @@ def by_trajectory(task, model, cases):
         yield {"ticks": path.ticks, "hits": hits, "rows": path.configurations}
 
 
-def by_checker(task, model, cases):
-    """Movements as they are stored, with what they took."""
-    judge = checker.stored_task(
-        task.model_dump_json(), json.dumps(model.for_radius(task.radius)._asdict())
-    )
-    for case in cases:
-        execution = execute(task, case.solution, model=model)
-        if not execution.completed:
-            yield None
-            continue
-        stored = [
-            checker.MoveRow(
-                n, m.goal, m.hand, m.kind, m.ticks,
-                np.atleast_2d(m.target if m.waypoints is None else m.waypoints),
-            )
-            for n, m in enumerate(execution.movements)
-        ]  # fmt: skip
-        reward, hands, corrections, travel = checker.recompute(judge, stored)
-        assert hands == execution.hands
-        assert travel == pytest.approx(
-            other_arm_travel(task, hands_of(hands), execution.configurations), abs=1e-9
-        )
-        yield {"reward": reward, "corrections": corrections}
-
-
 def assert_due(door, task, model, cases):
     """What a way to make trials says of each is what is due; of some it may say nothing."""
     found = [*door(task, model, cases)]
@@ -141,11 +113,9 @@ def assert_due(door, task, model, cases):
             if name == "reward":
                 assert value == due
             elif name == "movements":
-                assert [(m.goal, m.hand, m.kind, m.ticks) for m in value] == [
-                    (m.goal, m.hand, m.kind, m.ticks) for m in due
-                ]
                 for one, other in zip(value, due, strict=True):
                     np.testing.assert_allclose(one.target, other.target, rtol=0, atol=1e-9)
+                    assert repr(one) == repr(other)
             else:
                 due = np.reshape(due, np.shape(value))
                 np.testing.assert_allclose(value, due, rtol=0, atol=1e-9, err_msg=name)
@@ -199,7 +169,7 @@ def rich_cases(name, number):
 
 @pytest.mark.parametrize("number", range(len(OTHERS)))
 @pytest.mark.parametrize("name", ["ascending", "two-armed-1", "uneven"])
-@pytest.mark.parametrize("door", [by_execute_many, by_trajectory, by_checker])
+@pytest.mark.parametrize("door", [by_execute_many, by_trajectory])
 def test_a_solution_of_any_kind_is_the_references(door, name, number):
     found = assert_due(door, TASKS[name], OTHERS[number], rich_cases(name, number))
     assert found or (name, number) == ("two-armed-1", 0)  # in which no solution is completed

@@ -20,8 +20,8 @@ def _evaluate(angles):
 @pytest.mark.parametrize("span", [1e-3, 1.0, 7.0, 1e3, LARGEST * 0.999])
 def test_error_below_two_tenths_of_a_femto(span):
     """Also where a multiple of π/2 is near, so that nearly all digits of an angle cancel."""
-    angles = np.random.default_rng(5).uniform(-span, span, 2_000)
-    angles[:500] = np.round(angles[:500] / (np.pi / 2)) * (np.pi / 2)
+    angles = np.random.default_rng(5).uniform(-span, span, 500)
+    angles[:100] = np.round(angles[:100] / (np.pi / 2)) * (np.pi / 2)
     computed = _evaluate(angles)
     for angle, cos, sin in zip(angles, *computed, strict=True):
         assert abs(mpmath.cos(mpmath.mpf(float(angle))) - float(cos)) < 2e-16
@@ -31,5 +31,6 @@ def test_error_below_two_tenths_of_a_femto(span):
 def test_huge_angles_and_non_numbers_go_to_the_library_and_0_is_exact():
     angles = np.array([LARGEST, -1e9, 1e300])
     np.testing.assert_array_equal(_evaluate(angles), [np.cos(angles), np.sin(angles)])
-    assert np.isnan(_evaluate(np.array([np.nan]))).all()
-    np.testing.assert_array_equal(_evaluate(np.array([0.0])), [[1.0], [0.0]])
+    np.testing.assert_array_equal(
+        _evaluate(np.array([np.nan, 0.0])), [[np.nan, 1.0], [np.nan, 0.0]]
+    )

@@ -510,6 +510,7 @@ def test_only_findings_are_joined(wrong):
         (lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)), "goal has True; needed are real"),
         (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
         (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
+        (lambda: Movement(1, "right", "planned", MASKED), f"target {UNMASKED}"),
         (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints {UNMASKED}"),
         (lambda: make_trials(TASK, "RRR", [[MASKED] * 3]), UNMASKED),
         (lambda: other_tasks({"family": [MASKED]}), UNMASKED),
