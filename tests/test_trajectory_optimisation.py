@@ -95,24 +95,6 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost):
 
 
 ONE_SEGMENT = {"acceleration": (12, 3), "jerk": (720, 5)}  # from rest to rest: factor · L² / Tᵏ
-QUICK = {"nodes": 20, "graphs": 1, "chains": 1, "noisy_starts": 0}
-
-
-def planned(cost, task, stops=False):
-    """The plan of a task's initial hands by the method of a cost."""
-    (kind,) = (kind for kind in METHODS if kind.cost == cost)
-    method, session = kind(kind.Parameters(**QUICK)), Session(task, 0, kind.information)
-    problem = trajectory_problem(task.robot, task.hands, len(task.goals), cost)
-    hands = hands_of(task.initial_hands)
-    inside = 0.9 * task.radius
-    instance = Instance.of(task, hands, still=False, radius=inside)
-    starts = method.starts(session, task)[hands]
-    plan = cheapest_plan(session, problem, instance, starts)
-    if stops:
-        starts = [plan.configurations, *starts]
-        plan = cheapest_plan(session, problem, instance, starts, stops=True)
-    assert plan.converged
-    return plan
 
 
 @pytest.mark.parametrize("cost", ["acceleration", "jerk"])
@@ -120,11 +102,16 @@ def test_a_full_stop_at_each_goal_costs_as_independent_reaches_do(cost):
     """In straight lines; no goal would gain by time from another."""
     goals = ((2.6, 1.0), (3.2, -0.4), (1.5, -1.2), (0.2, 1.9), (2.2, 1.6))
     task = small_task(goals=goals, initial_hands="RRRLR")
-    plan = planned(cost, task, stops=True)
+    instance = Instance.of(task, hands_of("RRRLR"), still=False, radius=0.09)
+    problem = trajectory_problem(task.robot, task.hands, len(goals), cost)
+    start = corrective_trial(task, "RRRLR").configurations
+    passing, plan = (problem.solve(instance, start, stops=stops) for stops in (False, True))
+    assert passing.converged
+    assert plan.converged
     factor, power = ONE_SEGMENT[cost]
     lengths, times = plan.lengths(), plan.durations
     assert plan.cost == pytest.approx((factor * lengths**2 / times**power).sum(), rel=1e-9)
-    assert plan.cost > 2 * planned(cost, task).cost
+    assert plan.cost > 2 * passing.cost
     begin = task.q0
     for piece, length in zip(spline(plan, 50), lengths, strict=True):
         way = piece[-1] - begin

@@ -18,7 +18,7 @@ from coartic import (
     load_task,
     trajectory,
 )
-from coartic.method import Meter, Session
+from coartic.method import Session
 from coartic.motion.batch import SLOTS
 from coartic.motion.solution import execute_many
 from coartic.motion.trial import compiled_task
@@ -79,6 +79,9 @@ def by_trials(task, model, cases):
     trials = session.trials([case.hands for case in cases], np.array([c.targets for c in cases]))
     assert session.meter.jacobians == trials.iterations.sum()
     assert session.meter.movement_ticks == trials.ticks.sum()
+    assert session.meter.corrections == trials.corrections.sum()
+    assert session.meter.failed_trials == session.rewards.count(None)
+    assert session.meter.trials == len(cases)
     for n, reward in enumerate(session.rewards):
         assert trials.rewards[n] == (-np.inf if reward is None else reward)
         reached = trials.reached[n]
@@ -197,16 +200,3 @@ def test_a_trial_does_not_notice_its_neighbours(name):
     for solution, error in zip(solutions[-2:], many[-2:], strict=True):
         with pytest.raises(type(error), match=re.escape(str(error))):
             execute(task, solution, model=OTHERS[0])
-
-
-def test_a_batch_counts_as_so_many_trials():
-    task, model = TASKS["two-armed-1"], MODELS["two-armed-1"]
-    batch, single = (Session(task, 0, OPTIMISER_INFORMATION, model=model) for _ in range(2))
-    some = cases("two-armed-1")
-    batch.trials([case.hands for case in some], np.array([case.targets for case in some]))
-    for case in some:
-        single.trial(case.solution)
-    assert batch.rewards == single.rewards
-    for count in {*Meter.COUNTS} - {"forward_kinematics"}:
-        assert getattr(batch.meter, count) == getattr(single.meter, count), count
-    assert 0 < batch.meter.forward_kinematics < single.meter.forward_kinematics

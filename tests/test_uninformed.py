@@ -9,7 +9,7 @@ import pytest
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.hill_climbing import HillClimbing
-from coartic.baselines.random_search import RandomSearch, RandomSearchHands
+from coartic.baselines.random_search import RandomSearchHands
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Meter, MethodError, Session
 from coartic.optimisers import OPTIMISER_INFORMATION
@@ -36,15 +36,6 @@ def test_hands_chosen_goal_by_goal():
     many = task.model_copy(update={"goals": task.goals[:2] * 7, "initial_hands": "R" * 14})
     result, *_ = solve(GoalByGoal, many, trials=400)
     assert result.details["sequences"] > 4  # of 16,384, which are too many to try
-
-
-def test_random_search_begins_with_the_corrective_process_and_keeps_its_best_trial():
-    """Trial 0 of the corrective process; a short run is pinned in test_short_runs."""
-    task = load_task("ascending")
-    result, _, session = solve(RandomSearch, task, trials=2000)
-    alone = corrective_trial(task, "RRR").reward
-    assert (session.rewards[0], session.meter.trials) == (alone, 2000)
-    assert execute(task, result.solution).reward == max(filter(None, session.rewards)) > alone
 
 
 def test_random_search_with_every_hand_sequence():

@@ -394,12 +394,15 @@ OWN = {
     "initial_hands": RIGHT,
     "read_hits": {"path": "nowhere.csv"},
 }
-PUBLIC = {name: each for package in (coartic, analysis) for name, each in getmembers(package)
-          if isfunction(each) and name in package.__all__ and name not in OF_STUDY}  # fmt: skip
+PUBLIC = {name: each for package in (coartic, analysis)
+          for name, each in getmembers(package, isfunction)
+          if name in package.__all__ and name not in OF_STUDY}  # fmt: skip
 CALLS = (
     *(with_arguments(call, **OWN.get(name, {})) for name, call in PUBLIC.items()),
     *map(with_arguments, (
-        Robot, ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, sign_flip_test,
+        Robot, ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, ROBOT.arm,
+        ROBOT.joints, ROBOT.reach, ROBOT.joint_positions, ROBOT.linearised, PATH.hand_path,
+        sign_flip_test,
         measures.arm, measures.as_in_isolation, measures.gain_at_next, measures.hand,
         measures.other_arm, measures.ticks_slower, two_contexts.movable,
         two_contexts.motor_equivalence, PAPER.for_radius, gym.column, instance_names, essence,
@@ -452,6 +455,26 @@ def test_no_wrong_argument_gets_an_error_of_python(call, usual):
         if value is MASKED and name in hints:
             is_array = re.search("Array|Config|Sequence.float", str(hints[name].annotation))
             assert words or not is_array, name
+        if name == "hand":
+            assert re.search("left'?(,| and| or) '?right|needed is Hand", words), (value, words)
+
+
+TAKE_A_TASK = [each for name, each in getmembers(coartic, isfunction)
+               if {"task", "name_or_path"} & {*inspect.signature(each).parameters}]  # fmt: skip
+
+
+@pytest.mark.parametrize("call", TAKE_A_TASK)
+def test_a_name_and_a_path_stand_for_the_task(call):
+    usual = dict(CALLS)[call]
+    first = next(iter(usual))
+    for given in (usual[first], str(TASK_FILE), TASK_FILE):
+        due = call(**usual | {first: "ascending"})
+        assert repr(call(**usual | {first: given})) == repr(due)
+    for wrong in (None, ["ascending"], {"name": "ascending"}):
+        with pytest.raises(TypeError, match=r"task is .*; it must be .* path of a task file"):
+            call(**usual | {first: wrong})
+    with pytest.raises(coartic.TaskError, match="did you mean 'ascending'"):
+        call(**usual | {first: "ascendng"})
 
 
 def as_lists(value):
@@ -477,14 +500,14 @@ def as_lists(value):
 def test_arrays_may_be_lists(call, usual):
     def outcome(arguments):
         try:
-            return None, call(**arguments)
+            return call(**arguments)
         except Exception as error:
-            return repr(error), None
+            return error
 
-    (refused, expected), (error, found) = outcome(usual), outcome(as_lists(usual))
-    assert error == refused
-    if isinstance(expected, np.ndarray | float | estimates.Estimate) and "rng" not in usual:
-        assert repr(found) == repr(expected)
+    due, found = outcome(usual), outcome(as_lists(usual))
+    plain = isinstance(due, np.ndarray | float | estimates.Estimate) and "rng" not in usual
+    if plain or isinstance(due, Exception) or isinstance(found, Exception):
+        assert repr(found) == repr(due)
 
 
 @pytest.mark.parametrize("name", OF_STUDY)
