@@ -48,24 +48,18 @@ def test_errors_can_be_imported():
     assert names <= {*coartic.__all__}
 
 
-FUNCTIONS = {
-    f"{owner.__name__}.{name}": getattr(owner, name)
-    for owner, names in (
-        (coartic, {*coartic.__all__} - {"objective"}),
-        (Robot, ("forward_kinematics", "joint_positions", "jacobian", "base_outline")),
-    )
-    for name in names
-    if inspect.isfunction(getattr(owner, name))
-}
+PUBLIC = [getattr(coartic, name) for name in coartic.__all__]
+OF_A_ROBOT = [Robot.forward_kinematics, Robot.joint_positions, Robot.jacobian, Robot.base_outline]
 
 
-@pytest.mark.parametrize("name", sorted(FUNCTIONS))
-def test_docstrings_say_what_goes_in_and_what_comes_out(name):
-    text = inspect.getdoc(FUNCTIONS[name])
-    for parameter in {*inspect.signature(FUNCTIONS[name]).parameters} - {"self"}:
+@pytest.mark.parametrize("function", [*filter(inspect.isfunction, PUBLIC), *OF_A_ROBOT])
+def test_docstrings_say_what_goes_in_and_what_comes_out(function):
+    text = inspect.getdoc(function)
+    parameters = {*inspect.signature(function).parameters} - {"self"}
+    for parameter in parameters:
         assert f"\n{parameter} : " in text.partition("Parameters\n---")[2], parameter
     assert "\nReturns\n-------\n" in text
-    assert "\nRaises\n------\n" in text or not inspect.signature(FUNCTIONS[name]).parameters
+    assert "\nRaises\n------\n" in text or not parameters
 
 
 def test_what_is_no_solution():

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
 import coartic
 from coartic import (
@@ -21,6 +20,7 @@ from coartic import (
     load_task,
 )
 from coartic.baselines.corrective_alone import METHODS as ALONE
+from coartic.estimates import mean
 from coartic.learner.method import METHODS as LEARNERS
 from coartic.motion.solution import movements_of
 from coartic.optimisers import FAILED
@@ -215,15 +215,11 @@ def test_what_else_is_refused():
          lambda: single.reset(options={"task": "long"})),
         (ValueError, "seed is -1; it must be a whole number from 0",
          lambda: single.reset(seed=-1)),
-        (ValueError, "seed is 1.5; it must be a whole number from 0",
-         lambda: vector.reset(seed=1.5)),
         (ValueError, "3 seeds for 2 environments", lambda: vector.reset(seed=[1, 2, 3])),
         (ValueError, "num_envs is 0; it must be a whole", lambda: TaskVectorEnv(0, "ascending")),
         (ValueError, "it must be 'rgb_array'", lambda: TaskEnv("ascending", render_mode="human")),
         (ValueError, "the action of robot 1 is not finite", lambda: vector.step(missing)),
         (ValueError, "the action is not finite", lambda: single.step(missing[1])),
-        (ValueError, "actions has masked entries",
-         lambda: vector.step(np.ma.masked_invalid(missing))),
         (ValueError, r"shape \(1, 3\); it must be \(1, 6\)", lambda: single.step(np.zeros(3))),
         (ValueError, "did you mean 'coartic/Ascending-v2'", lambda: score("coartic/Ascending-v1")),
         (TypeError, "must be an environment of coartic or its id", lambda: score(no_environment)),
@@ -290,11 +286,8 @@ def test_a_family_is_scored_on_its_test_instances():
     env = TaskEnv("two-armed/v1", split="development", count=3)
     zeros = {"zeros": lambda seen: np.zeros((len(seen), 11)), "method": ALONE[0]()}
     table = coartic.gym.score(env, zeros, episodes=2)
-    gaps = (alone - best) / best
-    interval = stats.bootstrap(
-        (gaps,), np.mean, n_resamples=9_999, method="BCa", rng=np.random.default_rng(0)
-    ).confidence_interval
-    due = [alone.mean(), gaps.mean(), *interval, 1]
+    gap = mean((alone - best) / best)
+    due = [alone.mean(), gap.value, gap.low, gap.high, 1]
     for name in ("method", "corrective process"):
         np.testing.assert_allclose(table.loc[name], due, rtol=1e-9)
     assert table.gap["best known"] == 0 < table.gap["zeros"] < table.gap["random actions"]
@@ -308,8 +301,6 @@ def test_a_single_task_is_scored():
     assert table.reward["policy"] == table.reward["corrective process"] == -319
     assert table.gap["policy"] == pytest.approx(27 / 292)
     assert table.gap_low["random actions"] < table.gap["random actions"] > table.gap["policy"]
-    own = coartic.Task(name="own", goals=[(3, 2)], hands=["right"])
-    assert coartic.gym.score("coartic/Task-v2", task=own).gap.isna().all()
     other = coartic.gym.score(TWO, model=MotionModel(max_iterations=60))
     assert np.isnan(other.reward["best known"])
 
@@ -328,6 +319,7 @@ def test_policies_are_scored_where_the_corrective_process_fails():
     assert table.reward["turns"] == sum(rewards) > -FAILED
     assert table.completed[["turns", "planner", "corrective process"]].tolist() == [1, 0, 0]
     assert table.reward[["planner", "corrective process"]].isna().all()
+    assert table.gap.isna().all()
 
 
 class Peeping(ALONE[0]):

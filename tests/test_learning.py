@@ -23,7 +23,6 @@ from coartic import (
     learn_many,
     load_task,
     movements_of,
-    parse_task,
 )
 from coartic.analysis import load
 from coartic.benchmarks import run_suite
@@ -36,6 +35,7 @@ from tests.support import reference
 from tests.support.strategies import (
     PAPER_CELLS,
     STUCK,
+    changed,
     failing_task,
     make_trials,
     tiny_task,
@@ -58,9 +58,9 @@ def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED,
     slow = reference.learn(task, condition, seed=seed, **options)
     npt.assert_array_equal(fast.rewards.data, slow.rewards)
     counters = fast.counters
-    assert counters.movement_ticks == slow.movement_ticks
-    assert counters.corrections == slow.corrections
-    parts = [slow.corrections_by_trial[:1], *_tenths(slow.corrections_by_trial[1:])]
+    assert counters.movement_ticks == -slow.rewards.sum()
+    assert counters.corrections == slow.corrections.sum()
+    parts = [slow.corrections[:1], *_tenths(slow.corrections[1:])]
     assert fast.corrections.tolist() == [part.sum() for part in parts]
     assert counters.corrective_iterations == counters.jacobians
     assert counters.corrective_iterations == slow.corrective_iterations
@@ -69,7 +69,7 @@ def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED,
     assert (
         counters.corrective_iterations
         < counters.forward_kinematics
-        < slow.movement_ticks + (2 * slow.corrective_iterations + 8 * trials * len(task.goals))
+        < counters.movement_ticks + (2 * slow.corrective_iterations + 8 * trials * len(task.goals))
     )
     npt.assert_array_equal(fast.completed, slow.completed)
     if slow.completed.any():  # the first of the best
@@ -100,7 +100,7 @@ def test_equals_the_slow_learner_trial_by_trial(task, condition):
     task, (trials, seed) = load_task(task), (15, 998) if longest else (4, 36)
     slow = assert_equals_reference(task, CONDITIONS[condition], trials, seed)
     # Stored targets are hit and missed, explored hands lead to other states, ...
-    assert len(task.goals) < slow.corrections < trials * len(task.goals)
+    assert len(task.goals) < slow.corrections.sum() < trials * len(task.goals)
     assert (len(slow.values) > len(task.goals)) == (condition != "EC1")
     if longest:  # ... and what is stored is replaced, again and again.
         assert len(slow.values) == 13
@@ -125,7 +125,7 @@ CREDIT = [
 def test_ablations_equal_the_slow_learner_trial_by_trial(condition, seed):
     task = load_task("ascending" if condition.id.startswith("EC1") else "two-armed-1")
     slow = assert_equals_reference(task, condition, trials=5, seed=seed)
-    assert slow.corrections > len(task.goals) or not condition.corrects
+    assert slow.corrections.sum() > len(task.goals) or not condition.corrects
     assert slow.completed.all() == condition.corrects
     if seed == 162:
         assert bettered(slow) >= 2
@@ -142,7 +142,7 @@ def test_conditions_are_data(chosen, other, hands):
     task = uneven_task(locked_base=["x"])
     condition = ExplorationCondition("own", ("left", "right"), chosen, other, hands, 0.4, 0.1)
     slow = assert_equals_reference(task, condition, 8 if hands == "random" else 6, seed=0)
-    assert slow.corrections > len(task.goals)
+    assert slow.corrections.sum() > len(task.goals)
     assert slow.completed.all() == (hands != "random")  # a random hand fails now and then
     assert bettered(slow) or not other
 
@@ -203,7 +203,7 @@ def test_from_a_first_solution_it_equals_the_slow_learner(away, condition):
     task = load_task("two-armed-2")
     rules = (CONDITIONS | ABLATIONS)[condition]
     slow = assert_equals_reference(task, rules, trials=5, seed=3, start=start)
-    assert slow.corrections_by_trial[0] == (4 if away else 1)
+    assert slow.corrections[0] == (4 if away else 1)
     run = learn(task, condition, seed=3, trials=1, start=start)
     due = execute(task, start)
     assert (run.first_hands, run.initial_reward) == ("RLRR", due.reward)
@@ -256,11 +256,10 @@ def test_closest_hand_and_its_ties(shift, visited):
 
 
 def test_what_a_policy_spends_is_counted():
-    content = {**load_task("two-armed-1").model_dump(mode="json"), "initial_hands": "best-of-all"}
-    run = learn(parse_task(content, "x"), "EC3", seed=0, trials=1)
-    assert run.first_hands == "LRLR"
+    task = changed("two-armed-1", initial_hands="best-of-all")
+    assert learn(task, "EC3", seed=0, trials=1).first_hands == "LRLR"
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-    session = Session(parse_task(content, "x"), 0, information)
+    session = Session(task, 0, information)
     assert session.find_initial_hands() == "LRLR"
     meter = session.meter
     assert (meter.trials, meter.initial_trials, meter.failed_trials) == (0, 16, 0)

@@ -23,7 +23,7 @@ from coartic import (
 from coartic.tasks.families import shipped_families
 from coartic.tasks.task import check_task
 from tests.support.bad_inputs import GOOD
-from tests.support.strategies import TIED, changed, tiny_task
+from tests.support.strategies import TIED, changed, tiny_task, uneven_task
 
 
 def write(tmp_path, text):
@@ -52,12 +52,6 @@ def test_several_mistakes_each_get_a_line(tmp_path):
     assert "version 1.1.0 of coartic reads tasks with a penalty" in str(caught.value)
 
 
-def robot_with(links, **changes):
-    robot = {"left_links": (4 / links,) * links, "right_links": (4 / links,) * links}
-    start = {"left": (0.1,) * links, "right": (-1e-7,) * links}
-    return tiny_task(robot=robot, start=start, **changes)
-
-
 @pytest.mark.parametrize(
     "task",
     [
@@ -66,9 +60,8 @@ def robot_with(links, **changes):
         tiny_task(
             title='Fingers \\ "é"', provenance={"goals": {"status": "chosen", "source": "me"}}
         ),
-        robot_with(3, hands=["left"], initial_hands="LL"),
-        robot_with(6, locked_base=["y"], radius=0.3),
-        robot_with(5, locked_base=["y", "x"], goals=[[3.0, 1.0], [-0.5, 2.5]]),
+        uneven_task(right=[-1e-7] * 4, locked_base=["x"], radius=0.3),
+        tiny_task(locked_base=["y", "x"], goals=[[3.0, 1.0], [-0.5, 2.5]], initial_hands="LL"),
         Task(goals=[(3, 2)], q0=np.linspace(-6, 6, 10), robot=Robot(base_size=(2.0, 0.1))),
     ],
     ids=repr,

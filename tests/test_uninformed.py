@@ -16,11 +16,6 @@ from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import failing_task, solve, tiny_task
 
 METHODS = (HillClimbing, CMAES, GoalByGoal)
-ONE_GOAL = tiny_task(
-    hands=["right"],
-    goals=[[-3.0, 0.0]],
-    start={"left": [0.0] * 4, "right": [0.0, 0.3, 0.4, -0.2]},
-)
 
 
 def test_hands_chosen_goal_by_goal():
@@ -138,7 +133,7 @@ class HalfOfAPlain:
 def test_failed_trials_rank_last():
     """The best that does not fail is (0.5, 1, 1), with -25."""
     attempts = HalfOfAPlain()
-    session = Session(ONE_GOAL, 0, OPTIMISER_INFORMATION)
+    session = Session(load_task("ascending"), 0, OPTIMISER_INFORMATION)
     strategy = Strategy(session, attempts, "R", 0.05)
     failed = []
     for _ in range(80):

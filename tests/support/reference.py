@@ -22,11 +22,11 @@ from coartic.tasks.task import hands_of
 
 ReferenceRun = namedtuple(
     "ReferenceRun",
-    "rewards completed values targets movement_ticks corrections corrections_by_trial "
-    "corrective_iterations visits ticks_by_goal",
+    "rewards completed values targets corrections corrective_iterations visits ticks_by_goal",
 )
 """What the slow learner found; values and targets by state (goal, hand before) and hand. By trial:
-``visits`` has state, hand and posture at each hit, ``ticks_by_goal`` the ticks for each goal."""
+``corrections``; ``visits`` has state, hand and posture at each hit, ``ticks_by_goal`` the ticks for
+each goal."""
 
 
 def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PAPER, waypoints=()):
@@ -108,7 +108,7 @@ def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, pref
         step = model.gain * free * (robot.jacobian(q, hand).T @ error)
         before, q = q, q + step
         if pull:
-            moving = [j for j in np.flatnonzero(free) if j < 2 or _is_of(robot, hand, j)]
+            moving = _moving(robot, hand, free)
             toward = (preferred - before)[moving]
             q[moving] += pull * null_space(robot, before, hand, moving) @ toward
         if (q == before).all():  # a stationary point away from the goal: it stays for ever
@@ -118,8 +118,10 @@ def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, pref
     return Correction(q, converged, model.max_iterations)
 
 
-def _is_of(robot, hand, joint):
-    return joint in np.arange(robot.dof)[robot.joints(hand)]
+def _moving(robot, hand, joints):
+    """Numbers of those of the joints that move a hand."""
+    of_hand = [0, 1, *np.arange(robot.dof)[robot.joints(hand)]]
+    return [joint for joint in np.flatnonzero(joints) if joint in of_hand]
 
 
 def null_space(robot, q, hand, joints):
@@ -166,7 +168,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     targets = {}
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
-    ticks = corrections = iterations = 0
+    iterations = 0
     by_trial = np.zeros(trials, dtype=np.int64)
     visits, ticks_by_goal = [], []
     for trial in range(trials):
@@ -195,7 +197,6 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
                     target = start[number].target
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
-                ticks += result.ticks
             else:
                 hit = _distance(task.robot.forward_kinematics(q, hand), goal) <= task.radius
             if not hit:
@@ -213,8 +214,6 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
                     stop_on_arrival=False, model=model,
                 )  # fmt: skip
                 q, total = result.q, total - result.ticks
-                ticks += result.ticks
-                corrections += 1
                 by_trial[trial] += 1
             visited.append((state, hand, q))
             subtasks.append(total - spent_before)
@@ -239,9 +238,8 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
-        rewards, completed, values, targets, ticks, corrections, by_trial, iterations, visits,
-        ticks_by_goal,
-    )  # fmt: skip
+        rewards, completed, values, targets, by_trial, iterations, visits, ticks_by_goal
+    )
 
 
 def _choose(task, condition, q, goal, state, values, rng, model):
@@ -267,11 +265,7 @@ def _explore(task, condition, q, hand, stored, rng, drift, p):
     target = np.array(stored)
     explored = _explored(task, condition, hand)
     if drift:
-        projected = [
-            joint
-            for joint in np.flatnonzero(explored)
-            if joint < 2 or _is_of(task.robot, hand, joint)
-        ]
+        projected = _moving(task.robot, hand, explored)
         d = np.where(explored, p - stored, 0.0)
         d[projected] = null_space(task.robot, stored, hand, projected) @ d[projected]
         target += drift * d
