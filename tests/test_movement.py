@@ -126,7 +126,6 @@ def test_equals_every_step_where_positions_are_rounded_most(angle, radius, step)
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"q": np.zeros(3)}, r"shape \(3,\)"),
         ({"target": np.full(10, np.nan)}, "not finite"),
         ({"target": np.full(10, 1e17)}, "a (figure|number) beyond 100000"),
         ({"goal": (np.nan, 1.0)}, r"goal \(nan, 1.0\) is not finite"),
