@@ -24,8 +24,6 @@ from coartic import (
     load_task,
     movements_of,
 )
-from coartic.analysis import load
-from coartic.benchmarks import run_suite
 from coartic.benchmarks.planning import plan_suite
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
@@ -38,6 +36,7 @@ from tests.support.strategies import (
     changed,
     failing_task,
     make_trials,
+    solve,
     tiny_task,
     uneven_task,
 )
@@ -402,14 +401,12 @@ def own_suite(folder, line):
     return suite
 
 
-def test_any_condition_is_a_setting_of_a_method(tmp_path, in_this_process):
-    fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
-    suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
-    run_suite(str(suite), tmp_path / "results")
+def test_any_condition_is_a_setting_of_a_method():
+    fields = {"base": "EC3", "modify_other": True, "epsilon": 0.4, "drift": [0, 0.3], "pull": 0.01}
+    (method,) = (each for each in METHODS if each.name == "dual-process/custom")
+    _, execution, _ = solve(method, "two-armed-1", seed=3, trials=40, **fields)
     rules = replace(CONDITIONS["EC3"], modify_other=True, epsilon=0.4, drift=(0.0, 0.3), pull=0.01)
-    runs = load(tmp_path / "results").runs
-    due = [learn("two-armed-1", rules, seed=int(seed), trials=40).reward for seed in runs.seed]
-    assert runs.reward.tolist() == due
+    assert execution.reward == learn("two-armed-1", rules, seed=3, trials=40).reward
 
 
 @pytest.mark.parametrize(

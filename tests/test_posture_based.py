@@ -18,12 +18,12 @@ QUICK = {"stored": 20, "rounds": 5}
 
 
 def shortest(task, hands):
-    """Least joint-space distance through the goals' discs, from five random starts."""
+    """Least joint-space distance through the goals' discs, from three random starts."""
     moving = np.zeros((len(hands), task.robot.dof), bool)
     moving[:, :2] = [axis not in task.locked_base for axis in "xy"]
     for row, hand in zip(moving, hands, strict=True):
         row[task.robot.joints(hand)] = True
-    starts = np.random.default_rng(7).normal(0, 0.6, (5, moving.sum()))
+    starts = np.random.default_rng(7).normal(0, 0.6, (3, moving.sum()))
     return least_cost(task, hands, moving, starts, radius=ACCURACY)
 
 

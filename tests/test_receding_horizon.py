@@ -13,9 +13,7 @@ from tests.support.processes import apart
 from tests.support.strategies import solve, tiny_task
 
 FEW = {"graphs": 1, "chains": 1}
-# With four links, for which kernels are compiled anyway, and at most three goals.
-THREE_GOALS = "redundancy/v1/d009"
-INSTANCES = ["one-armed/v1/d001", "two-armed/v1/d006", THREE_GOALS]
+INSTANCES = ["one-armed/v1/d001", "two-armed/v1/d006"]
 
 
 def solved(task, method=RecedingHorizon, **parameters):
@@ -25,7 +23,7 @@ def solved(task, method=RecedingHorizon, **parameters):
 
 def in_threads():
     """Targets of plans that threads make at once; a crash of IPOPT would end the process."""
-    tasks = list(map(load_task, ["ascending", "descending", "two-armed/v1/d006"])) * 2
+    tasks = [*map(load_task, ["ascending", "descending"])] * 2
     with ThreadPoolExecutor(len(tasks)) as pool:
         plans = pool.map(lambda task: solved(task, nodes=20)[0].solution, tasks)
         return [[m.target.tobytes() for m in plan] for plan in plans]
@@ -33,11 +31,10 @@ def in_threads():
 
 @pytest.mark.process
 def test_plans_are_those_of_one_thread_in_several():
-    together, half = apart(in_threads), 3
-    assert together[:half] == together[half:]
-    for name, plan in zip(("ascending", "descending"), together, strict=False):
-        alone = solved(name, nodes=20)[0].solution
-        assert plan == [movement.target.tobytes() for movement in alone]
+    one, other, *same = apart(in_threads)
+    assert [one, other] == same
+    alone = solved("ascending", nodes=20)[0].solution
+    assert one == [movement.target.tobytes() for movement in alone]
 
 
 @pytest.mark.parametrize("name", ["descending", "two-armed/v1/d006"])
@@ -101,7 +98,7 @@ def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view()
     rewards = {horizon: [] for horizon in (0, 1, 9)}
     for name in INSTANCES:
         for horizon, of_horizon in rewards.items():
-            result, execution = solved(name, nodes=60, horizon=horizon)
+            result, execution = solved(name, nodes=40, horizon=horizon)
             of_horizon.append(execution.reward)
             assert execution.corrections == 0
             rounded = execution.ticks - result.details["path_length"] / PAPER.step

@@ -2,7 +2,6 @@
 
 import functools
 import re
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -38,16 +37,11 @@ MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.i
 
 
 def case_of(task, model, hands, targets):
-    """A trial: hands, targets (NaN: none), the same as a solution, and what comes of it."""
+    """A trial: hands, targets (NaN: none), and what comes of it."""
     kinds = ["corrective" if np.isnan(target).all() else "learned" for target in targets]
-    rows = list(enumerate(zip(hands_of(hands), kinds, targets, strict=True), 1))
+    rows = enumerate(zip(hands_of(hands), kinds, targets, strict=True), 1)
     given = [Movement(g, hand, k, None if k == "corrective" else t) for g, (hand, k, t) in rows]
-    due = reference.execute(task, given, model)
-    made = {m.goal: m.target for m in reversed(due.movements) if m.kind == "learned"}
-    solution = [  # with all joints; goals after a failure have some target, too
-        m if m.kind == "corrective" else replace(m, target=made.get(m.goal, task.q0)) for m in given
-    ]
-    return SimpleNamespace(hands=hands, targets=targets, due=due, solution=solution)
+    return SimpleNamespace(hands=hands, targets=targets, due=reference.execute(task, given, model))
 
 
 @functools.cache
