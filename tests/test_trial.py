@@ -15,6 +15,7 @@ from coartic import (
     execute,
     hand_sequences,
     load_task,
+    movements_of,
     trajectory,
 )
 from coartic.method import Session
@@ -36,14 +37,6 @@ TASKS = {name: uneven_task() if name == "uneven" else load_task(name) for name i
 MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.items()}
 
 
-def case_of(task, model, hands, targets):
-    """A trial: hands, targets (NaN: none), and what comes of it."""
-    kinds = ["corrective" if np.isnan(target).all() else "learned" for target in targets]
-    rows = enumerate(zip(hands_of(hands), kinds, targets, strict=True), 1)
-    given = [Movement(g, hand, k, None if k == "corrective" else t) for g, (hand, k, t) in rows]
-    return SimpleNamespace(hands=hands, targets=targets, due=reference.execute(task, given, model))
-
-
 @functools.cache
 def cases(name):
     """Trials; in every second one, the arms without a goal to come stay and no other joint."""
@@ -58,7 +51,12 @@ def cases(name):
             targets[n][rng.random(targets[n].shape) < 0.2] = np.nan
         if n % 4 > 1:
             targets[n, rng.integers(len(task.goals))] = np.nan
-    return [case_of(task, model, *each) for each in zip(hands, targets, strict=True)]
+    return [
+        SimpleNamespace(
+            hands=each, targets=rows, due=reference.execute(task, movements_of(each, rows), model)
+        )
+        for each, rows in zip(hands, targets, strict=True)
+    ]
 
 
 def by_execute_many(task, model, cases):
