@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -113,22 +114,19 @@ def test_the_most_promising_pair_is_the_cheapest_of_all():
     assert cost(found) == pytest.approx(min(map(cost, every)))
 
 
-@pytest.mark.parametrize("locked", [["x", "y"], ["y"], ["x"]])
+@pytest.mark.parametrize("locked", [("x", "y"), ("y",), ("x",)])
 def test_every_evaluation_is_counted(locked):
     """Feedforward correction step by step, from the start alone; the base has done its part."""
-    rng = np.random.default_rng(3)
     corrected = 0
-    for _ in range(10):
-        goal = rng.uniform([1, -2], [3, 2])
+    for goal in np.random.default_rng(3).uniform([1, -2], [3, 2], (10, 2)):
         task = bent(goals=[goal.tolist()], hands=["right"])
-        task = task.model_copy(update={"locked_base": tuple(locked)})
-        movable = np.array([c not in locked for c in "xy"] + [True] * 8)
-        q = np.array(task.q0)
-        q[:2] += movable[:2] * (goal - task.robot.forward_kinematics(q, "right"))
-        steps = 0
-        while (distance := math.dist(goal, task.robot.forward_kinematics(q, "right"))) > ACCURACY:
-            miss = goal - task.robot.forward_kinematics(q, "right")
-            miss *= min(distance - 0.999 * ACCURACY, 0.5) / distance
+        task = task.model_copy(update={"locked_base": locked})
+        hand = partial(task.robot.forward_kinematics, hand="right")
+        movable = [c not in locked for c in "xy"] + [True] * 8
+        q, steps = np.array(task.q0), 0
+        q[:2] += movable[:2] * (goal - hand(q))
+        while (distance := math.dist(goal, hand(q))) > ACCURACY:
+            miss = (goal - hand(q)) * min(distance - 0.999 * ACCURACY, 0.5) / distance
             jacobian = task.robot.jacobian(q, "right") * movable
             q += jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-3 * np.eye(2), miss)
             steps += 1

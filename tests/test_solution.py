@@ -41,12 +41,11 @@ def planned(*targets, hand="right"):
 def test_one_kernel_makes_any_number_of_movements_to_a_goal():
     task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
     plan = planned(posture(0.1), posture(0.2))
-    alone = execute(task, plan)
+    execute(task, plan)
     compiled = len(reach_kernel.dispatcher.signatures)
     short = Movement(1, "right", "planned", posture(0.001))
     several = execute(task, [short, short, *plan])
     assert [movement.goal for movement in several.movements[:3]] == [1, 1, 1]
-    assert several.ticks > alone.ticks
     assert len(reach_kernel.dispatcher.signatures) == compiled
 
 

@@ -1,12 +1,11 @@
-"""Trajectories: their rows by hand, their table and their film."""
+"""Trajectories: their table and their film; test_trial has their rows."""
 
-import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
 from coartic import CoarticError, Movement, Task, corrective_trial, movements_of, trajectory
 from coartic.film import set_stage
-from tests.support.strategies import posture, tiny_task
+from tests.support.strategies import tiny_task
 
 TASK = Task(goals=[(3.0, 2.0), (4.5, 2.0)], q0=[0, 0, 2, -0.5, 0, 0, 1, 0.5, 0, 0])
 
@@ -28,6 +27,10 @@ def test_the_table_has_each_tick(mine):
     for hand in ("left", "right"):
         places = frame[[f"{hand}_x", f"{hand}_y"]].to_numpy()
         assert places == pytest.approx(TASK.robot.forward_kinematics(joints, hand))
+        assert places == pytest.approx(mine.hand_path(hand))
+    first, second = mine.hits
+    assert [len(mine.subtask(goal)) for goal in (1, 2)] == [first + 1, second - first + 1]
+    assert mine.subtask(2)[[0, -1]] == pytest.approx(mine.configurations[mine.hits])
 
 
 def test_a_film_and_a_picture(tmp_path):
@@ -48,15 +51,6 @@ def test_a_film_and_a_picture(tmp_path):
         mine.animate(tmp_path / "mine.gif")
 
 
-def test_rows_of_a_trajectory_by_hand():
-    """A goal hit at the start, two lines of 3 and 2 steps, q + k m (target - q)/distance."""
-    task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]])
-    ahead = [Movement(n, "right", "planned", posture(x)) for n, x in ((2, 0.06), (3, 0.08))]
-    path = trajectory(task, [Movement(1, "right", "corrective"), *ahead])
-    np.testing.assert_allclose(path.configurations[:, 0], np.array([0, 1, 2, 3, 3, 4, 5]) / 100)
-    np.testing.assert_allclose(path.hand_path("right")[:, 0], path.configurations[:, 0] + 4.5)
-    assert path.hits.tolist() == [0, 3, 6]
-    assert [len(path.subtask(goal)) for goal in (1, 2, 3)] == [1, 4, 4]
-    only = tiny_task(goals=[[4.5, 0.1]])
-    idle = trajectory(only, [Movement(1, "right", "corrective")])
+def test_a_trajectory_where_the_hand_is_in_the_goal_has_no_row():
+    idle = trajectory(tiny_task(goals=[[4.5, 0.1]]), [Movement(1, "right", "corrective")])
     assert (idle.configurations.shape, idle.hits.tolist()) == ((0, 10), [0])

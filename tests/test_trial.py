@@ -1,7 +1,6 @@
 """Every way to make a trial makes that of the step-by-step reference."""
 
 import functools
-import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -183,12 +182,8 @@ def test_a_trial_does_not_notice_its_neighbours(name):
         for field, same in zip(together, some, strict=True):
             np.testing.assert_array_equal(field[chosen], same)
     solutions = [case.solution for case in rich_cases(name, 0)]
-    solutions += [[*solutions[0], "nonsense"], 5]
     many = execute_many(compiled_task(task, OTHERS[0]), solutions)
-    for solution, execution in zip(solutions[:-2], many[:-2], strict=True):
+    for solution, execution in zip(solutions, many, strict=True):
         alone = execute(task, solution, model=OTHERS[0])
         np.testing.assert_array_equal(alone.configurations, execution.configurations)
         assert alone.evaluations == execution.evaluations
-    for solution, error in zip(solutions[-2:], many[-2:], strict=True):
-        with pytest.raises(type(error), match=re.escape(str(error))):
-            execute(task, solution, model=OTHERS[0])

@@ -1,4 +1,4 @@
-"""Hill climbing and CMA-ES against closed forms, brute force and their own rules."""
+"""Hill climbing and CMA-ES against closed forms and their own rules; test_short_runs pins runs."""
 
 import math
 from types import SimpleNamespace
@@ -6,12 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
+from coartic import MotionModel, corrective_trial, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.hill_climbing import HillClimbing
-from coartic.baselines.random_search import RandomSearchHands
-from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import Meter, MethodError, Session
+from coartic.method import MethodError, Session
 from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import failing_task, solve, tiny_task
 
@@ -33,17 +31,6 @@ def test_hands_chosen_goal_by_goal():
     assert result.details["sequences"] > 4  # of 16,384, which are too many to try
 
 
-def test_random_search_with_every_hand_sequence():
-    task = load_task("two-armed-2")
-    result, _, session = solve(RandomSearchHands, task, trials=165)
-    assert session.meter.trials == 165
-    alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
-    starts = [165 * n // 16 for n in range(16)]
-    assert sorted(session.rewards[n] for n in starts) == sorted(alone.values())
-    assert execute(task, result.solution).reward == max(filter(None, session.rewards))
-    assert solve(RandomSearchHands, task, trials=301, budget=20)[2].meter.trials == 20
-
-
 def test_the_bandit_exploits_and_explores():
     """Each sequence begins with its corrective trial; LRLR has -532 at first, the next -574."""
     task = load_task("two-armed-1")
@@ -61,45 +48,6 @@ SECOND_FOR_THE_RIGHT = tiny_task(
     start={"left": [1.0, -0.5, -0.2, 0.1], "right": [0.8, 0.2, 0.1, 0.1]},
 )
 """The base is locked and the second goal out of the left hand's reach."""
-
-
-def one_by_one(task, seed, parameters):
-    """Hill climbing as it is defined: draw, make one trial, draw again."""
-    session = Session(task, seed, OPTIMISER_INFORMATION)
-    attempts, rng = Attempts(session, parameters), session.rng
-    letters = [hand[0].upper() for hand in session.hands]
-    centres, failed, hands = {}, set(), task.initial_hands
-
-    def drawn():
-        chosen = ""
-        for letter in attempts.hands or " " * session.goals_count:
-            random = letter == " " or rng.random() < 0.2
-            chosen += letters[rng.integers(len(letters))] if random else letter
-        return drawn() if chosen in failed else chosen
-
-    while attempts.left > 0:
-        mask = attempts.explored
-        if hands in centres:
-            centre, reward = centres[hands]
-            values = centre + parameters.sigma * rng.standard_normal(len(centre))
-            attempt = attempts.around(hands, values[None])
-        else:
-            attempt, reward = attempts.by_correction(hands), -np.inf
-        if attempt.rewards[0] == reward == -np.inf:
-            failed.add(hands)
-        elif attempt.rewards[0] > reward:
-            centres[hands] = attempt.reached[0, mask], attempt.rewards[0]
-        hands = drawn()
-    return session
-
-
-@pytest.mark.parametrize("task", [load_task("two-armed-2"), SECOND_FOR_THE_RIGHT])
-def test_trials_made_together_are_those_made_one_by_one(task):
-    *_, session = solve(HillClimbing, task, trials=300)
-    alone = one_by_one(task, 0, UninformedParameters(trials=300))
-    assert session.rewards == alone.rewards
-    together, single = vars(session.meter), vars(alone.meter)
-    assert all(together[name] == single[name] for name in Meter.COUNTS)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
