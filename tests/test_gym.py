@@ -123,12 +123,15 @@ def what_comes_of(steps, envs, seed):
     """Arrays, infos, and what the trials that ended had last, at the reset and at each step."""
     for *arrays, info in (envs.reset(seed=seed), *map(envs.step, steps)):
         rows = np.flatnonzero(info.get("_final_obs", []))
-        last = [[info["final_obs"][row].tolist(), *(info["final_info"][key][row] for key in INFOS)]
-                for row in rows]  # fmt: skip
+        last = [
+            [info["final_obs"][row].tolist(), *(info["final_info"][key][row] for key in OF_LAST)]
+            for row in rows
+        ]
         yield [(a.dtype, a.tolist()) for a in arrays], [info[key].tolist() for key in INFOS], last
 
 
 INFOS = ("task", "is_success")
+OF_LAST = (*INFOS, "_task", "_is_success")
 FAILING = {"task": "two-armed-1", "model": MotionModel(max_iterations=150)}
 
 
