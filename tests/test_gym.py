@@ -36,7 +36,7 @@ from gymnasium import wrappers  # noqa: E402
 from gymnasium.envs.registration import EnvSpec  # noqa: E402
 
 import coartic.gym  # noqa: E402
-from coartic.gym import TaskEnv, TaskVectorEnv  # noqa: E402
+from coartic.gym import TaskEnv, TaskVectorEnv, compare, sb3, score  # noqa: E402
 
 TWO = "coartic/TwoArmed1-v2"
 MIXED = "mixed/v1"
@@ -208,7 +208,7 @@ def test_a_wrong_option_is_refused_with_a_sentence(options, error, words):
 def test_what_else_is_refused():
     with pytest.raises(gymnasium.error.DeprecatedEnv, match="use `coartic/TwoArmed1-v2`"):
         gymnasium.make("coartic/TwoArmed1-v1")
-    single, vector, score = TaskEnv("ascending"), TaskVectorEnv(2, "ascending"), coartic.gym.score
+    single, vector = TaskEnv("ascending"), TaskVectorEnv(2, "ascending")
     single.reset(), vector.reset()
     missing = np.zeros((2, 6))
     missing[1, 3] = np.nan
@@ -271,13 +271,13 @@ def names_of_program(title):
 
 
 def test_the_first_program_of_the_page_learns():
-    table = coartic.gym.score(TWO, names_of_program("REINFORCE")["policy"], ahead=3)
+    table = score(TWO, names_of_program("REINFORCE")["policy"], ahead=3)
     assert table.reward["policy"] > -475  # the corrective process alone: -532
 
 
 def test_the_agent_of_the_page_trains():
     pytest.importorskip("stable_baselines3")
-    table = coartic.gym.score(TWO, names_of_program("Train PPO")["agent"])
+    table = score(TWO, names_of_program("Train PPO")["agent"])
     assert -531 < table.reward["policy"] < -480
 
 
@@ -288,7 +288,7 @@ def test_a_family_is_scored_on_its_test_instances():
     best = np.array([best_shipped(task).reward for task in tasks])
     env = TaskEnv("two-armed/v1", split="development", count=3)
     zeros = {"zeros": lambda seen: np.zeros((len(seen), 11)), "method": ALONE[0]()}
-    table = coartic.gym.score(env, zeros, episodes=2)
+    table = score(env, zeros, episodes=2)
     gap = mean((alone - best) / best)
     due = [alone.mean(), gap.value, gap.low, gap.high, 1]
     for name in ("method", "corrective process"):
@@ -299,12 +299,12 @@ def test_a_family_is_scored_on_its_test_instances():
 
 def test_a_single_task_is_scored():
     """The known rewards of the paper's first task; a policy that fails has no mean."""
-    table = coartic.gym.score("coartic/Ascending-v2", lambda seen: np.zeros((1, 6)))
+    table = score("coartic/Ascending-v2", lambda seen: np.zeros((1, 6)))
     assert table.reward["best known"] == -292
     assert table.reward["policy"] == table.reward["corrective process"] == -319
     assert table.gap["policy"] == pytest.approx(27 / 292)
     assert table.gap_low["random actions"] < table.gap["random actions"] > table.gap["policy"]
-    other = coartic.gym.score(TWO, model=MotionModel(max_iterations=60))
+    other = score(TWO, model=MotionModel(max_iterations=60))
     assert np.isnan(other.reward["best known"])
 
 
@@ -315,7 +315,7 @@ def test_policies_are_scored_where_the_corrective_process_fails():
     """From a straight arm that points away from the goal."""
     task = coartic.Task(locked_base=("x", "y"), **BEHIND)
     policies = {"turns": lambda seen: np.full((len(seen), 4), 0.5), "planner": ALONE[1]()}
-    table = coartic.gym.score("coartic/Task-v2", policies, task=task)
+    table = score("coartic/Task-v2", policies, task=task)
     env = TaskEnv(task)
     env.reset()
     rewards = [env.step(np.full(4, 0.5))[1] for _ in task.goals]
@@ -342,9 +342,9 @@ class Forged(Peeping):
 def test_methods_of_others_have_the_information_that_they_declare():
     for method in (Peeping(), Forged()):
         with pytest.raises(coartic.UndeclaredError):
-            coartic.gym.score("coartic/Ascending-v2", method)
+            score("coartic/Ascending-v2", method)
     learner = LEARNERS[0](LEARNERS[0].Parameters(trials=20))  # to which the task is revealed
-    assert coartic.gym.score("coartic/Ascending-v2", learner).reward["policy"] >= -319
+    assert score("coartic/Ascending-v2", learner).reward["policy"] >= -319
 
 
 def test_wrappers_are_refused_by_name():
@@ -357,11 +357,11 @@ def test_wrappers_are_refused_by_name():
         ("TimeLimit", gymnasium.make(TWO, max_episode_steps=2)),
     ):
         with pytest.raises(TypeError, match=f"env is wrapped in {name}, which score would"):
-            coartic.gym.score(env)
+            score(env)
     zeros = {"zeros": lambda seen: np.zeros((len(seen), 10))}
-    due = coartic.gym.score(TWO, zeros)
+    due = score(TWO, zeros)
     for env in (made, made.unwrapped, vector):
-        pd.testing.assert_frame_equal(coartic.gym.score(env, zeros), due)
+        pd.testing.assert_frame_equal(score(env, zeros), due)
 
 
 def test_an_agent_is_scored_as_it_was_trained():
@@ -381,28 +381,28 @@ def test_an_agent_is_scored_as_it_was_trained():
         "by hand": lambda seen: agent.predict(norm.normalize_obs(seen), deterministic=True)[0],
         "as seen": lambda seen: agent.predict(seen, deterministic=True)[0],
     }
-    rewards = coartic.gym.score(TWO, policies, episodes=1).reward
+    rewards = score(TWO, policies, episodes=1).reward
     assert rewards["agent"] == rewards["by hand"] != rewards["as seen"]
-    coartic.gym.score(TWO, sb3.PPO("MlpPolicy", gymnasium.make(TWO), **small), episodes=1)
+    score(TWO, sb3.PPO("MlpPolicy", gymnasium.make(TWO), **small), episodes=1)
     for env in (vec_env.VecFrameStack(robots(), 2), made):
         agent = sb3.PPO("MlpPolicy", env, **small)
         with pytest.raises(TypeError, match="the agent's environment is wrapped in"):
-            coartic.gym.score(TWO, agent)
+            score(TWO, agent)
 
 
 def test_what_is_not_installed_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "coartic.sb3", None)
     with pytest.raises(coartic.CoarticError, match=r"needs: pip install 'coartic\[rl\]'"):
-        coartic.gym.sb3(TWO)
+        sb3(TWO)
 
 
 def test_a_policy_that_fails_once_has_no_mean():
     """In one of many trials, on one of many tasks."""
     earned = np.array([[-320.0, -320.0], [-330.0, np.nan], [-310.0, -310.0]])
-    table = coartic.gym.compare({"policy": earned}, np.array([[-300.0], [-300.0], [np.nan]]))
+    table = compare({"policy": earned}, np.array([[-300.0], [-300.0], [np.nan]]))
     assert table.loc["policy", ["reward", "gap", "gap_low"]].isna().all()
     assert table.completed["policy"] == 5 / 6
-    solved = coartic.gym.compare({"policy": earned[[0, 2]]}, np.array([[-300.0], [np.nan]]))
+    solved = compare({"policy": earned[[0, 2]]}, np.array([[-300.0], [np.nan]]))
     assert solved.reward["policy"] == -315
     assert solved.gap["policy"] == pytest.approx(20 / 300)
 
@@ -410,7 +410,7 @@ def test_a_policy_that_fails_once_has_no_mean():
 def test_robots_for_stable_baselines():
     pytest.importorskip("stable_baselines3")
     family = {"task": "one-armed/v1", "count": 20}  # whose initial hands are the only ones
-    envs = coartic.gym.sb3("coartic/Task-v2", num_envs=6, **family)
+    envs = sb3("coartic/Task-v2", num_envs=6, **family)
     envs.seed(3)
     vector = TaskVectorEnv(6, **family)
     np.testing.assert_array_equal(envs.reset(), vector.reset(seed=[3, 4, 5, 6, 7, 8])[0])
@@ -429,12 +429,12 @@ def test_robots_for_stable_baselines():
         names = vector.step(nothing)[4]["task"]
     assert ends > 12
     # A task of 0 ticks for the corrective process.
-    envs = coartic.gym.sb3("coartic/Task-v2", 2, task=tiny_task(goals=[[4.5, 0.1]]))
+    envs = sb3("coartic/Task-v2", 2, task=tiny_task(goals=[[4.5, 0.1]]))
     envs.reset()
     rewards = envs.step(np.full((2, *envs.action_space.shape), 0.5))[1]
     assert np.isfinite(rewards).all()
     assert (rewards < 0).all()
-    fails = coartic.gym.sb3("coartic/TwoArmed2-v2", 50, model=MotionModel(max_iterations=100))
+    fails = sb3("coartic/TwoArmed2-v2", 50, model=MotionModel(max_iterations=100))
     fails.reset()
     steps = map(fails.step, np.random.default_rng(0).choice([-1.0, 1.0], (4, 50, 11)))
     failed = {each for _, rewards, _, infos in steps

@@ -14,7 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import coartic
-from coartic import CoarticError, MotionModel, UndeclaredError, corrective_trial, execute, load_task
+from coartic import (
+    CoarticError,
+    MotionModel,
+    UndeclaredError,
+    corrective_trial,
+    execute,
+    load_task,
+    objective,
+)
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session, run_method
@@ -27,7 +35,7 @@ DOCS = ROOT / "docs"
 
 def test_the_cost_of_a_point_is_what_its_trial_takes():
     task = load_task("two-armed-1")
-    cost = coartic.objective(task, "LRLR", half_width=0.25)
+    cost = objective(task, "LRLR", half_width=0.25)
     assert (cost.dim, cost.bounds.shape) == (4 * 9, (36, 2))  # the base is locked in y
     np.testing.assert_allclose(cost.bounds.T - cost.x0, [[-0.25] * 36, [0.25] * 36])
     assert cost.best_cost == -corrective_trial(task, "LRLR").reward
@@ -38,7 +46,7 @@ def test_the_cost_of_a_point_is_what_its_trial_takes():
 
 def test_the_best_point_is_kept_with_its_solution():
     task = load_task("ascending")
-    cost = coartic.objective("ascending")
+    cost = objective("ascending")
     assert execute(task, cost.solution).reward == -319  # the corrective process alone
     assert cost(cost.best_x) == cost.best_cost == 319 < cost(cost.x0)
     points = cost.x0 + 0.05 * np.random.default_rng(0).standard_normal((1500, cost.dim))
@@ -51,7 +59,7 @@ def test_the_best_point_is_kept_with_its_solution():
 
 def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
     model = MotionModel(max_iterations=100)
-    cost = coartic.objective("ascending", model=model)
+    cost = objective("ascending", model=model)
     points = cost.x0 + np.random.default_rng(0).standard_normal((200, cost.dim))
     costs = cost.many(points)
     assert 0 < (costs == FAILED).sum() < 200
@@ -60,15 +68,15 @@ def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
     assert not execute("ascending", cost.movements(failed), model=model).completed
     assert cost(cost.x0 + 1e6) == FAILED  # where an unbounded search may go
     with pytest.raises(MethodError, match="completes no hand sequence"):
-        coartic.objective("ascending", model=MotionModel(max_iterations=2))
+        objective("ascending", model=MotionModel(max_iterations=2))
     many = tiny_task(goals=[[5.0, 1.0]] * 13)
     with pytest.raises(MethodError, match="hand sequences; .* say which hands"):
-        coartic.objective(many)
+        objective(many)
     with pytest.raises(coartic.NotApplicableError, match="8192 hand sequences"):
-        _ = coartic.objective(many, "R" * 13).hand_sequences
+        _ = objective(many, "R" * 13).hand_sequences
 
 
-COST = coartic.objective("ascending")
+COST = objective("ascending")
 GOALS = np.argwhere(COST.joints)[:, 0]  # of each entry of a point
 
 
@@ -76,7 +84,7 @@ MASKED = np.ma.array(COST.x0, mask=np.arange(18) == 3)
 
 
 def with_width(half_width):
-    return coartic.objective("ascending", half_width=half_width)
+    return objective("ascending", half_width=half_width)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +116,7 @@ def test_what_is_no_point_no_target_and_no_width_is_refused(call, wrong, words):
     assert COST.evaluations == 0
 
 
-COPIED = coartic.objective("ascending", budget=50)
+COPIED = objective("ascending", budget=50)
 
 
 @pytest.mark.process
@@ -129,7 +137,7 @@ def evaluate_copied(x):
 
 def test_points_become_movements():
     task = load_task("two-armed-2")
-    cost = coartic.objective(task, "RLRR")
+    cost = objective(task, "RLRR")
     points = cost.x0 + 0.3 * np.random.default_rng(2).standard_normal((30, cost.dim))
     points[3, np.argwhere(cost.joints)[:, 0] == 1] = np.nan  # the corrective process alone
     for hands in (None, "RRRR", "LLRL"):
@@ -183,7 +191,7 @@ def test_the_examples_are_methods(path, in_this_process):
 
 
 def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):
-    costs, objective = [], coartic.objective
+    costs = []
     monkeypatch.setattr(coartic, "objective", lambda *a: costs.append(objective(*a)) or costs[-1])
     runpy.run_path(str(EXAMPLES / "choose_hands.py"), run_name="__main__")
     ticks, hands = re.search(r"([0-9.]+) ticks with hands (\w+)", capsys.readouterr().out).groups()
@@ -198,7 +206,7 @@ def test_targets_and_hands_are_minimised_together_by_catcma():
     pytest.importorskip("cmaes")
     search = runpy.run_path(str(EXAMPLES / "catcma.py"))["search"]
     cost, again = (search("two-armed-1", 400) for _ in range(2))
-    alone = coartic.objective("two-armed-1")
+    alone = objective("two-armed-1")
     assert cost.evaluations + len(cost.hand_sequences) == 400
     assert cost.best_hands in cost.hand_sequences
     assert cost.best_cost < alone.best_cost
@@ -247,7 +255,7 @@ def test_the_package_for_optunahub():
     assert [*start.values()].count(0.0) == 40
     assert len(start) == 44
     assert problem.best_known == 300
-    cost = coartic.objective("two-armed-2", "RLRR")
+    cost = objective("two-armed-2", "RLRR")
     targets = cost.configurations.copy()
     targets[1, 2] += 0.1
     targets[3, 9] -= 0.2
@@ -266,11 +274,11 @@ def test_what_is_known_of_a_task():
     for entry in shipped_optima():
         if (entry.base, entry.other_arm) != ("task", "free"):
             continue
-        problem = coartic.objective(entry.task)
+        problem = objective(entry.task)
         assert (problem.best_known, problem.proven) == (-entry.reward, entry.bound == entry.reward)
-    assert coartic.objective("two-armed/v1/i900").best_known is None
-    assert not coartic.objective("two-armed/v1/i900").proven
-    assert coartic.objective("ascending", model=coartic.MotionModel(gain=0.04)).best_known is None
+    assert objective("two-armed/v1/i900").best_known is None
+    assert not objective("two-armed/v1/i900").proven
+    assert objective("ascending", model=coartic.MotionModel(gain=0.04)).best_known is None
 
 
 @pytest.mark.parametrize("threads", [1, 4])
@@ -283,9 +291,7 @@ def test_what_is_known_of_a_task():
 def test_history_and_evaluations_to_are_what_the_returned_costs_say(threads, sizes, budget, seed):
     """In batches of any size, 0 for a point alone; where the budget cuts a batch; after refused
     copies; and of threads, whose order is open."""
-    cost, single = (
-        coartic.objective("two-armed-1", "LRLR", budget=most) for most in (budget + 1, None)
-    )
+    cost, single = (objective("two-armed-1", "LRLR", budget=most) for most in (budget + 1, None))
     rng, alone = np.random.default_rng(seed), cost.best_cost
     batches = [
         cost.x0 + rng.uniform(0, 0.05) * rng.standard_normal((max(size, 1), cost.dim))
@@ -320,7 +326,7 @@ def test_history_and_evaluations_to_are_what_the_returned_costs_say(threads, siz
 
 
 def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
-    problem = coartic.objective(FOUR, budget=17)
+    problem = objective(FOUR, budget=17)
     problem(problem.x0)
     again = problem.fresh()
     assert (again.evaluations, again.dim) == (0, problem.dim)
@@ -328,9 +334,9 @@ def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     few = "budget is 15; to choose among the hand sequences .* takes 16 trials: give more, or say"
     for budget, words in ((0, "budget is 0; it must be a whole number from 1"), (15, few)):
         with pytest.raises(ValueError, match=words):
-            coartic.objective(FOUR, budget=budget)
-    assert coartic.objective(FOUR, "RLRR", budget=5).trials_left == 4
-    assert coartic.objective(FOUR, budget=16).trials_left == 0
+            objective(FOUR, budget=budget)
+    assert objective(FOUR, "RLRR", budget=5).trials_left == 4
+    assert objective(FOUR, budget=16).trials_left == 0
 
 
 class Idle(coartic.Optimiser):
