@@ -67,27 +67,37 @@ def test_the_smallest_p_is_that_of_the_clearest_case():
     assert context_tests.smallest_p(50, 50, resamples=99) == 0.01
 
 
+def divisions(*groups):
+    """Yield each division of the runs of two groups into groups as large."""
+    pool = np.concatenate(groups)
+    for chosen in itertools.combinations(range(len(pool)), len(groups[0])):
+        yield pool[[*chosen]], np.delete(pool, chosen, axis=0)
+
+
+def test_permutations_by_brute_force():
+    draw = rng(11)
+    groups = draw.standard_normal((3, 2)), draw.standard_normal((4, 2)) + 0.8
+    observed = distance_of_means(*groups)
+    p = np.mean([distance_of_means(*each) >= observed - 1e-12 for each in divisions(*groups)])
+    assert permutation_p(*groups, rng()) == pytest.approx(p)
+    drawn = permutation_p(*groups, rng(), resamples=34)
+    assert drawn == pytest.approx(p, abs=0.25)
+    assert drawn * 35 == pytest.approx(round(drawn * 35))  # the observed one counts
+    assert math.isnan(permutation_p(groups[0][:1], groups[1], rng()))
+
+
 def test_more_than_another_by_brute_force():
     draw = rng(6)
     method = draw.standard_normal((3, 2)), draw.standard_normal((2, 2)) + 2.0
     other = draw.standard_normal((2, 2)), draw.standard_normal((2, 2)) + 0.5
-    pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]
-
-    def excess(ours, theirs):
-        groups = zip(pools, ours, theirs, strict=True)
-        parts = [(pool[list(a)], pool[list(b)]) for pool, a, b in groups]
-        return distance_of_means(parts[0][0], parts[1][0]) - distance_of_means(
-            parts[0][1], parts[1][1]
-        )
-
-    observed, count, total = (distance_of_means(*method) - distance_of_means(*other), 0, 0)
-    for one in itertools.combinations(range(5), 3):
-        for two in itertools.combinations(range(4), 2):
-            rest = [set(range(5)) - set(one), set(range(4)) - set(two)]
-            count += excess((one, two), rest) >= observed - 1e-12
-            total += 1
+    both = [divisions(*runs) for runs in zip(method, other, strict=True)]
+    excess = [
+        distance_of_means(*ours) - distance_of_means(*theirs)
+        for ours, theirs in (zip(*each, strict=True) for each in itertools.product(*both))
+    ]
+    observed = distance_of_means(*method) - distance_of_means(*other)
     p = context_tests.beyond_p(method, other, rng(), resamples=20_000)
-    assert p == pytest.approx(2 * count / total, abs=0.03)
+    assert p == pytest.approx(2 * np.mean(np.array(excess) >= observed - 1e-12), abs=0.03)
 
 
 def test_drawn_tests_count_what_was_seen():
@@ -105,12 +115,10 @@ def test_drawn_tests_count_what_was_seen():
 def test_posture_difference_below_a_bound_by_brute_force():
     first, second = rng(12).standard_normal((3, 2)), rng(13).standard_normal((2, 2)) + 1.5
     reached = [
-        distance_of_means(a, b) >= 2.0 * math.sqrt((((a - a.mean(0)) ** 2).sum()
-                                                    + ((b - b.mean(0)) ** 2).sum()) / 3)
+        not context_tests.standardised_posture_difference(np.array(a), np.array(b)) < 2.0
         for a in itertools.product(first, repeat=3)
         for b in itertools.product(second, repeat=2)
-        for a, b in [(np.array(a), np.array(b))]
-    ]  # fmt: skip
+    ]  # NaN where resamples have no spread: infinitely far
     p = context_tests.posture_difference_below(first, second, 2.0, rng())
     assert 0.1 < p < 0.9
     assert p == pytest.approx(np.mean(reached), abs=0.02)
@@ -130,22 +138,6 @@ def test_pairs_of_contexts():
     assert context_pairs(others) == [("a", "b", 2), ("b", "c", 2)]
     wider = others["b"].model_copy(update={"radius": 0.2})
     assert context_pairs({"a": others["a"], "b": wider}) == []
-
-
-def test_permutations_by_brute_force():
-    draw = rng(11)
-    first, second = draw.standard_normal((3, 2)), draw.standard_normal((4, 2)) + 0.8
-    pool = np.concatenate([first, second])
-    observed = distance_of_means(first, second)
-    count = 0
-    for chosen in itertools.combinations(range(7), 3):
-        rest = [k for k in range(7) if k not in chosen]
-        count += distance_of_means(pool[list(chosen)], pool[rest]) >= observed - 1e-12
-    assert permutation_p(first, second, rng()) == pytest.approx(count / 35)
-    assert math.isnan(permutation_p(first[:1], second, rng()))
-    drawn = permutation_p(first, second, rng(), resamples=34)
-    assert drawn == pytest.approx(count / 35, abs=0.25)
-    assert drawn * 35 == pytest.approx(round(drawn * 35))  # the observed one counts
 
 
 JACOBIAN = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]])
@@ -224,13 +216,14 @@ def test_what_a_posture_serves():
 def test_signs_are_one_number_a_run():
     """A learner's first movement is slower, the whole task faster, than with the same hands."""
     task = load_task("two-armed-1")
-    learned = [learn(task, "EC4", seed=seed, trials=400).execute() for seed in (1, 2)]
+    learned = [learn(task, "EC4", seed=seed, trials=100).execute() for seed in (1, 2)]
     cell = Solutions(task, "", tuple(learned))
-    corrective = [corrective_trial(task, run.hands).ticks_by_goal() for run in cell.runs]
-    learned = [run.ticks_by_goal() for run in cell.runs]
-    first, whole = (SIGNATURES[name].each(cell) for name in ("first", "whole"))
-    assert first.tolist() == [a[0] - b[0] for a, b in zip(learned, corrective, strict=True)]
-    assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
+    ticks = [
+        (run.ticks_by_goal(), corrective_trial(task, run.hands).ticks_by_goal()) for run in learned
+    ]
+    first, whole = (SIGNATURES[name].each(cell).tolist() for name in ("first", "whole"))
+    assert first == [ours[0] - alone[0] for ours, alone in ticks]
+    assert whole == [sum(alone) - sum(ours) for ours, alone in ticks]
     assert not any(
         signature.each(Solutions(task, "", ())).size for signature in SIGNATURES.values()
     )
@@ -251,52 +244,28 @@ def test_choice_in_isolation():
     assert SIGNATURES["hand"].each(Solutions(task, "", some)).tolist() == [0.0, 1.0, 0.0]
 
 
-def test_preshaping_by_the_arm_alone():
-    """The base never moves: all of it is the arm's."""
-    start = posture(left_1=1.0)
-    swung = posture(left_1=1.0, right_1=0.4)
-    robot = load_task("two-armed-1").robot
-    goals = [robot.forward_kinematics(q, hand).tolist()
-             for q, hand in ((swung, "right"), (posture(left_1=0.2), "left"))]  # fmt: skip
-    content = {"left": start[2:6].tolist(), "right": start[6:].tolist()}
-    task = tiny_task(goals=goals, initial_hands="RL", start=content, locked_base=["x", "y"])
-    end = posture(left_1=0.2, right_1=0.4)
-    initial = execute(task, movements_of("RL", [swung, end]))
-    run = execute(task, movements_of("RL", [posture(left_1=0.6, right_1=0.4), end]))
-    now, before = (
-        np.linalg.norm(robot.forward_kinematics(of.configurations[0], "left") - goals[1])
-        for of in (run, initial)
-    )
-    assert 0.2 < measures.preshaping(task, run, initial)[0] == pytest.approx(1 - now / before)
-    assert np.isnan(measures.preshaping(task, run, initial)[1])
-
-
-def test_what_its_own_hit_left_is_no_preshaping_since():
-    """The left arm keeps still after its hit of goal 1, in another posture than initially."""
+def test_preshaping_is_what_the_idle_arm_moved_since_its_own_hit_or_the_start():
+    """The base does not count, nor the posture that an arm's own hit left."""
     task = load_task("two-armed-1")
-    initial = corrective_trial(task, "RRRR")
-    run = corrective_trial(task, "LRLR")
+    initial, run = corrective_trial(task, "RRRR"), corrective_trial(task, "LRLR")
     np.testing.assert_array_equal(measures.preshaping(task, run, initial)[:3], [0, 0, 0])
-    moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
-    robot = task.robot
-    goals = [robot.forward_kinematics(q, hand).tolist()
+    moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0.2), (0.8, 0.4))]
+    goals = [task.robot.forward_kinematics(q, hand).tolist()
              for q, hand in zip(moved, ("left", "right"), strict=True)]  # fmt: skip
-    goals.append([7.0, 3.0])
-    small = tiny_task(goals=goals, initial_hands="LRL")
-    end = Movement(3, "left", "corrective")
-    still = execute(
-        small, [Movement(1, "left", "corrective"), Movement(2, "right", "corrective"), end]
-    )
-    run = execute(small, [*movements_of("LR", moved), end])
-    configurations = run.configurations
-    held = np.array(configurations[1])
-    held[2:6] = configurations[0, 2:6]
-    now, without, before = (
-        np.linalg.norm(robot.forward_kinematics(q, "left") - [7.0, 3.0])
-        for q in (configurations[1], held, still.configurations[1])
-    )
-    assert measures.preshaping(small, run, still)[1] == pytest.approx((without - now) / before)
-    assert abs(without - now) > 0.05
+    small = tiny_task(goals=[*goals, [7.0, 3.0]], initial_hands="LRL")
+    initial = corrective_trial(small, "LRL")
+    run = execute(small, [*movements_of("LR", moved), Movement(3, "left", "corrective")])
+    shares = measures.preshaping(small, run, initial)
+    for k, idle, kept in ((0, "right", small.q0), (1, "left", run.configurations[0])):
+        held, joints = run.configurations[k].copy(), small.robot.joints(idle)
+        held[joints] = kept[joints]
+        now, without, initially = (
+            np.linalg.norm(small.robot.forward_kinematics(q, idle) - small.goals[k + 1])
+            for q in (run.configurations[k], held, initial.configurations[k])
+        )
+        assert shares[k] == pytest.approx((without - now) / initially)
+        assert abs(without - now) > 0.05
+    assert np.isnan(shares[2])
 
 
 ONE_ARMED = ("ascending", "descending")
