@@ -1,7 +1,6 @@
 """Reports: their numbers are those of the runs, their text is escaped, their rows name runs."""
 
 import html
-import math
 import re
 import shutil
 import subprocess
@@ -11,7 +10,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError, Movement
 from coartic.analysis.report import about, render
 from coartic.analysis.report.about import attempt, limits
 from coartic.analysis.report.build import stamp, write_report
@@ -19,7 +18,7 @@ from coartic.analysis.report.player import methods_played, player
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.study import Study
 from tests.support.made_up import runs_of, study_of
-from tests.support.suites import KNOWN, cell_on, cells_of, run_and_write
+from tests.support.suites import cells_of, run_and_write
 
 
 @pytest.fixture(scope="module")
@@ -143,21 +142,6 @@ def test_a_page_stands_alone(report):
     assert len(text) < 1_500_000
 
 
-def test_failed_runs_have_a_table_and_bar_from_the_ranking(traced):
-    assert TABLES["failed"](traced).empty
-    learner = "dual-process/EC4"
-    runs = traced.runs.reset_index(drop=True)
-    late = runs.index[(runs.method == learner) & (runs.setting == "")][-1:]
-    runs.loc[late, "status"], runs.loc[late, "reward"] = "timeout", pd.NA
-    runs.loc[late, "reason"] = "CPU time limit of 600 s exceeded"
-    spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
-    (row,) = TABLES["failed"](spoiled).to_dict("records")
-    assert (row["method"], row["failed"]) == (learner, 1)
-    assert row["reasons"] == "1 × CPU time limit of 600 s exceeded"
-    ranked = TABLES["ranking"](spoiled).loc[learner]
-    assert (ranked.failed, math.isnan(ranked.gap)) == (1, True)
-
-
 def numbers_in(text):
     return re.findall(r"−?\d+(?:\.\d+)?", text.replace("\u202f", ""))
 
@@ -176,19 +160,15 @@ def test_every_number_of_a_sentence_is_in_the_table_under_it(report):
     assert seen > 20
 
 
-def test_few_runs_say_so(tmp_path):
-    """One run a cell, and no learner: every answer is true, none is invented."""
-    one = cells_of("paper", tasks=["ascending", "descending"])
-    few = run_and_write(tmp_path / "few", cells=one, runs=1, trials=30)
-    assert TABLES["contexts"](few).verdict.unique().tolist() == ["too few runs"]
+def test_a_report_of_one_run_without_a_learner_stays_with_its_results(traced, tmp_path):
     alone = cells_of("comparison", tasks=["ascending"], methods=["corrective-alone/given"])
-    without = run_and_write(tmp_path / "without", cells=alone, runs=1)
-    files = write_report(without, tmp_path / "report")
-    assert {"report.html", "tables/ranking.tex"} <= set(files[0])
-    assert any(name.endswith(".pdf") for name in files[0])
+    one = run_and_write(tmp_path / "one", cells=alone, runs=1)
+    files, _ = write_report(one, tmp_path / "report")
+    assert {"report.html", "tables/ranking.tex"} <= {*files}
+    assert any(name.endswith(".pdf") for name in files)
     with pytest.raises(CoarticError, match="report holds the report of other results"):
-        write_report(few, tmp_path / "report", for_paper=False)
-    write_report(without, tmp_path / "report", for_paper=False)
+        write_report(traced, tmp_path / "report")
+    write_report(one, tmp_path / "report", for_paper=False)
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
@@ -230,11 +210,10 @@ def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
     assert {path.stem for path in report.glob("tables/*.csv")} >= {"ranking", "signatures", "tasks"}
 
 
-def test_methods_that_follow_paths_are_left_out(tmp_path):
-    methods = "posture-qp/current-goal", "corrective-alone/given"
-    cells = [cell_on(load_task("ascending"), KNOWN[method]) for method in methods]
-    study = run_and_write(tmp_path / "both", cells, trials=20, runs=1)
-    played = methods_played(study, ["ascending"])
-    assert [run["id"] for run in played] == ["corrective-alone/given"]
-    alone = run_and_write(tmp_path / "alone", cells[:1], trials=20, runs=1)
-    assert player(alone) == ""
+def test_methods_that_follow_paths_are_left_out():
+    kinds = "corrective", "path"
+    rows = [run for kind in kinds for run in runs_of("ascending", kind, [-300], run_id=[kind])]
+    stored = {kind: [Movement(1, "right", kind)] for kind in kinds}
+    both, paths = (study_of(runs, movements=lambda _: stored) for runs in (rows, rows[1:]))
+    assert [run["id"] for run in methods_played(both, ["ascending"])] == ["corrective"]
+    assert player(paths) == ""

@@ -106,6 +106,11 @@ def test_a_failed_run_reaches_nothing():
     learner, other = "dual-process/EC1", "posture-based/two-goals"
     rewards = {learner: [-300] * 4, other: [-305, -305, None, None]}
     seen = study({("ascending", method): of for method, of in rewards.items()})
+    seen.runs.loc[seen.runs.reward.isna(), "reason"] = "time limit"
+    (failed,) = TABLES["failed"](seen).to_dict("records")
+    assert (failed["method"], failed["failed"]) == (other, 2)
+    assert failed["reasons"] == "2 × time limit"
+    assert TABLES["ranking"](seen).failed.to_dict() == {learner: 0, other: 2}
     assert [*standings.board(seen).index] == [learner]
     assert TABLES["against-learner"](seen).empty
     assert TABLES["runtimes"](seen).reached[other] == pytest.approx(2 / 4 * 10 / 20)
