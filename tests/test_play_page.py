@@ -19,7 +19,7 @@ from tests.support.strategies import changed, metres_task
 pytestmark = pytest.mark.browser
 
 
-TRIALS = 300  # of 10,000 that the page makes, as tests see the same in fewer
+TRIALS = 100  # of 10,000 that the page makes, as tests see the same in fewer
 
 
 @pytest.fixture(scope="module")
@@ -207,6 +207,7 @@ def test_an_arm_in_metres_is_in_proportion_and_does_what_python_does(opened_task
 
 def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     page = settled(opened("who=alone&preset=1&others="))
+    assert ticks(page, r"Optimum \(proven\)") == 292
     handle = page.get_by_role("button", name="Goal 3, at")
     handle.focus()
     for _ in range(7):
@@ -215,6 +216,7 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     task = changed("ascending", goals=[[6.0, 0.1], [6.0, 2.0], [5.98, 3.3]])
     page.wait_for_url("**goals=6,0.1;6,2;5.98,3.3*")
     assert ticks(page, "Corrective process alone") == -corrective_trial(task, "RRR").reward
+    assert "Optimum" not in text(page, "score")
     page.get_by_role("radio", name="learner").check()
     settled(page)
     assert trials_made(page) == TRIALS
@@ -248,6 +250,7 @@ def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_
 def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page = settled(opened("preset=3&who=you"))
     assert ticks(page, "You") == ticks(page, "Corrective process alone")
+    assert "Optimum" not in text(page, "score")  # it is not proven
     handle = page.get_by_role("button", name="left arm, elbow 2")
     box = handle.bounding_box()
     page.mouse.move(box["x"] + 15, box["y"] + 15)
@@ -281,18 +284,6 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     comes_back(page)
 
 
-def test_a_proven_optimum_is_shown_until_the_task_is_changed(opened):
-    page = settled(opened("preset=1&others="))
-    assert ticks(page, r"Optimum \(proven\)") == 292
-    page.get_by_role("button", name="Goal 2").focus()
-    page.keyboard.press("ArrowUp")
-    assert "Optimum" not in text(settled(page), "score")
-    press(page, "Reset")
-    assert ticks(settled(page), r"Optimum \(proven\)") == 292
-    page.get_by_label("Task").select_option("3")  # two-armed 1, not proven
-    assert "Optimum" not in text(settled(page), "score")
-
-
 def test_the_link_holds_the_whole_state(opened, address):
     page = settled(opened())
     assert "posture difference" in text(page, "finding")
@@ -303,17 +294,20 @@ def test_the_link_holds_the_whole_state(opened, address):
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowRight")
     settled(page)
-    page.get_by_role("slider", name="Practice").fill("400")
+    page.get_by_role("slider", name="Practice").fill("800")
     page.get_by_role("slider", name="Tick").fill("123")
     assert f"trials={trials_made(settled(page))}&" in page.url
     comes_back(page)
-    assert trials_made(changed_to(page, address, "trials=200")) == 200
-    changed_to(page, address, "preset=3&explores=EC3")
-    assert ticks(page, "The learner") == learned("two-armed-1", "EC3")
+    assert trials_made(changed_to(page, address, "trials=50")) == 50
+    changed_to(page, address, "preset=3&explores=EC3&reward=movement&drift=1")
+    condition = shown_condition(page)
+    assert (condition.drift, condition.credit) == (1.0, "subtask")
+    assert ticks(page, "The learner") == learned("two-armed-1", condition)
     # Entries that are no state are left out, and goals and joints far out lie nearer.
-    for name in ("constructor", "__proto__"):
-        changed_to(page, address, f"preset=3&who={name}&mate={name}&explores={name}&{name}=1")
-        assert ticks(page, "The learner") > 0
+    changed_to(
+        page, address, "preset=3&who=constructor&mate=__proto__&explores=constructor&__proto__=1"
+    )
+    assert ticks(page, "The learner") > 0
     changed_to(page, address, "preset=1&others=&who=you&own=1,0,1e308,0,0,0,0,0,0,1e9,0")
     assert ticks(page, "You") > 0
     changed_to(page, address, "who=learner&trials=x&preset=99&goals=1,a&nothing=1&tick=1e9")
@@ -329,33 +323,25 @@ def shown_condition(page):
     return eval(code, {"CONDITIONS": CONDITIONS, "replace": replace})
 
 
-def test_the_learner_is_that_of_the_python_that_the_page_shows(opened):
-    page = settled(opened("preset=3&explores=EC3&reward=movement&drift=1"))
-    condition = shown_condition(page)
-    assert (condition.drift, condition.credit) == (1.0, "subtask")
-    assert ticks(page, "The learner") == learned("two-armed-1", condition)
-
-
 def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
-    page = settled(opened("preset=2&others=&trials=100"))
+    page = settled(opened("preset=2&others=&trials=50"))
     dial = page.get_by_role("slider", name="How far exploration leans towards the next goal")
     by_drift = [ticks(page, "The learner")]
     dial.focus()
-    for drift in ("0.03", "0.1", "0.3", "1"):
-        page.keyboard.press("ArrowRight")
+    for key, drift in (("ArrowRight", "0.03"), ("End", "1")):
+        page.keyboard.press(key)
         by_drift.append(ticks(settled(page), "The learner"))
         assert f"drift={drift}&" in page.url
         assert drift in dial.get_attribute("aria-valuetext")
         assert text(page, "progress").endswith(f"drift {drift}")
-    assert by_drift == sorted(by_drift, reverse=True)  # the same trials find better movements
-    assert by_drift[3] < by_drift[0]
+    assert by_drift[0] >= by_drift[1] > by_drift[2]  # the same trials find better movements
     comes_back(page)
     page.get_by_label("Task").select_option("1")
     assert "drift=1" in settled(page).url
     page.get_by_role("radio", name="planner").check()
     assert not dial.is_visible()
-    for nonsense in ("x", "0.2", "Infinity", ""):
-        changed_to(page, address, f"preset=2&others=&trials=100&drift={nonsense}")
+    for nonsense in ("x", "0.2"):
+        changed_to(page, address, f"preset=2&others=&trials=50&drift={nonsense}")
         assert shown_condition(page) == CONDITIONS["EC1"]
         assert ticks(page, "The learner") == by_drift[0]
     changed_to(page, address, "preset=2&others=&drift=1")
@@ -426,14 +412,15 @@ def test_on_a_phone_picture_slider_and_finding_come_first(visited, address):
     assert page.get_by_label("Task").is_visible()
 
 
-@pytest.mark.parametrize("width", [1280, 390])
-def test_every_goal_is_seen_on_screen_and_in_print(opened, width):
-    page = settled(opened(width=width, color_scheme="dark"))
-    stage, inset = (page.locator(f"[data-is={name}]").bounding_box() for name in STAGE)
-    beside, below = (inset[axis] >= stage[axis] + stage[size] for axis, size in SIDES)
-    assert (beside, below) == (width == 1280, width == 390)
-    for handle in page.locator(".handle").all():
-        assert handle.evaluate(IS_ON_TOP)
+def test_every_goal_is_seen_on_screen_and_in_print(opened):
+    page = settled(opened(color_scheme="dark"))
+    for width, beside in ((390, False), (1280, True)):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.evaluate(DRAWN)
+        stage, inset = (page.locator(f"[data-is={name}]").bounding_box() for name in STAGE)
+        clear = [inset[axis] >= stage[axis] + stage[size] for axis, size in SIDES]
+        assert clear == [beside, not beside]
+        assert all(page.locator(".handle").evaluate_all(ARE_ON_TOP))
     page.evaluate(RECORD_PRINT, STAGE)
     page.emulate_media(media="null")  # as the browser sees it: screen, then print
     page.pdf(format="A4")
@@ -446,11 +433,10 @@ def test_every_goal_is_seen_on_screen_and_in_print(opened, width):
 
 STAGE = ["stage", "inset"]
 SIDES = (("x", "width"), ("y", "height"))
-IS_ON_TOP = """handle => {
+ARE_ON_TOP = """handles => handles.map((handle) => {
   const { left, top, width, height } = handle.getBoundingClientRect();
-  window.scrollTo(0, 0);
   return document.elementFromPoint(left + width / 2, top + height / 2) === handle;
-}"""
+})"""
 RECORD_PRINT = """names => {
   window.printed = [];
   matchMedia("print").addEventListener("change", ({ matches }) => matches && names.forEach(name => {
@@ -463,7 +449,7 @@ RECORD_PRINT = """names => {
 
 
 def test_it_practises_plays_and_saves_pictures(opened):
-    page = opened(reduced_motion="no-preference")
+    page = opened("preset=1&others=&trials=10", reduced_motion="no-preference")
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
     press(page, "Pause")
@@ -496,18 +482,17 @@ def test_a_goal_is_dragged_by_a_finger(opened):
     assert page.evaluate("scrollY") == 0  # the page did not scroll instead
 
 
-@pytest.mark.parametrize(
-    ("width", "scheme", "state"),
-    [
-        (390, "dark", "preset=4&who=you"),
-        (1280, "light", "drift=0.03&reward=movement"),
-    ],
-)
-def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme, state):
-    page = settled(opened(state, width, color_scheme=scheme))
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    accessibility = Axe().run(page)
-    assert accessibility.violations_count == 0, accessibility.generate_report()
+def test_nothing_scrolls_sideways_and_all_is_accessible(opened, address):
+    page = opened()
+    for width, scheme, state in (
+        (1280, "light", "drift=0.03&reward=movement"), (390, "dark", "preset=4&who=you")
+    ):  # fmt: skip
+        page.set_viewport_size({"width": width, "height": 900})
+        page.emulate_media(color_scheme=scheme)
+        changed_to(page, address, state)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        accessibility = Axe().run(page)
+        assert accessibility.violations_count == 0, accessibility.generate_report()
 
 
 def test_without_scripts_there_is_a_picture(page_without_scripts, address):
