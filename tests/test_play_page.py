@@ -34,7 +34,7 @@ def address(tmp_path_factory):
 def opened_task(visited, tmp_path):
     """Opens the page of a task, with so many trials and other changes of its code."""
 
-    def open_page(task=None, trials=2000, changes=()):
+    def open_page(task=None, trials=1000, changes=()):
         html = pages.play_page(*[task] if task else [])
         for old, new in (("TRIALS = 10000;", f"TRIALS = {trials};"), *changes):
             html = html.replace(old, new)
@@ -129,7 +129,7 @@ def learned(task, condition, trials=TRIALS):
 def test_coarticulation_appears_with_practice(opened_task):
     page = opened_task()
     trials = trials_made(page)
-    assert trials == 2000  # on every machine
+    assert trials == 1000  # on every machine
     postures = []  # at the goal that they share
     for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
         runs = [learn(name, "EC1", seed=seed, trials=trials) for seed in range(5)]

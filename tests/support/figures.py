@@ -24,7 +24,7 @@ def texts_of(figure):
 def misplaced(figure):
     """Texts that leave the figure, and pairs of texts that overlap by more than a pixel."""
     canvas = FigureCanvasAgg(figure)
-    canvas.draw()
+    figure.draw_without_rendering()
     boxes = [(text.get_text(), text.get_window_extent(canvas.get_renderer()).extents)
              for text in texts_of(figure)]  # fmt: skip
     width, height = figure.bbox.extents[2:]
