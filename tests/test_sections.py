@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import load_task
+from coartic import CoarticError, load_task
+from coartic.analysis import runtimes
 from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL
 from coartic.analysis.sections import FIGURES, TABLES
-from tests.support.made_up import made_up_optima, row, runs_of, study_of, study_of_trials
+from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of, study_of_trials
 
 ONE, TWO = "ascending", "two-armed-1"
 EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
@@ -124,6 +125,27 @@ def test_runtimes(study):
     table = TABLES["runtimes"](study)
     same(table.loc[list(cells)], names, cells)
     assert len(table) == 3
+
+
+def test_running_times_of_chosen_targets(study):
+    """-306 and -499 halfway, and -292 and -465, which no run of the learner reaches."""
+    curves = runtimes(study, targets=[0.5, 1.0])
+    assert {*curves.method} == {BOTH, CMA, PLAN}  # each condition ran on one of the two tasks
+    for spend, each in (("trials", 1), ("forward_kinematics", 1_000)):
+        curve = curves[(curves.method == BOTH) & (curves.spend == spend)]
+        assert curve.budget.tolist() == [50 * each, 500 * each, 1_000 * each]
+        assert curve.share.tolist() == pytest.approx([1 / 12, 2 / 12, 6 / 12])
+    assert runtimes(study).equals(runtimes(study, targets=[n / 20 for n in range(1, 21)]))
+
+
+def test_running_times_that_cannot_be_shown(study, tmp_path):
+    for targets in ([], [0.0], [1.01], [math.nan], [[0.5]]):
+        with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):
+            runtimes(study, targets=targets)
+    with pytest.raises(CoarticError, match="no task has a best known reward"):
+        runtimes(MadeUp(study, optima={}))
+    with pytest.raises(CoarticError, match="there is no folder"):
+        runtimes(tmp_path / "nowhere")
 
 
 def test_learning(study):

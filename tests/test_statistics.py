@@ -11,7 +11,6 @@ from scipy import stats
 
 from coartic import estimates as statistics
 from coartic.analysis.statistics import hypotheses
-from coartic.estimates import LEVEL
 
 
 @pytest.mark.parametrize(
@@ -72,17 +71,27 @@ def test_smallest_p():
     assert (drawn.least_p, drawn.p) == (2 / 10_000, pytest.approx(expected, abs=0.01))
 
 
-def test_bca_interval_against_all_resamples():
-    """The formula of Efron & Tibshirani (1993, equation 14.10) on all 6^6 resamples."""
-    values = np.array([0.0, 1.0, 2.5, 4.2, 9.1, 17.3])
-    every = np.array(list(itertools.product(values, repeat=6))).mean(axis=1)
-    z0 = stats.norm.ppf((every < values.mean()).mean() + (every == values.mean()).mean() / 2)
-    left_out = np.array([np.delete(values, i).mean() for i in range(6)])
-    spread = left_out.mean() - left_out
+@pytest.mark.parametrize(
+    ("samples", "weights"),
+    [
+        ([[0.0, 1.0, 2.5, 4.2, 9.1, 17.3]], [1]),
+        ([[0.0, 2.1, 5.3, 12.7], [3.0, 4.6, 5.9, 9.2]], [1, -1]),
+    ],
+)
+def test_bca_interval_against_all_resamples(samples, weights):
+    """The formula of Efron & Tibshirani (1993, equation 14.10) on all resamples."""
+    parts = [*zip(weights, map(np.array, samples), strict=True)]
+    means = [w * np.array([*itertools.product(of, repeat=len(of))]).mean(1) for w, of in parts]
+    every = sum(np.meshgrid(*means)).ravel().round(9)
+    value = round(sum(w * of.mean() for w, of in parts), 9)
+    z0 = stats.norm.ppf((every < value).mean() + (every == value).mean() / 2)
+    spread = np.array([
+        w * (of.mean() - np.delete(of, i).mean()) for w, of in parts for i in range(len(of))
+    ])  # fmt: skip
     a = (spread**3).sum() / (6 * (spread**2).sum() ** 1.5)
     z = z0 + stats.norm.ppf([0.025, 0.975])
     low, high = np.quantile(every, stats.norm.cdf(z0 + z / (1 - a * z)))
-    interval = statistics.mean(values, resamples=20_000)
+    interval = statistics.mean_of_means([of for _, of in parts], weights, 20_000)
     assert (interval.low, interval.high) == pytest.approx((low, high), abs=0.25)
 
 
@@ -164,44 +173,3 @@ def test_share_test():
     assert test.p == pytest.approx(0.75**20)
     assert hypotheses.share_test(0, 20, 0.75, "less").p == pytest.approx(0.25**20)
     assert hypotheses.share_test(15, 20, 0.75, "greater").p > 0.5
-
-
-POPULATIONS = {
-    "ticks": lambda rng, n: -300 + rng.normal(0, 3, n).round(),
-    "skewed": lambda rng, n: -300 - rng.exponential(8, n).round(),
-    "two levels": lambda rng, n: np.where(
-        rng.random(n) < 0.7, -331 + rng.normal(0, 5, n), -355 + rng.normal(0, 1, n)
-    ).round(),
-}
-"""Rewards as they occur: with ties, skewed, and on two levels, by the hands that are learned."""
-RUNS, RESAMPLES = 20, 999
-
-
-def holds(interval, truth):
-    return interval.low - 1e-9 <= truth <= interval.high + 1e-9
-
-
-def right_of_rewards(rng, draw, mean):
-    """Whether each interval holds the truth, and each test does not reject it, of two samples."""
-    a, b = draw(rng, RUNS), draw(rng, RUNS)
-    few = {"resamples": RESAMPLES}
-    return [
-        holds(statistics.mean(a, **few), mean),
-        holds(statistics.difference_of_means(a, b, **few), 0),
-        holds(statistics.mean(a - b, **few), 0),
-        hypotheses.bootstrap_test(a, mean, **few).p > LEVEL,
-        hypotheses.bootstrap_test(a, b, **few).p > LEVEL,
-        hypotheses.sign_flip_test(a - b).p > LEVEL,
-    ]
-
-
-@pytest.mark.parametrize("population", POPULATIONS)
-def test_procedures_are_calibrated_on_rewards_with_a_known_truth(population):
-    """About 95 of 100 samples are right; intervals of half their width would be in 67. No interval
-    of a mean holds 5 ticks in place of -300."""
-    draw = POPULATIONS[population]
-    mean = float(draw(np.random.default_rng(1), 1_000_000).mean())
-    rng = np.random.default_rng(0)
-    rates = np.mean([right_of_rewards(rng, draw, mean) for _ in range(100)], axis=0)
-    assert (rates >= 0.8).all(), rates
-    assert not right_of_rewards(rng, draw, 5.0)[0]
