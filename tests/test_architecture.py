@@ -142,12 +142,12 @@ def members_of(tree):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             members.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            if ast.unparse(targets[0]) == "__all__":
+            name = ast.unparse(node).partition(" =")[0].partition(":")[0]
+            if name == "__all__":
                 return {*ast.literal_eval(node.value)}
             if isinstance(following, ast.Expr):
-                members |= {target.id for target in targets if isinstance(target, ast.Name)}
-    return {name for name in members if not name.startswith("_")}
+                members.add(name)
+    return {name for name in members if re.fullmatch(r"[A-Za-z]\w*", name)}
 
 
 @cache
@@ -158,11 +158,12 @@ def is_public(full):
     pages = public_names()
     if leads_to_a_page(full) or name in pages.get(module, ()):
         return True
-    package = importlib.import_module(module) if leads_to_a_page(module) else None
-    if name not in getattr(package, "__all__", ()):
+    homes = [home for home, names in pages.items() if name in names]
+    if not leads_to_a_page(module) or not homes:
         return False
-    homes = [importlib.import_module(home) for home, names in pages.items() if name in names]
-    return any(getattr(home, name) is getattr(package, name) for home in homes)
+    package, *homes = map(importlib.import_module, (module, *homes))
+    exported = name in getattr(package, "__all__", ())
+    return exported and any(getattr(home, name) is getattr(package, name) for home in homes)
 
 
 def leads_to_a_page(module):
@@ -273,19 +274,12 @@ def test_a_list_of_names_needs_no_compiler():
 
 def has_encoding(call):
     """Whether a call that reads or writes text names the encoding; all other calls have it."""
-    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-    keywords = {keyword.arg: keyword.value for keyword in call.keywords}
-    if keywords.keys() & {"encoding", "errors"} or name not in (
-        "open", "read_text", "write_text",
-    ):  # fmt: skip
+    name, *arguments = map(ast.unparse, (call.func, *call.args))
+    if not re.search(r"^(?!os\.|webbrowser\.).*\b(open|read_text|write_text)$", name, re.DOTALL):
         return True
-    if name in ("read_text", "write_text"):
-        return len(call.args) > (name == "write_text")
-    if ast.unparse(call.func) in ("os.open", "webbrowser.open"):
+    if {keyword.arg for keyword in call.keywords} & {"encoding", "errors"}:
         return True
-    place = 1 if isinstance(call.func, ast.Name) else 0
-    mode = call.args[place] if len(call.args) > place else keywords.get("mode")
-    return isinstance(mode, ast.Constant) and "b" in str(mode.value)
+    return bool(arguments and re.fullmatch(r"'(utf-8(-sig)?|[arwx]b)'", arguments[-1]))
 
 
 def test_texts_are_read_and_written_in_an_encoding_that_is_named():

@@ -120,26 +120,26 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
     frame = small_frame(task=["t", "u"])
     for names in (["method", "run"], "reward"):
         named = frame.set_index(names, drop=False)
-        assert frames.gaps(named).tolist() == frames.gaps(frame).tolist()
-        pd.testing.assert_frame_equal(frames.ranking(named), frames.ranking(frame))
-        pd.testing.assert_frame_equal(frames.ecdf(named, [0.1]), frames.ecdf(frame, [0.1]))
-        means = frames.means(named, "method", "reward")
-        pd.testing.assert_frame_equal(means, frames.means(frame, ["method"], ["reward"]))
+        for compute in (
+            frames.ranking, lambda of: frames.ecdf(of, [0.1]),
+            lambda of: frames.means(of, "method", "reward"),
+        ):  # fmt: skip
+            pd.testing.assert_frame_equal(compute(named), compute(frame))
     assert frames.gaps(frame.set_index("run")).index.name == "run"
 
 
 @pytest.mark.parametrize(
     ("words", "compute", "changes", "arguments"),
     [
-        ("by is empty: needed are names", frames.means, {}, ([], ["reward"])),
-        ("by is 3: needed are names", frames.means, {}, (3, ["reward"])),
-        ("it names a column twice", frames.means, {}, (["method", "method"], ["reward"])),
-        ("column reward is in by and in columns", frames.means, {}, (["reward"], ["reward"])),
+        *((words, frames.means, {}, (by, ["reward"])) for words, by in (
+            ("by is empty: needed are names", []),
+            ("by is 3: needed are names", 3),
+            ("it names a column twice", ["method", "method"]),
+            ("column reward is in by and in columns", ["reward"]),
+        )),
         ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
-        ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
         ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
-        *(("targets are", frames.ecdf, {}, (targets,))
-          for targets in ([], 0.1, [-0.1], ["a"], [np.nan], [50])),
+        *(("targets are", frames.ecdf, {}, (gaps,)) for gaps in ([], 0.1, [-0.1], ["a"], [50])),
     ],
 )  # fmt: skip
 def test_arguments_that_cannot_be_meant_are_refused(words, compute, changes, arguments):
@@ -179,20 +179,20 @@ def test_verdicts_of_planted_means(monkeypatch):
     monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
     rng = np.random.default_rng(2)
     above, below = 5 + rng.normal(size=30), -5 + rng.normal(size=30)
-    claims = {
-        "above": mean_beyond("{}", above, 1.0),
-        "not above": mean_beyond("{}", below, 1.0),
-        "below": mean_beyond("{}", below, 1.0, "less"),
-        "both": all_of(mean_beyond("{}", above, 1.0), mean_beyond("{}", below, 1.0, "less")),
-        "one not": all_of(mean_beyond("{}", above, 1.0), mean_beyond("{}", below, 1.0)),
-        "open": mean_beyond("{}", rng.normal(size=30)),
-        "few": mean_beyond("{}", [1.0, np.nan]),
-    }
-    judged = judge({name: ("", "", finding) for name, finding in claims.items()})
-    assert judged.verdict.to_dict() == {
-        "above": "supported", "not above": "not supported", "below": "supported",
-        "both": "supported", "one not": "not supported", "open": "undecided", "few": "undecided",
-    }  # fmt: skip
+    is_above, is_not, is_below = (
+        mean_beyond("{}", values, 1.0, side)
+        for values, side in ((above, "greater"), (below, "greater"), (below, "less"))
+    )
+    for finding, verdict in (
+        (is_above, "supported"),
+        (is_not, "not supported"),
+        (is_below, "supported"),
+        (all_of(is_above, is_below), "supported"),
+        (all_of(is_above, is_not), "not supported"),
+        (mean_beyond("{}", rng.normal(size=30)), "undecided"),
+        (mean_beyond("{}", [1.0, np.nan]), "undecided"),
+    ):
+        assert judge({"": ("", "", finding)}).verdict.tolist() == [verdict]
     with pytest.raises(CoarticError, match="one finding at least"):
         all_of(*[])
     with pytest.raises(CoarticError, match="unknown side"):

@@ -5,7 +5,6 @@ import re
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from coartic import Task, load_task
 from coartic.analysis import standings
@@ -16,7 +15,6 @@ from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
 from coartic.analysis.statistics import running_times
 from coartic.analysis.words import number
-from coartic.estimates import SEED
 from tests.support.golden import golden
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
@@ -33,7 +31,6 @@ def test_which_tasks_are_ranked_does_not_depend_on_the_corrective_process():
     seen = study_of(rows, tasks, optima=best, rewards=lambda: iter(()))
     ranked = TABLES["ranking"](seen)
     assert ranked.gap.to_dict() == pytest.approx({"two": 11 / 319 / 2, "one": 0.1 / 2})
-    assert not costs.spans(seen)
     assert TABLES["runtimes"](seen).empty
     assert FIGURES["runtimes"](seen) is None
 
@@ -43,21 +40,6 @@ LEARNER = {("ascending", EC1): [-300, -301, -302, -303],
            ("two-armed-1", "dual-process/EC4"): [-480, -481, -482, -483]}  # fmt: skip
 CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
        ("two-armed-1", "cma-es/bandit"): [-466, -467, -468, -466]}  # fmt: skip
-
-
-def test_on_one_task_intervals_are_of_the_gaps_themselves():
-    """Of skewed rewards, so that the ends are not alike; without spread a point."""
-    rewards = [-310, -300, -301, -302, -300, -300]
-    seen = study({("ascending", "dual-process/EC1"): rewards, ("ascending", "mine"): [-322] * 3})
-    gap = (np.array(rewards) + 292) / -292
-    ends = stats.bootstrap((gap,), np.mean, n_resamples=9_999, rng=np.random.default_rng(SEED))
-    low, high = ends.confidence_interval
-    assert high - gap.mean() > 1.3 * (gap.mean() - low) > 0
-    table = standings.board(seen)[["gap", "gap_low", "gap_high"]]
-    assert table.loc["dual-process/EC1"].tolist() == pytest.approx(
-        [gap.mean(), low, high], rel=0.01
-    )
-    assert table.loc["mine"].tolist() == pytest.approx([30 / 292] * 3)
 
 
 def test_the_learner_is_joined_with_each_form():
@@ -88,10 +70,7 @@ def test_crossings_by_brute_force():
     budgets = np.unique(np.concatenate([part.ravel() for part in spends]))
     for level in (0.1, 0.25, 0.5, 0.9):
         least = next((b for b in budgets if share(b) >= level - 1e-12), math.inf)
-        crossing = running_times.budget_for(spends, level)
-        assert crossing.value == least
-        assert crossing.low <= least <= crossing.high or math.isinf(least)
-    assert math.isnan(running_times.budget_for([spends[0][:2]], 0.5).low)  # too few runs
+        assert running_times.budget_for(spends, level).value == least
     at = np.quantile(budgets, [0.1, 0.5])
     drawn = [
         np.mean([(part[rng.integers(0, len(part), len(part))][..., None] <= at).mean((0, 1))
@@ -201,14 +180,11 @@ def test_the_ranking_figure_has_every_name_gap_and_interval():
 
 
 def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
-    rewards = LEARNER | CMA | {("two-armed-2", "mine"): [-310, -308]}
-    seen = study(rewards)
+    rewards = LEARNER | CMA | {("two-armed-2", name): [-310] for name in ("mine", "theirs")}
     optima = made_up_optima("ascending", "two-armed-1")
-    assert standings.common_tasks(MadeUp(seen, optima=optima)) == ("ascending", "two-armed-1")
-    both = study(rewards | {("two-armed-2", "theirs"): [-300]})
-    optima |= {"two-armed-2": BestKnown(-300, None, only_here=True)}
-    both = MadeUp(both, optima=optima)
-    assert standings.common_tasks(both) == ("ascending", "two-armed-1")
+    for known in ({}, {"two-armed-2": BestKnown(-300, None, only_here=True)}):
+        seen = study(rewards, optima=optima | known)
+        assert standings.common_tasks(seen) == ("ascending", "two-armed-1")
     one_in_common = {("ascending", name): [-300] for name in ("one", "two", "three")}
     one_in_common |= {("two-armed-1", "one"): [-500], ("two-armed-2", "two"): [-310]}
     assert standings.common_tasks(study(one_in_common)) == ("ascending",)
@@ -241,15 +217,6 @@ def test_an_own_method_stands_next_to_others_on_the_tasks_that_it_solved():
     assert math.isnan(rows.difference_low.iloc[1])  # of two runs there is no interval
     texts = render.texts_of(TABLES["own"], rows, "difference")
     assert texts[1].startswith(number(100 * rows.difference.iloc[1], 1))  # per cent, as the gaps
-    # Of runs that have the same seeds the interval is for independent ones, as in the ranking.
-    rewards, drawn = np.array([-309, -301, -305, -304]), np.random.default_rng(0)
-    row_of = TABLES["own"](study(TEN | {("ascending", "mine"): list(rewards)})).loc[
-        "mine dual-process/EC1"
-    ]
-    each = (SPREAD - 303) / -292, rewards / -292
-    means = [drawn.choice(of_method, (20_000, len(of_method))).mean(1) for of_method in each]
-    due = np.quantile(means[0] - means[1], [0.025, 0.975])
-    assert [row_of.difference_low, row_of.difference_high] == pytest.approx(due.tolist(), abs=2e-3)
 
 
 def with_parameters():
@@ -281,11 +248,10 @@ def test_settings_stand_behind_their_method_in_the_ranking():
     means = [1480 / 3, 1492 / 3]
     assert of_settings.gap.tolist() == pytest.approx([(mean - 292) / 292 for mean in means])
     assert (of_settings.gap_low < of_settings.gap_high).all()
-    # A setting of an ablation stands behind the ablation.
     ablation = f"{EC1}-subtask"
-    of_ablation = runs_of("ascending", ablation, [-520] * 3)
-    of_ablation += runs_of("ascending", ablation, [-510] * 3, setting="noise_sd=0.1")
-    both = TABLES["ranking"](with_settings("", more=of_ablation)).index.tolist()
+    more = runs_of("ascending", ablation, [-520] * 3)
+    more += runs_of("ascending", ablation, [-510] * 3, setting="noise_sd=0.1")
+    both = TABLES["ranking"](with_settings("", more=more)).index.tolist()
     assert both == [EC1, ablation, f"{ablation} noise_sd=0.1"]
     without = with_settings("noise_sd=0.1", "noise_sd=0.2", more=between)
     assert TABLES["ranking"](without).index.tolist() == [settings[0], "hill-climbing", settings[1]]
