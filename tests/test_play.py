@@ -20,12 +20,9 @@ from coartic.learner.conditions import load_condition
 from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play.page import FOLDER
 from coartic.robot import HANDS
-from coartic.tasks.task import hands_of
 from tests.support.strategies import (
     PAPER_CELLS,
-    make_trials,
     metres_task,
-    sample,
     shipped_optima,
     uneven_task,
 )
@@ -33,12 +30,6 @@ from tests.support.strategies import (
 MODEL = FOLDER / "model.js"
 NODE = shutil.which("node")
 pytestmark = [pytest.mark.process, pytest.mark.skipif(NODE is None, reason="Node is not installed")]
-
-TASKS = [
-    *("ascending", "two-armed-1", "two-armed-2"),
-    *("one-armed/v1/i000", "long/v1/i000", "aligned/v1/i002", "redundancy/v1/i007"),
-]
-
 
 OWN = {
     "uneven": uneven_task(locked_base=["x"]),
@@ -71,96 +62,17 @@ def content(task):
     return task.model_dump(mode="json")
 
 
-def listed(array):
-    """An array with None for NaN."""
-    return np.where(np.isnan(array), None, np.asarray(array, dtype=object)).tolist()
-
-
-TRIALS = """(task, cases) => {
-  const problem = coartic.problem_of(task);
-  return cases.map(([hands, targets]) => {
-    const rows = targets.map((row) => row.some((value) => value !== null)
-      ? row.map((value) => value === null ? NaN : value) : null);
-    const codes = [...hands].map((letter) => "LR".indexOf(letter));
-    const trial = coartic.make_trial(problem, codes, rows);
-    const { going, ticks, reached, movements } = trial;
-    const corrections = movements.filter((m) => m.kind === "corrective" && m.ticks).length;
-    return { going, ticks, reached, corrections };
-  });
-}"""
-
-
-@pytest.mark.parametrize("name", [*TASKS, "uneven", "metres", "millimetre"])
-def test_random_trials_are_those_of_the_package(name):
-    task = uneven_task() if name == "uneven" else OWN.get(name) or load_task(name)
-    rng = np.random.default_rng(5)
-    halves = [sample(task, 50, noise, seed=7) for noise in (0.05, 0.5)]
-    hands, targets = halves[0][0] + halves[1][0], np.concatenate([half[1] for half in halves])
-    targets[rng.random(targets.shape) < 0.1] = np.nan  # joints that keep their value
-    targets[rng.random(targets.shape[:2]) < 0.2] = np.nan  # goals that are left to A
-    ours = make_trials(task, hands, targets)
-    cases = list(zip(hands, listed(targets), strict=True))
-    theirs = node(TRIALS, content(task), cases)
-    assert [trial["going"] for trial in theirs] == ours.completed.tolist()
-    assert sum(ours.completed) > 80
-    assert [trial["ticks"] for trial in theirs] == ours.ticks.tolist()
-    assert [trial["corrections"] for trial in theirs] == ours.corrections.tolist()
-    for trial, reached in zip(theirs, ours.reached, strict=True):
-        hit = reached[~np.isnan(reached[:, 0])]
-        np.testing.assert_allclose(np.reshape(trial["reached"], hit.shape), hit, rtol=0, atol=1e-9)
-
-
-EXECUTE = """(task, solutions) => {
-  const problem = coartic.problem_of(task);
-  return solutions.map((movements) => {
-    const trial = coartic.execute(problem, movements);
-    const { rows, hits } = coartic.trajectory(problem, trial);
-    const made = trial.movements.map((m) => [m.goal + 1, m.hand, m.kind, m.ticks]);
-    return { reward: trial.reward, made, rows, hits };
-  });
-}"""
-
-
-def test_straight_solutions_are_executed_tick_by_tick():
-    task = load_task("two-armed-1")
-    rng = np.random.default_rng(3)
-    hands, targets = sample(task, 60, noise=0.2, seed=11)
-    solutions = []
-    for letters, rows in zip(hands, targets, strict=True):
-        movements = []
-        for number, (hand, target) in enumerate(zip(hands_of(letters), rows, strict=True), 1):
-            kind = str(rng.choice(["learned", "planned", "corrective"]))
-            gone = None if kind == "corrective" and rng.random() < 0.5 else target
-            movements.append(Movement(number, hand, kind, gone))
-        solutions.append(movements)
-    plain = [
-        [{"goal": m.goal - 1, "hand": HANDS.index(m.hand), "kind": m.kind,
-          "target": None if m.target is None else m.target.tolist()} for m in movements]
-        for movements in solutions
-    ]  # fmt: skip
-    theirs, completed = node(EXECUTE, content(task), plain), 0
-    for movements, film in zip(solutions, theirs, strict=True):
-        outcome = execute(task, movements)
-        made = [[m.goal, HANDS.index(m.hand), m.kind, m.ticks] for m in outcome.movements]
-        assert film["made"][: len(made)] == made
-        assert film["reward"] == outcome.reward
-        if not outcome.completed:
-            continue
-        ours = trajectory(task, movements)
-        completed += 1
-        assert film["hits"] == ours.hits.tolist()
-        np.testing.assert_allclose(film["rows"], ours.configurations, rtol=0, atol=1e-9)
-    assert completed > 10
-
-
 LEARN = """(cases) => cases.map(([task, id, drift, seed, trials]) => {
   const problem = coartic.problem_of(task);
   const [condition, credit] = id.split("-");
   const rules = { ...coartic.CONDITIONS[condition], drift, ...(credit && { credit }) };
   const learner = new coartic.Learner(problem, rules, BigInt(seed));
   const rewards = Array.from({ length: trials }, () => learner.step().reward);
-  const { hands, reached } = learner.learned();
-  return { rewards, replay: learner.replay().reward, learned: coartic.letters_of(hands), reached };
+  const { hands, reached, movements } = learner.learned();
+  const made = coartic.execute(problem, movements);
+  const { rows, hits } = coartic.trajectory(problem, made);
+  const learned = [coartic.letters_of(hands), learner.replay().reward, made.reward];
+  return { rewards, learned, reached, rows, hits };
 })"""
 RUNS = [
     *((task, condition, 0, 7) for task, condition in PAPER_CELLS),
@@ -185,7 +97,7 @@ RUNS = [
 
 
 def test_the_same_seed_learns_the_same_trial_by_trial():
-    trials = 500
+    trials = 300
     tasks = [OWN.get(name) or load_task(name) for name, *_ in RUNS]
     cases = [
         (content(task), of, drift, str(seed), trials)
@@ -196,10 +108,11 @@ def test_the_same_seed_learns_the_same_trial_by_trial():
         ours = learn(task, condition, seed=seed, trials=trials)
         rewards = [None if reward is np.ma.masked else int(reward) for reward in ours.rewards]
         assert run["rewards"] == rewards
-        assert run["replay"] == ours.replay_reward
-        assert run["learned"] == ours.hands
-        reached = ours.execute().configurations
-        np.testing.assert_allclose(run["reached"], reached, rtol=0, atol=1e-9)
+        made, film = ours.execute(), trajectory(task, ours.learned)
+        assert run["learned"] == [ours.hands, ours.replay_reward, made.reward]
+        assert run["hits"] == film.hits.tolist()
+        np.testing.assert_allclose(run["rows"], film.configurations, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(run["reached"], made.configurations, rtol=0, atol=1e-9)
         assert len(set(rewards)) > 10
 
 

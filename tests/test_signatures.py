@@ -10,7 +10,12 @@ import pytest
 from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task, movements_of
-from coartic.analysis import control
+from coartic.analysis.control import (
+    contexts_of_control,
+    control_suite,
+    mean_excess,
+    with_control,
+)
 from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.signatures import context_tests, measures
@@ -274,49 +279,48 @@ FEW_CONTROLS = "undecided: too few runs of random search"
 
 
 @pytest.mark.parametrize(
-    ("method", "difference", "runs", "of_random_search", "its_runs", "its_trials", "verdict"),
+    ("method", "difference", "runs", "verdict", "control"),
     [
-        (EC1, 2.0, MANY, 0.5, MANY, 10, "different postures"),
-        (EC1, 0.5, MANY, 0.5, MANY, 10, "no more than random search"),
-        (EC1, 0.5, MANY, 2.0, MANY, 10, "no more than random search"),
-        (EC1, 0.0, MANY, 0.5, MANY, 10, "no significant difference"),
-        (EC1, 2.0, (2, 2), 0.5, MANY, 10, "too few runs"),
-        (EC1, 2.0, MANY, 0.5, ONE, 10, FEW_CONTROLS),
-        (EC1, 2.0, MANY, 0.5, MANY, 9, FEW_CONTROLS),  # fewer trials than the learner's
+        (EC1, 2.0, MANY, "different postures", {}),
+        (EC1, 0.5, MANY, "no more than random search", {}),
+        (EC1, 0.5, MANY, "no more than random search", {"difference": 2.0}),
+        (EC1, 0.0, MANY, "no significant difference", {}),
+        (EC1, 2.0, (2, 2), "too few runs", {}),
+        (EC1, 2.0, MANY, FEW_CONTROLS, {"runs": ONE}),
+        (EC1, 2.0, MANY, FEW_CONTROLS, {"trials": 9}),  # fewer than the learner's
         # Methods without trials select nothing; of one that draws nothing there is no test.
-        ("plan", 0.0, ONE, 0.5, MANY, 10, "the same posture"),
-        ("plan", 0.5, ONE, 0.5, MANY, 10, "different postures"),
-        ("mine", 0.5, ONE, 0.5, MANY, 10, "too few runs"),
+        ("plan", 0.0, ONE, "the same posture", {}),
+        ("plan", 0.5, ONE, "different postures", {}),
+        ("mine", 0.5, ONE, "too few runs", {}),
         # Of 41 divisions one is as far apart: below 5 %.
-        ("mine", 0.5, (40, 1), 0.5, MANY, 10, "too few runs"),
-        ("mine", 0.5, (9, 9), 0.5, MANY, 10, "different postures"),
-        ("mine", 0.0, (9, 9), 0.5, MANY, 10, "no significant difference"),
+        ("mine", 0.5, (40, 1), "too few runs", {}),
+        ("mine", 0.5, (9, 9), "different postures", {}),
+        ("mine", 0.0, (9, 9), "no significant difference", {}),
     ],
 )
-def test_verdicts_on_postures_at_a_shared_goal(
-    method, difference, runs, of_random_search, its_runs, its_trials, verdict
-):
+def test_verdicts_on_postures_at_a_shared_goal(method, difference, runs, verdict, control):
     """Bases differ so much at goal 1 by the next goal, in so many runs on each of two tasks."""
+    planted = {"difference": 0.5, "runs": MANY, "trials": 10} | control
     cells = [
         posed(load_task(name), label, [posture(x + each) for each in noise[:count]])
         for label, shift, counts in (
-            (method, difference, runs), (RANDOM_SEARCH, of_random_search, its_runs)
+            (method, difference, runs), (RANDOM_SEARCH, planted["difference"], planted["runs"])
         )
         for noise in [0.1 * rng(2).standard_normal(40)]
         for name, x, count in zip(ONE_ARMED, (0.0, shift), counts, strict=True)
     ]  # fmt: skip
     study = study_of_solutions(cells, deterministic=["plan"])
     of_control = study.runs.method == RANDOM_SEARCH
-    study.runs["trials"] = np.where(of_control, its_trials, 10 * (method == EC1))
-    assert control.selects(study, method) == (method == EC1)
+    study.runs["trials"] = np.where(of_control, planted["trials"], 10 * (method == EC1))
     contexts = coarticulation.shared_goal(study)
     assert contexts.method == method
     assert coarticulation.verdict_of(study, contexts) == verdict
-    compared = control.contexts_of_control(study, contexts)
+    compared = contexts_of_control(study, contexts)
+    assert compared is None or method == EC1
     if compared is not None:
-        assert compared.posture_difference == pytest.approx(of_random_search)
+        assert compared.posture_difference == pytest.approx(planted["difference"])
         # Random search is not compared itself.
-        assert control.contexts_of_control(study, compared) is None
+        assert contexts_of_control(study, compared) is None
 
 
 def shifted(task, label, first, *, others=-20, shift=0.0, hands="RRR"):
@@ -347,21 +351,21 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_p
         rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 3, setting=setting, trials=trials,
                         hands=hands)  # fmt: skip
     study = study_of_solutions(cells, rows)
-    compared = control.with_control(study, "first", task.name, EC4)
+    compared = with_control(study, "first", task.name, EC4)
     assert {each: [v.tolist() for v in pair] for each, pair in compared.items()} == {
         "RRRR": [[5] * 18, [2, 3, 400]],
         "RLRR": [[9] * 3, []],
     }
-    assert control.mean_excess(study, "first", task.name, EC4) == 5 - 135
+    assert mean_excess(study, "first", task.name, EC4) == 5 - 135
     table = TABLES["signatures"](study).loc[f"{task.name} {EC4} RRRR"]
     test = bootstrap_test([5.0] * 18, [2.0, 3.0, 400.0])
     assert (table["first"], table.first_control, table.first_p) == (5, 135, test.p)
     assert (table.runs, table.control_runs) == (18, 3)
-    (tmp_path / "control.toml").write_text(control.control_suite(study), "utf-8")
+    (tmp_path / "control.toml").write_text(control_suite(study), "utf-8")
     (job,) = plan_suite(tmp_path / "control.toml")
-    assert (job.cell.task.name, job.cell.method.name) == (task.name, "random-search")
-    assert len(job.numbers) == 20
-    assert (job.cell.parameters["hands"], job.cell.parameters["trials"]) == ("RLRR", 10)
+    cell = job.cell
+    assert (cell.task.name, cell.method.name, len(job.numbers)) == (task.name, RANDOM_SEARCH, 20)
+    assert (cell.parameters["hands"], cell.parameters["trials"]) == ("RLRR", 10)
 
 
 def test_p_of_shared_goals_is_corrected_by_method():
