@@ -12,9 +12,7 @@ from coartic.analysis import load
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
-from coartic.analysis.sections.learning import learning_curves
 from coartic.analysis.sections.ranking import name_in_figure
-from coartic.analysis.study import solved
 from tests.support.figures import misplaced
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, ROOT
@@ -74,23 +72,6 @@ def test_a_figure_has_chosen_methods_tasks_and_style(shipped, tmp_path):
 def test_the_gallery_shows_every_figure():
     shown = re.findall(r'FIGURES\["([^"]+)"\]', (ROOT / "docs" / "gallery.md").read_text("utf-8"))
     assert sorted(shown) == sorted(FIGURES)
-
-
-def test_learning_curves_against_a_loop(traced):
-    data = learning_curves(traced)
-    rewards = dict(traced.rewards())
-    spread = 0
-    for key, rows in data.groupby(["task", "method"]):
-        runs = [rewards[run_id] for run_id in solved(traced.cells[key]).run_id]
-        assert rows.trial.iloc[[0, -1]].tolist() == [1, 150]
-        for point in rows.itertuples():
-            best = sorted(np.nanmax(run[: point.trial]) for run in runs)
-            assert point.best == pytest.approx(np.mean(best))
-            # Quartiles of four runs lie a quarter of the way from the inner to the outer ones.
-            assert point.best_low == pytest.approx(best[0] + 0.75 * (best[1] - best[0]))
-            assert point.best_high == pytest.approx(best[3] - 0.75 * (best[3] - best[2]))
-            spread += point.best_low < point.best_high
-    assert spread > 100
 
 
 def test_names_and_looks_tell_methods_apart():

@@ -8,13 +8,12 @@ import pytest
 
 import coartic
 from coartic import CoarticError
-from coartic.analysis import frames, judging, load, pages
+from coartic.analysis import frames, judging, pages
 from coartic.analysis.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics import instances
 from coartic.analysis.words import p_value
-from coartic.benchmarks import run_suite
 from coartic.learner import learning
 from tests.support.made_up import row, study_of
 
@@ -230,31 +229,29 @@ def test_runs_with_another_base_have_no_gap():
     assert frames.ranking(tidied).gap.tolist() == pytest.approx([8 / 292])
 
 
-def test_runs_are_tidy(tmp_path, in_this_process):
+def test_runs_are_tidy(traced):
     """Columns of a folder's runs against its tasks; signatures and postures against executions."""
-    chosen = {"tasks": ["two-armed-1"], "methods": ["EC3", "corrective-alone/given"]}
-    run_suite("paper", tmp_path / "runs", runs=3, trials=50, **chosen)
-    study = load(tmp_path / "runs")
-    runs = study.runs
+    runs = traced.runs[traced.runs.task == "two-armed-1"]
     assert runs.family.isna().all()
     assert {*runs.attrs["units"]} < {*runs}
-    assert runs.goals.tolist() == [4] * 4
-    assert runs.noise_sd.dropna().tolist() == [0.05] * 3
+    assert (runs.goals == 4).all()
+    assert {*runs.noise_sd.dropna()} == {0.05, 0.1}
     best = coartic.objective("two-armed-1").best_known
     assert runs.gap.to_numpy() == pytest.approx((-best - runs.reward).to_numpy(float) / best)
-    learned = study.executed("two-armed-1", "EC3")
-    assert learned.run_ids == tuple(runs.run_id[:3])
-    postures = study.configurations("two-armed-1", "dual-process/EC3")
+    of_learner = runs.label == "dual-process/EC3"
+    learned = traced.executed("two-armed-1", "EC3")
+    assert learned.run_ids == tuple(runs.run_id[of_learner])
+    postures = traced.configurations("two-armed-1", "dual-process/EC3")
     np.testing.assert_array_equal(postures, [run.configurations for run in learned.runs])
+    replays = traced.executed("two-armed-1", "dual-process/EC3", replay=True)
     for name, signature in SIGNATURES.items():
-        of_learner = study.signature(name, replay=True)[runs.method == "dual-process/EC3"]
-        replays = study.executed("two-armed-1", "dual-process/EC3", replay=True)
-        np.testing.assert_array_equal(of_learner, signature.each(replays))
-    assert study.signature("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
+        values = traced.signature(name, replay=True)[runs.index]
+        np.testing.assert_array_equal(values[of_learner], signature.each(replays))
+        assert values[~runs.method.str.startswith("dual-process")].isna().all()
     with pytest.raises(CoarticError, match="did you mean 'two-armed-1'"):
-        study.executed("two-armed", "EC3")
+        traced.executed("two-armed", "EC3")
     with pytest.raises(CoarticError, match="did you mean 'first'"):
-        study.signature("frist")
+        traced.signature("frist")
 
 
 def planted_scores():

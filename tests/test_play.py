@@ -17,7 +17,6 @@ from coartic import (
     trajectory,
 )
 from coartic.learner.conditions import load_condition
-from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play.page import FOLDER
 from coartic.robot import HANDS
 from tests.support.strategies import (
@@ -32,6 +31,10 @@ NODE = shutil.which("node")
 pytestmark = [pytest.mark.process, pytest.mark.skipif(NODE is None, reason="Node is not installed")]
 
 OWN = {
+    **{
+        policy: load_task("two-armed/v1/i000").model_copy(update={"initial_hands": policy})
+        for policy in ("best-of-all", "best-single-hand")
+    },
     "uneven": uneven_task(locked_base=["x"]),
     "metres": metres_task(),
     "millimetre": metres_task(radius=1e-3),
@@ -47,19 +50,13 @@ def node(script, *given):
     program = f"""
       const coartic = require({json.dumps(str(MODEL))});
       const given = JSON.parse(require("fs").readFileSync(0, "utf8"));
-      Promise.resolve(({script})(...given))
-        .then((answer) => process.stdout.write(JSON.stringify(answer)));
+      process.stdout.write(JSON.stringify(({script})(...given)));
     """
-    text = json.dumps(given)  # NaN has no place in it: None
     done = subprocess.run(
-        [NODE, "-e", program], input=text, capture_output=True, text=True, check=False
+        [NODE, "-e", program], input=json.dumps(given), capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
-
-
-def content(task):
-    return task.model_dump(mode="json")
 
 
 LEARN = """(cases) => cases.map(([task, id, drift, seed, trials]) => {
@@ -77,16 +74,12 @@ LEARN = """(cases) => cases.map(([task, id, drift, seed, trials]) => {
 RUNS = [
     *((task, condition, 0, 7) for task, condition in PAPER_CELLS),
     ("descending", "EC1-subtask", 0, 2**100 + 3),
-    ("two-armed-1", "EC4-subtask", 0, 0),
-    ("two-armed/v1/i003", "EC4", 0, 2**63 - 1),
+    ("best-of-all", "EC4", 0, 0),
+    ("best-single-hand", "EC4", 0, 2**63 - 1),
     ("ascending", "EC1", 0.03, 1),
-    ("descending", "EC1", 1, 2),
     ("descending", "EC1-subtask", 0.3, 3),
     ("two-armed-1", "EC2", 0.1, 4),  # the base is on a rail
     ("two-armed-1", "EC3", 1, 5),
-    ("two-armed-1", "EC4", 0.3, 6),
-    ("two-armed-2", "EC3", 0.3, 7),
-    ("two-armed-2", "EC4", 1, 8),
     ("long/v1/i000", "EC4", 0.3, 9),
     ("redundancy/v1/i007", "EC1", 0.3, 10),
     ("uneven", "EC4", 0.3, 11),
@@ -100,7 +93,7 @@ def test_the_same_seed_learns_the_same_trial_by_trial():
     trials = 300
     tasks = [OWN.get(name) or load_task(name) for name, *_ in RUNS]
     cases = [
-        (content(task), of, drift, str(seed), trials)
+        (task.model_dump(mode="json"), of, drift, str(seed), trials)
         for task, (_, of, drift, seed) in zip(tasks, RUNS, strict=True)
     ]
     for task, (_, of, drift, seed), run in zip(tasks, RUNS, node(LEARN, cases), strict=True):
@@ -116,27 +109,6 @@ def test_the_same_seed_learns_the_same_trial_by_trial():
         assert len(set(rewards)) > 10
 
 
-def test_random_numbers_are_numpys():
-    script = """(seeds, count) => seeds.map((seed) => {
-      const rng = new coartic.Generator(BigInt(seed));
-      return Array.from({ length: count }, (_, k) => k % 3 ? rng.standard_normal() : rng.random());
-    })"""
-    seeds, count = [0, 1, 2**32, 2**63 - 25, 2**128 - 1], 15_000  # the tail is 1 in 4000
-    for seed, draws in zip(seeds, node(script, list(map(str, seeds)), count), strict=True):
-        rng = np.random.default_rng(seed)
-        ours = [rng.standard_normal() if k % 3 else rng.random() for k in range(count)]
-        np.testing.assert_allclose(draws, ours, rtol=0, atol=1e-14)
-
-
-@pytest.mark.parametrize("name", ["two-armed-2", "two-armed/v1/i000"])
-def test_initial_hands_follow_the_policy(name):
-    for policy in ("best-of-all", "best-single-hand"):
-        task = load_task(name).model_copy(update={"initial_hands": policy})
-        script = "(task) => coartic.letters_of(coartic.initial_hands(coartic.problem_of(task)))"
-        assert node(script, content(task)) == initial_hands(task)
-    assert len(hand_sequences(task)) > 2
-
-
 PLAN = """(task, horizons) => {
   const problem = coartic.problem_of(task);
   return horizons.map((horizon) => {
@@ -149,7 +121,7 @@ PLAN = """(task, horizons) => {
 @pytest.mark.parametrize("name", ["ascending", "two-armed-2", "metres", "millimetre"])
 def test_plans_end_where_the_packages_do_and_say_their_true_reward(name):
     task = OWN.get(name) or load_task(name)
-    plans = node(PLAN, content(task), list(range(len(task.goals))))
+    plans = node(PLAN, task.model_dump(mode="json"), list(range(len(task.goals))))
     for plan in plans:
         movements = [
             Movement(m["goal"] + 1, HANDS[m["hand"]], m["kind"], np.array(m["target"]))

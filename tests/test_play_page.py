@@ -162,11 +162,8 @@ def test_a_task_from_a_file_begins_with_the_hands_of_the_package(opened_task, tm
     best = max(hand_sequences(task), key=lambda hands: corrective_trial(task, hands).reward)
     alone = corrective_trial(task, best).reward
     assert ticks(page, "Corrective process alone") == -alone
-    fewer = -spent - alone
-    words = (
-        f"{abs(fewer)} ticks {'fewer' if fewer > 0 else 'more'} than the corrective process alone"
-    )
-    assert f"{words} (best hands {best})." in text(page, "finding")
+    words = f"{-alone - spent} ticks fewer than the corrective process alone (best hands {best})."
+    assert words in text(page, "finding")
     page.get_by_role("slider", name="Practice").fill("0")
     assert ticks(page, "The learner") == -corrective_trial(task, initial_hands(task)).reward
 

@@ -15,6 +15,7 @@ from coartic import CoarticError, load_task
 from coartic.analysis import runtimes
 from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL
 from coartic.analysis.sections import FIGURES, TABLES
+from coartic.analysis.sections.learning import learning_curves
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of, study_of_trials
 
 ONE, TWO = "ascending", "two-armed-1"
@@ -157,6 +158,11 @@ def test_learning(study):
         f"{TWO} {CMA}": (3, -532.0, -470.0, NONE, NONE),
     }
     same(TABLES["learning"](study), names, cells)
+    curve = learning_curves(study).set_index(["task", "method"]).loc[(ONE, EC1)].set_index("trial")
+    # -305, -301 and -300 in the end; quartiles lie halfway to the inner one.
+    ends = {1: [-319, -319, -319], 1000: [-302, -303, -300.5]}
+    curve = curve[["best", "best_low", "best_high"]].iloc[[0, -1]]
+    assert dict(zip(curve.index, curve.to_numpy().tolist(), strict=True)) == ends
 
 
 def test_of_planners_the_best_alone_has_a_curve(study):
