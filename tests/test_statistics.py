@@ -43,7 +43,7 @@ def test_bootstrap_test_against_all_resamples(a, b, alternative):
     assert test.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
 
 
-@given(st.lists(st.integers(-9, 9).map(float), min_size=2, max_size=9))
+@given(st.lists(st.integers(-9, 9).map(float), min_size=2, max_size=6))
 def test_sign_flips_are_exact_for_few_pairs(differences):
     signs = np.array(list(itertools.product([1, -1], repeat=len(differences))))
     sums = signs @ np.array(differences)
@@ -95,10 +95,10 @@ def test_bca_interval_against_all_resamples(samples, weights):
     assert (interval.low, interval.high) == pytest.approx((low, high), abs=0.25)
 
 
-@pytest.mark.parametrize("sizes", [(400, 300), (4_000, 700)])  # the latter beyond BCa
-def test_intervals_of_many_normal_values_are_the_usual_ones(sizes):
+def test_intervals_of_many_normal_values_are_the_usual_ones():
+    """Of so many that they are percentiles."""
     rng = np.random.default_rng(8)
-    a, b = rng.normal(0, 1, sizes[0]), rng.normal(0.5, 2, sizes[1])
+    a, b = rng.normal(0, 1, 4_000), rng.normal(0.5, 2, 700)
     between = statistics.difference_of_means(a, b)
     expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval(0.95)
     assert (between.low, between.high) == pytest.approx((expected.low, expected.high), abs=0.01)
