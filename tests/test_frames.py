@@ -106,11 +106,7 @@ LACKING = pd.DataFrame({"best_known": [-292]})
         ("no column reward", frames.gaps, LACKING),
         ("no column method, task, reward", frames.ranking, LACKING),
         ("no column run", lambda frame: frames.ecdf(frame, [0.1]), LACKING),
-        (
-            "no column method, reward",
-            lambda frame: frames.means(frame, "method", "reward"),
-            LACKING,
-        ),
+        ("no column method, reward", lambda of: frames.means(of, "method", "reward"), LACKING),
     ],
 )
 def test_what_is_no_frame_of_results_is_refused(words, compute, given):

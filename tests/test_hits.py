@@ -38,22 +38,25 @@ def read(tmp_path):
     return write_and_read
 
 
+def put(column, row, value):
+    """A change of one value."""
+    return lambda t: t.assign(**{column: t[column].astype(object).where(t.index != row, value)})
+
+
 WRONG = {
     "no column left_2": lambda t: t.drop(columns="left_2"),
-    "line 4: hand is 'both'; needed is left or right": lambda t: t.assign(
-        hand=t.hand.where(t.index != 2, "both")
-    ),
-    "line 3: goal is 9": lambda t: t.assign(goal=t.goal.where(t.index != 1, 9)),
-    "line 2: trial is 0.5;": lambda t: t.assign(trial=t.trial.where(t.index != 0, 0.5)),
-    "line 3: ticks is -5": lambda t: t.assign(ticks=t.ticks.where(t.index != 1, -5)),
+    "line 4: hand is 'both'; needed is left or right": put("hand", 2, "both"),
+    "line 3: goal is 9": put("goal", 1, 9),
+    "line 2: trial is 0.5;": put("trial", 0, 0.5),
+    "line 3: ticks is -5": put("ticks", 1, -5),
     "has no hit": lambda t: t[:0],
-    "line 2: ticks is empty": lambda t: t.assign(ticks=t.ticks.where(t.index != 0)),
+    "line 2: ticks is empty": put("ticks", 0, None),
     "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
     "a line above already; number trials": lambda t: pd.concat([t, t]),
     "line 2: ticks is .*column duration": lambda t: t.assign(ticks=t.ticks / 100),
     "less than a tick": lambda t: t.assign(duration=t.ticks / 1000).drop(columns="ticks"),
-    "base_x is 1e\\+300": lambda t: t.assign(base_x=1e300),
-    "line 2: left_2 is 'inf'": lambda t: t.assign(left_2=np.inf),
+    "base_x is 1e\\+300": put("base_x", 0, 1e300),
+    "line 2: left_2 is 'inf'": put("left_2", 0, np.inf),
     "no column subject.*found are who, trial": lambda t: t.rename(columns={"subject": "who"}),
 }
 

@@ -56,6 +56,7 @@ def opened(visited, address):
     return open_page
 
 
+SIDES = (("x", "width"), ("y", "height"))
 DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
@@ -72,6 +73,25 @@ def ticks(page, who):
 
 def press(page, name):
     page.get_by_role("button", name=name).click()
+
+
+def choose(page, name):
+    page.get_by_role("radio", name=name).check()
+    return settled(page)
+
+
+def slide(page, name, value):
+    page.get_by_role("slider", name=name).fill(str(value))
+
+
+def drag(page, handle, across, down):
+    """By the pointer, from its middle by so many pixels."""
+    box = handle.bounding_box()
+    x, y = (box[axis] + box[size] / 2 for axis, size in SIDES)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + across, y + down, steps=4)
+    page.mouse.up()
 
 
 def settled(page):
@@ -93,9 +113,9 @@ def comes_back(page):
     assert page.url == link
 
 
-def changed_to(page, address, state):
+def changed_to(page, state):
     """Follow a link from the page to itself."""
-    page.goto(f"{address}#{state}")
+    page.goto(f"{page.url.partition('#')[0]}#{state}")
     return settled(page)
 
 
@@ -143,7 +163,7 @@ def test_coarticulation_appears_with_practice(opened_task):
     # Earlier, by the slider, there was less of it.
     reset = page.get_by_role("button", name="Reset")
     assert reset.is_disabled()
-    page.get_by_role("slider", name="Practice").fill("1")
+    slide(page, "Practice", 1)
     assert "alike" in text(page, "finding")
     reset.click()
     assert words in text(settled(page), "finding")
@@ -164,7 +184,7 @@ def test_a_task_from_a_file_begins_with_the_hands_of_the_package(opened_task, tm
     assert ticks(page, "Corrective process alone") == -alone
     words = f"{-alone - spent} ticks fewer than the corrective process alone (best hands {best})."
     assert words in text(page, "finding")
-    page.get_by_role("slider", name="Practice").fill("0")
+    slide(page, "Practice", 0)
     assert ticks(page, "The learner") == -corrective_trial(task, initial_hands(task)).reward
 
 
@@ -214,16 +234,11 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     page.wait_for_url("**goals=6,0.1;6,2;5.98,3.3*")
     assert ticks(page, "Corrective process alone") == -corrective_trial(task, "RRR").reward
     assert "Optimum" not in text(page, "score")
-    page.get_by_role("radio", name="learner").check()
-    settled(page)
+    choose(page, "learner")
     assert trials_made(page) == TRIALS
     assert ticks(page, "The learner") == learned(task, "EC1")
     # By the pointer, too, and out of reach it says so.
-    box = handle.bounding_box()
-    page.mouse.move(box["x"] + 22, box["y"] + 22)
-    page.mouse.down()
-    page.mouse.move(box["x"] - 78, box["y"] + 50, steps=4)
-    page.mouse.up()
+    drag(page, handle, -100, 28)
     page.wait_for_url(re.compile(r"goals=6,0.1;6,2;(?!5.98)[45][.\d]*,[23]"))
 
 
@@ -240,8 +255,8 @@ def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_
     assert shifts[0] == "0"
     assert float(shifts[1]) > 0.1
     comes_back(page)
-    page.get_by_role("radio", name="each movement").check()  # and it learns anew
-    assert "Corrective process alone" in text(settled(page), "score")
+    choose(page, "each movement")  # and it learns anew
+    assert "Corrective process alone" in text(page, "score")
 
 
 def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
@@ -249,11 +264,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     assert ticks(page, "You") == ticks(page, "Corrective process alone")
     assert "Optimum" not in text(page, "score")  # it is not proven
     handle = page.get_by_role("button", name="left arm, elbow 2")
-    box = handle.bounding_box()
-    page.mouse.move(box["x"] + 15, box["y"] + 15)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 35, box["y"] + 45, steps=5)
-    page.mouse.up()
+    drag(page, handle, 20, 30)
     page.get_by_label("Place it at").select_option("2")
     page.get_by_label("hit by the").select_option("0")
     page.get_by_role("button", name="Box").focus()
@@ -281,35 +292,33 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     comes_back(page)
 
 
-def test_the_link_holds_the_whole_state(opened, address):
+def test_the_link_holds_the_whole_state(opened):
     page = settled(opened())
     assert "posture difference" in text(page, "finding")
-    page.get_by_role("radio", name="each movement").check()
-    assert "alike" in text(settled(page), "finding")  # no coarticulation by such a reward
+    choose(page, "each movement")
+    assert "alike" in text(page, "finding")  # no coarticulation by such a reward
     page.get_by_label("Task").select_option("3")
     page.get_by_label("It explores").select_option("EC3")
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowRight")
     settled(page)
-    page.get_by_role("slider", name="Practice").fill("800")
-    page.get_by_role("slider", name="Tick").fill("123")
+    slide(page, "Practice", 800)
+    slide(page, "Tick", 123)
     assert f"trials={trials_made(settled(page))}&" in page.url
     comes_back(page)
-    assert trials_made(changed_to(page, address, "trials=50")) == 50
-    changed_to(page, address, "preset=3&explores=EC3&reward=movement&drift=1")
+    assert trials_made(changed_to(page, "trials=50")) == 50
+    changed_to(page, "preset=3&explores=EC3&reward=movement&drift=1")
     condition = shown_condition(page)
     assert (condition.drift, condition.credit) == (1.0, "subtask")
     assert ticks(page, "The learner") == learned("two-armed-1", condition)
     # Entries that are no state are left out, and goals and joints far out lie nearer.
-    changed_to(
-        page, address, "preset=3&who=constructor&mate=__proto__&explores=constructor&__proto__=1"
-    )
+    changed_to(page, "preset=3&who=constructor&mate=__proto__&explores=constructor&__proto__=1")
     assert ticks(page, "The learner") > 0
-    changed_to(page, address, "preset=1&others=&who=you&own=1,0,1e308,0,0,0,0,0,0,1e9,0")
+    changed_to(page, "preset=1&others=&who=you&own=1,0,1e308,0,0,0,0,0,0,1e9,0")
     assert ticks(page, "You") > 0
-    changed_to(page, address, "who=learner&trials=x&preset=99&goals=1,a&nothing=1&tick=1e9")
+    changed_to(page, "who=learner&trials=x&preset=99&goals=1,a&nothing=1&tick=1e9")
     assert ticks(page, "Blue") > 0
-    changed_to(page, address, "who=alone&preset=1&goals=60,0;6,-70,1;6,-70")
+    changed_to(page, "who=alone&preset=1&goals=60,0;6,-70,1;6,-70")
     assert page.get_by_role("button", name="Goal 1, at 12, 0.").count() == 1
     assert page.get_by_role("button", name="Goal 2, at 6, -12.").count() == 1
 
@@ -320,7 +329,7 @@ def shown_condition(page):
     return eval(code, {"CONDITIONS": CONDITIONS, "replace": replace})
 
 
-def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
+def test_a_slider_leads_from_trial_and_error_to_planning(opened):
     page = settled(opened("preset=2&others=&trials=50"))
     dial = page.get_by_role("slider", name="How far exploration leans towards the next goal")
     by_drift = [ticks(page, "The learner")]
@@ -335,13 +344,13 @@ def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
     comes_back(page)
     page.get_by_label("Task").select_option("1")
     assert "drift=1" in settled(page).url
-    page.get_by_role("radio", name="planner").check()
+    choose(page, "planner")
     assert not dial.is_visible()
     for nonsense in ("x", "0.2"):
-        changed_to(page, address, f"preset=2&others=&trials=50&drift={nonsense}")
+        changed_to(page, f"preset=2&others=&trials=50&drift={nonsense}")
         assert shown_condition(page) == CONDITIONS["EC1"]
         assert ticks(page, "The learner") == by_drift[0]
-    changed_to(page, address, "preset=2&others=&drift=1")
+    changed_to(page, "preset=2&others=&drift=1")
     press(page, "Reset")
     assert dial.input_value() == "0"
 
@@ -349,8 +358,8 @@ def test_a_slider_leads_from_trial_and_error_to_planning(opened, address):
 def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back(opened):
     page = settled(opened("who=plan&tick=200"))
     state, second = page.url, ticks(page, "Orange")
-    page.get_by_role("radio", name="You").check()
-    assert ticks(settled(page), "Blue: you") == -corrective_trial("ascending", "RRR").reward
+    choose(page, "You")
+    assert ticks(page, "Blue: you") == -corrective_trial("ascending", "RRR").reward
     assert ticks(page, r"Orange: the planner \(local search\)") == second
     assert ticks(page, r"Planner \(local search\), blue goals") < second
     assert "blue robot, a posture for each goal. Orange: the planner (local search)." in text(
@@ -359,8 +368,8 @@ def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back
     page.get_by_role("button", name="elbow 2").focus()
     page.keyboard.press("ArrowDown")
     comes_back(page)
-    page.get_by_role("radio", name="planner").check()
-    assert ticks(settled(page), "Orange") == second
+    choose(page, "planner")
+    assert ticks(page, "Orange") == second
     press(page, "Reset")
     assert settled(page).url == state.replace("&tick=200", "")
 
@@ -380,7 +389,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     assert distances.min() >= 1
     assert "reach" not in text(page, "finding")
     assert task.inner_text() == "Up or down (changed)"
-    page.get_by_role("slider", name="Tick").fill("400")
+    slide(page, "Tick", 400)
     for _ in range(5):
         press(page, "Remove a goal")
     shown, last = map(int, re.findall(r"\d+", text(page, "count")))
@@ -429,7 +438,6 @@ def test_every_goal_is_seen_on_screen_and_in_print(opened):
 
 
 STAGE = ["stage", "inset"]
-SIDES = (("x", "width"), ("y", "height"))
 ARE_ON_TOP = """handles => handles.map((handle) => {
   const { left, top, width, height } = handle.getBoundingClientRect();
   return document.elementFromPoint(left + width / 2, top + height / 2) === handle;
@@ -450,7 +458,7 @@ def test_it_practises_plays_and_saves_pictures(opened):
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
     press(page, "Pause")
-    page.get_by_role("slider", name="Tick").fill("100")
+    slide(page, "Tick", 100)
     page.get_by_role("slider", name="Tick").press("ArrowRight")
     page.get_by_text("102 of").wait_for()
     size = page.locator("[data-is=stage]").evaluate(
@@ -479,14 +487,14 @@ def test_a_goal_is_dragged_by_a_finger(opened):
     assert page.evaluate("scrollY") == 0  # the page did not scroll instead
 
 
-def test_nothing_scrolls_sideways_and_all_is_accessible(opened, address):
+def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
     page = opened()
     for width, scheme, state in (
         (1280, "light", "drift=0.03&reward=movement"), (390, "dark", "preset=4&who=you")
     ):  # fmt: skip
         page.set_viewport_size({"width": width, "height": 900})
         page.emulate_media(color_scheme=scheme)
-        changed_to(page, address, state)
+        changed_to(page, state)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         accessibility = Axe().run(page)
         assert accessibility.violations_count == 0, accessibility.generate_report()
