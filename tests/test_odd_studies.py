@@ -2,7 +2,6 @@
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from coartic import load_task
 from coartic.analysis.control import with_control
@@ -159,7 +158,7 @@ def test_a_method_without_evaluations_has_its_name_in_the_figure_of_costs():
     assert {"mine", "hill climbing"} <= {*texts}
 
 
-@pytest.mark.parametrize("first", [[np.nan] * 8 + [-480.0, -470.0]])
-def test_runs_that_all_have_a_solution_at_no_number_of_trials_have_no_curve(first):
-    study = study_of_trials({(TWO, "mine"): [first, [-480.0] * 5]}, [], forward_kinematics=5)
+def test_runs_that_all_have_a_solution_at_no_number_of_trials_have_no_curve():
+    rewards = [[np.nan] * 8 + [-480.0, -470.0], [-480.0] * 5]
+    study = study_of_trials({(TWO, "mine"): rewards}, [], forward_kinematics=5)
     assert FIGURES["learning-curves"](study) is None

@@ -21,7 +21,9 @@ from coartic.play.page import FOLDER
 from coartic.robot import HANDS
 from tests.support.strategies import (
     PAPER_CELLS,
+    make_trials,
     metres_task,
+    sample,
     shipped_optima,
     uneven_task,
 )
@@ -107,6 +109,29 @@ def test_the_same_seed_learns_the_same_trial_by_trial():
         np.testing.assert_allclose(run["rows"], film.configurations, rtol=0, atol=1e-9)
         np.testing.assert_allclose(run["reached"], made.configurations, rtol=0, atol=1e-9)
         assert len(set(rewards)) > 10
+
+
+TRIALS = """(task, cases) => {
+  const problem = coartic.problem_of(task);
+  return cases.map(([hands, targets]) => {
+    const rows = targets.map((row) => row.map((value) => value === null ? NaN : value));
+    const { going, ticks } = coartic.make_trial(problem, hands, rows);
+    return [going, ticks];
+  });
+}"""
+
+
+def test_joints_without_a_target_keep_their_value():
+    task = load_task("two-armed-1")
+    hands, targets = sample(task, 60, noise=0.3)
+    targets[np.random.default_rng(5).random(targets.shape) < 0.1] = np.nan
+    given = np.where(np.isnan(targets), None, targets.astype(object)).tolist()
+    codes = [["LR".index(hand) for hand in letters] for letters in hands]
+    cases = [*zip(codes, given, strict=True)]
+    ours = make_trials(task, hands, targets)
+    due = np.transpose([ours.completed, ours.ticks]).tolist()
+    assert node(TRIALS, task.model_dump(mode="json"), cases) == due
+    assert sum(ours.completed) > 40
 
 
 PLAN = """(task, horizons) => {
