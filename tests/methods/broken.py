@@ -142,13 +142,11 @@ class Outsider(Good):
     def details(self, session):
         task, correction = load_task("ascending"), by_correction(session)
         own = Session(task, 0, Information)
-        searched = task.model_copy(update={"initial_hands": "best-single-hand"})
         means = {
             "objective": lambda: coartic.objective(task, "RRR").many([[0.0] * 18] * 5),
             "learn": lambda: coartic.learn(task, "EC1", seed=0, trials=9),
             "execute": lambda: coartic.execute(task, correction),
             "session": lambda: (own.trial(correction), own.trials("RRR", np.zeros((3, 3, 10)))),
-            "initial hands": lambda: coartic.initial_hands(searched),
             "environments in a thread": lambda: step_in_a_thread(task),
         }
         means[self.parameters.means]()
