@@ -48,7 +48,6 @@ from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
     holm,
     share_test,
-    sign_flip_test,
 )
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in, registry
@@ -398,7 +397,6 @@ CALLS = (
     *map(with_arguments, (
         Robot, ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, ROBOT.arm,
         ROBOT.joints, ROBOT.reach, ROBOT.joint_positions, ROBOT.linearised, PATH.hand_path,
-        sign_flip_test,
         measures.arm, measures.as_in_isolation, measures.gain_at_next, measures.hand,
         measures.other_arm, measures.ticks_slower, two_contexts.movable,
         two_contexts.motor_equivalence, PAPER.for_radius, gym.column, instance_names, essence,

@@ -1,8 +1,8 @@
 """Tests of means and shares, and Holm's correction for several tests.
 
-Means have bootstrap tests, paired differences sign-flip tests, shares exact binomial tests, counts
-Fisher's exact test; permutation tests of postures are in :mod:`coartic.analysis.signatures`.
-Samples, exact numbers and seeds are as in :mod:`coartic.estimates`.
+Means have bootstrap tests, shares exact binomial tests; permutation tests of postures are in
+:mod:`coartic.analysis.signatures`. Samples, exact numbers and seeds are as in
+:mod:`coartic.estimates`.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 16;
 A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
@@ -120,32 +120,6 @@ def _kept_places(
 ) -> list[tuple[int, slice, NDArray[np.int64]]]:
     """Return all of :func:`_places`, kept for further samples of these sizes: do not change it."""
     return [*_places(sizes, resamples)]
-
-
-@checked_arguments
-def sign_flip_test(differences: ArrayLike) -> Estimate:
-    """Test paired differences, shape ``(n,)``, by permutations of their signs, two-tailed. The
-    value of the estimate is their mean.
-
-    The level is exact if the two members of a pair are exchangeable. All 2^n signs are enumerated
-    up to 13 pairs; beyond, :data:`RESAMPLES` are drawn. p is NaN with a single pair. Raises
-    ValueError without a pair, and for NaN or infinity.
-    """
-    values = vector(differences)
-    mean, n = float(values.mean()), (len(values),)
-    if len(values) < 2:
-        return Estimate(mean, n=n)
-    result = scipy.stats.permutation_test(
-        (values,),
-        np.mean,
-        permutation_type="samples",
-        vectorized=True,
-        n_resamples=RESAMPLES,
-        batch=max(1, min(1_000, IN_CACHE // len(values))),
-        rng=np.random.default_rng(SEED),
-    )
-    least = 2 / min(2 ** len(values), 1 + RESAMPLES)
-    return Estimate(mean, p=float(result.pvalue), n=n, least_p=least)
 
 
 @checked_arguments
