@@ -55,6 +55,7 @@ def test_the_best_point_is_kept_with_its_solution():
         each += 1.0
     np.testing.assert_array_equal(cost.best_x, best)
     assert -execute(task, cost.solution).reward == cost.best_cost == cost(cost.best_x) < 319
+    assert cost.history.cost.is_unique  # a point as good as the best is not a better one
 
 
 def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
