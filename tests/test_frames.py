@@ -216,15 +216,18 @@ def test_one_task_carries_no_claim_and_refutes_none(side, where):
     assert opposite.verdict == "undecided"
 
 
-def test_runs_with_another_base_have_no_gap():
-    """They solve another task, and may better the best known of this one."""
+def test_searches_with_another_base_have_no_gap():
+    """They solve another task, and may better the best known of this one. The ``base`` of a learner
+    is a condition."""
     tidied = study_of([
-        row("one", -300, task="ascending"),
-        row("one", -250, task="ascending", run=1, parameters='{"base": ""}'),
+        row("optimum/search", -300, task="ascending"),
+        row("optimum/search", -250, task="ascending", run=1, parameters='{"base": "xy"}'),
+        row("dual-process/custom", -310, task="ascending", parameters='{"base": "EC1"}'),
     ]).runs  # fmt: skip
-    assert tidied.best_known.tolist() == [-292, pd.NA]
-    assert tidied.gap.tolist() == pytest.approx([8 / 292, np.nan], nan_ok=True)
-    assert frames.ranking(tidied).gap.tolist() == pytest.approx([8 / 292])
+    assert tidied.best_known.tolist() == [-292, pd.NA, -292]
+    assert tidied.gap.tolist() == pytest.approx([8 / 292, np.nan, 18 / 292], nan_ok=True)
+    gaps = frames.ranking(tidied).gap.to_dict()
+    assert gaps == pytest.approx({"optimum/search": 8 / 292, "dual-process/custom": 18 / 292})
 
 
 def test_runs_are_tidy(traced):
