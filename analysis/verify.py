@@ -184,7 +184,7 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     return points[:, k], k + 1, bool(hits[k])
 
 
-def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
+def _recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
     """Return reward, hands, corrections made, and joint travel of the arms not chosen, from hit to
     hit, rad. Raises ValueError if a movement breaks a rule or takes other ticks than are stored."""
     _check_rules(task, movements)
@@ -277,7 +277,7 @@ def _check_all(db: sqlite3.Connection) -> _Report:
             need(spent <= MOST_IN_ALL, "it and those before have too many ticks and trials")
             for part, moves in parts.items():
                 where, movements = f"Run {run}, {part}", movements + len(moves)
-                outcome = recompute(task, moves) if moves else (None, None, None, None)
+                outcome = _recompute(task, moves) if moves else (None, None, None, None)
                 for name, now in zip(STATED[part], outcome, strict=False):
                     close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
                     need(close or row[name] == now, f"{name} is {now}, not {row[name]}")

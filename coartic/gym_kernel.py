@@ -127,7 +127,7 @@ def _squared_distance(run: Any) -> float:
 
 
 @inlined
-def aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
+def _aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
     """Set hand and target of ``run``, in place, from an action: phase 2, *aim*.
 
     ``run`` and, with two hands, ``other`` have the solutions of the corrective process with one
@@ -165,7 +165,7 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
     others = state.runs[len(state.sides) - 1]
     for i in range(count):
         n = state.indices[i]
-        aim_by_action(
+        _aim_by_action(
             batch.runs[i], others[i], state.movable[state.task[n]], state.actions[n], state
         )
     move(count, robot, batch)

@@ -116,7 +116,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 
 @cached
-def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
+def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs of each compared method on the tasks of :func:`.common_tasks` that have
     targets, by label.
 
@@ -192,7 +192,7 @@ def runtimes(
     if not spans(study):
         raise CoarticError("no task has a best known reward above the corrective process alone")
     rows = []
-    for name, runs in runs_with_targets(study).items():
+    for name, runs in _runs_with_targets(study).items():
         for spend in SPENDS:
             times = _times_on_tasks(study, runs, spend, tuple(shares.tolist()))
             if all(map(len, times)):
@@ -215,7 +215,7 @@ def list_runtimes(study: Study) -> Rows:
     ``half on *``: median number of trials to the target halfway to the optimum on a task, infinite
     if most runs do not reach this target.
     """
-    for method, runs in runs_with_targets(study).items():
+    for method, runs in _runs_with_targets(study).items():
         times = {spend: _times_on_tasks(study, runs, spend) for spend in SPENDS}
         if not all(map(len, times["trials"])):
             continue
@@ -260,7 +260,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     for (label, spend), curve in data.groupby(["method", "spend"], sort=False):
         # No more than are seen.
         curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 100).round()).astype(int)]
-        runs = runs_with_targets(study)[str(label)]
+        runs = _runs_with_targets(study)[str(label)]
         times = _times_on_tasks(study, runs, str(spend))
         low, high = running_times.interval_by_budget(times, curve.budget.to_numpy())
         steps.append(curve.assign(share_low=low, share_high=high, runs=len(runs)))

@@ -49,7 +49,7 @@ def within(option: str, what: str, least: float, most: float) -> Any:
     int. Reading any other value raises CoarticError."""
 
     def read(text: str) -> Any:
-        value = value_in(text)
+        value = _value_in(text)
         try:
             check_limits(option, value, least, most)
         except ValueError as error:
@@ -59,7 +59,7 @@ def within(option: str, what: str, least: float, most: float) -> Any:
     return typer.Option(option, parser=read, metavar="N", help=what)
 
 
-def value_in(text: str) -> Any:
+def _value_in(text: str) -> Any:
     """Return the number that an option names, an int if it is one, or the range ``50..99``, both
     ends included; any other text is returned unchanged."""
     ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", str(text))  # a default is no text
@@ -79,7 +79,7 @@ def asked(name: str, what: str, unit: str = "N") -> Any:
         from coartic.benchmarks.planning import request_for
 
         try:
-            return getattr(request_for(**{name: value_in(text)}), name)
+            return getattr(request_for(**{name: _value_in(text)}), name)
         except CoarticError as error:
             raise CoarticError(str(error).replace(name, option, 1)) from None
 
