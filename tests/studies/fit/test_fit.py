@@ -1,5 +1,7 @@
 """Study fit: the reader, the simulator, and fits of people whom other code simulates."""
 
+import re
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +20,20 @@ PROTOCOLS, FIT, STUDY, PLAIN = programs("fit", "protocols", "fit", "study", "pla
 TASK = load_task("two-armed-1")
 
 
+@pytest.fixture(autouse=True)
+def fewer_simulated(monkeypatch):
+    """The check simulates a third of the study's number of people, or as many as a test asks."""
+
+    def simulate(number):
+        monkeypatch.setattr(sys.modules["check"], "SIMULATED", number)
+
+    simulate(19)
+    return simulate
+
+
 @pytest.fixture(scope="module")
 def people():
-    """Two people, of whom the second is uninformed."""
-    return PROTOCOLS.simulate(TASK, "informed", 0.04, 0.3, [0.4, 0.0], seeds=[1, 2], trials=60)
+    return PROTOCOLS.simulate(TASK, "informed", 0.04, 0.3, 0.4, seeds=[1], trials=20)
 
 
 @pytest.mark.parametrize(("name", "condition"), [("ascending", "EC1"), ("two-armed-1", "EC2")])
@@ -44,39 +56,37 @@ def test_parameters_of_the_plain_learner_are_found():
     for name, value in truth.items():
         assert fitted[f"{name}_low"] < value < fitted[f"{name}_high"]
     assert fitted.kappa_high - fitted.kappa_low < 0.1
-    assert "κ = 0." in FIT.sentence(fitted)
+    assert "Motor noise is more" in FIT.sentence(pd.Series({**fitted, "noise": 0.02}))
 
 
-@pytest.mark.parametrize("model", ["drawn", "memoryless", "planner"])
-def test_model_of_simulated_people_is_preferred(model):
-    """Others are in the cell of the recovery, below."""
-    people = PROTOCOLS.simulate(TASK, model, 0.04, 0.3, seeds=[3], trials=30)
-    fitted = FIT.fit(people, TASK).iloc[0]
-    assert fitted.model == model
-    assert ("do not apply" in FIT.sentence(fitted)) == (model not in FIT.LEARNERS)
-
-
-def with_noise(people, sd):
-    noisy, joints = people.copy(), [*TASK.robot.joint_names]
-    noisy[joints] += sd * np.random.default_rng(0).standard_normal((len(noisy), len(joints)))
-    return noisy
-
-
-def rough(people, noise):
+def rough(people, noise=0.0):
     """The row of one subject, without intervals, which take long."""
     trials, condition = FIT.trials_of(people, TASK), FIT.condition_for(TASK)
     plan = FIT.plan_for(TASK)
     return FIT.fit_subject(TASK, condition, trials, noise=noise, plan=plan, intervals=False)
 
 
+@pytest.mark.parametrize("model", ["drawn", "memoryless", "planner"])
+def test_model_of_simulated_people_is_preferred(model):
+    """The others are on the page of the how-to, below."""
+    people = PROTOCOLS.simulate(TASK, model, 0.04, 0.3, seeds=[3], trials=20)
+    assert rough(people)["model"] == model
+
+
+def test_people_of_another_model_are_none_of_the_six():
+    """Of averages, how-to's p2 is an example."""
+    people = PROTOCOLS.simulate(TASK, "decays", 0.04, 0.3, seeds=[1], trials=30)
+    assert "grow or shrink with practice" in rough(people)["misfit"]
+
+
 def test_motor_noise_is_a_parameter(people):
-    noisy = with_noise(people[(people.subject == 0) & (people.trial <= 30)], 0.03)
-    assert rough(noisy, 0.0)["sigma"] > 0.046
-    given = FIT.fit(noisy, TASK, noise=0.03).iloc[0]
-    assert given.sigma == pytest.approx(0.04, rel=0.1)
-    assert given.kappa == pytest.approx(0.4, abs=0.05)
-    assert given.misfit == ""
-    assert "Motor noise is more" in FIT.sentence(given)
+    noisy, joints = people.copy(), [*TASK.robot.joint_names]
+    noisy[joints] += 0.03 * np.random.default_rng(0).standard_normal(noisy[joints].shape)
+    assert rough(noisy)["sigma"] > 0.046
+    given = rough(noisy, 0.03)
+    assert given["sigma"] == pytest.approx(0.04, rel=0.1)
+    assert given["kappa"] == pytest.approx(0.4, abs=0.05)
+    assert given["misfit"] == ""
 
 
 def test_where_two_models_explain_the_trials_no_parameters_are_given():
@@ -99,60 +109,58 @@ def test_signatures_of_recorded_trials_are_of_what_was_recorded():
     assert len(solutions_of(task, people.sort_values("goal", ascending=False)).runs) == 20
 
 
-DEGENERATE = {
-    "two trials": lambda hits: hits[hits.trial == 1],
-    "postures are equal": lambda hits: pd.concat(
-        [hits[hits.trial == 1].assign(trial=n) for n in range(1, 31)], ignore_index=True
-    ),
-    "take 400 ticks, as by a met": lambda hits: hits.assign(ticks=100),
-}
-
-
-@pytest.mark.parametrize("why", DEGENERATE)
-def test_degenerate_trials_are_left_out_with_the_reason(people, why):
-    hits = DEGENERATE[why](people[people.subject == 0])
-    with pytest.warns(UserWarning, match=f"subject 0 is left out: .*{why}"):
-        assert not len(FIT.fit(hits, TASK))
+def test_degenerate_trials_are_left_out_with_the_reason(people):
+    first = people[people.trial == 1]
+    degenerate = {
+        "two trials": first,
+        "postures are equal": pd.concat(first.assign(trial=n) for n in range(1, 31)),
+        "take 400 ticks, as by a met": people.assign(ticks=100),
+    }
+    every = pd.concat([of.assign(subject=why) for why, of in degenerate.items()])
+    with pytest.warns(UserWarning, match="^subject two trials is left out: ") as warned:
+        assert not len(FIT.fit(every, TASK))
+    for why, warning in zip(degenerate, warned, strict=True):
+        assert str(warning.message).count(why) == 2  # as the subject's name, and as the reason
 
 
 def test_what_cannot_be_fitted_is_refused(people):
     with pytest.raises(CoarticError, match="EC1 does not use the left hand"):
         FIT.fit(people, TASK, condition=CONDITIONS["EC1"])
-    task = metres_task()
-    rows = [["s", t, g, "right", 30, 0, 0, 0, 0.5 + t / 99, 1.5] for t in (1, 2) for g in (1, 2, 3)]
-    names = ["subject", "trial", "goal", "hand", "ticks", *task.robot.joint_names]
     with pytest.raises(CoarticError, match="2 coordinates move for the right hand.*null space"):
-        FIT.fit(pd.DataFrame(rows, columns=names), task)
+        FIT.fit(people, metres_task())
 
 
-def test_people_of_another_model_are_none_of_the_six():
-    """Of averages, how-to's p2 is an example."""
-    people = PROTOCOLS.simulate(TASK, "decays", 0.04, 0.3, seeds=[1], trials=60)
-    assert "grow or shrink with practice" in rough(with_noise(people, 0.02), 0.02)["misfit"]
+@pytest.mark.parametrize(("subjects", "simulated"), [("s", 19), ("p1", 19), ("p2", 39)])
+def test_how_to_shows_what_the_command_prints(
+    subjects, simulated, tmp_path, monkeypatch, capsys, fewer_simulated
+):
+    fewer_simulated(simulated)
+    task, recorded, options = "two-armed-1", "example.csv", []
+    if subjects != "s":
+        task, recorded = str(FOLDER / "metres.toml"), "metres.csv"
+        options = ["--ticks-per-unit", "100", "--noise", "0.005"]
+    lines = (FOLDER / recorded).read_text("utf-8").splitlines(keepends=True)
+    file = tmp_path / recorded
+    file.write_text("".join(line for line in lines if line.startswith(("subject", subjects))))
+    monkeypatch.setattr("sys.argv", ["fit.py", task, str(file), *options])
+    FIT.main()
+    page = (ROOT / "docs" / "howto" / "people.md").read_text("utf-8").splitlines()
+    shown = [line for line in page if re.match(rf"{subjects}\d*, trials", line)]
+    assert capsys.readouterr().out.splitlines() == shown
 
 
-def test_how_to_shows_what_the_command_prints(monkeypatch, capsys):
-    example = FOLDER / "example.csv"
-    page = (ROOT / "docs" / "howto" / "people.md").read_text("utf-8")
-    metres = [str(FOLDER / name) for name in ("metres.toml", "metres.csv")]
-    options = ("--ticks-per-unit", "100", "--noise", "0.005")
-    for given in (("two-armed-1", str(example)), (*metres, *options)):
-        monkeypatch.setattr("sys.argv", ["fit.py", *given])
+@pytest.mark.parametrize("option", [("--noise", "-1"), ("--out", "no/such/folder.csv")])
+def test_an_option_that_cannot_be_is_refused(option, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", "no file", *option])
+    with pytest.raises(SystemExit, match="2"):
         FIT.main()
-        assert all(line in page for line in capsys.readouterr().out.splitlines())
-    assert example.stat().st_size < 30_000
-    for option in (("--noise", "-1"), ("--out", "no/such/folder.csv")):
-        monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", str(example), *option])
-        with pytest.raises(SystemExit, match="2"):
-            FIT.main()
-        assert capsys.readouterr().err.startswith(f"error: {option[0]}")
+    assert capsys.readouterr().err.startswith(f"error: {option[0]}")
 
 
 def test_the_recording_in_metres_is_of_a_simulator_without_the_package(capsys):
     assert "coartic" not in (FOLDER / "plain_person.py").read_text("utf-8").split('"""')[2]
     PLAIN.main()
     assert capsys.readouterr().out == (FOLDER / "metres.csv").read_text("utf-8")
-    assert (FOLDER / "metres.csv").stat().st_size < 40_000
 
 
 def planted(true, fitted, kappa=(0.0, 0.0), off=1.0, misfit="", replaced=0.5):
