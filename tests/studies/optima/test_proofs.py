@@ -29,11 +29,11 @@ NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 def test_offsets_are_exact_maxima(half, normal):
     a, b, k = normal
     offset = RELAXED.offset_of(*np.array(normal)[:, None, None], np.array([half])).item()
-    delta = np.linspace(-half, half, 40_001)
+    delta = np.linspace(-half, half, 4_001)
     cosine, sine = directions(delta).T
     true = (a * cosine + b * sine + k * delta).max()
     assert offset >= true - 1e-12
-    assert offset == pytest.approx(true, abs=1e-6)
+    assert offset == pytest.approx(true, abs=1e-4)
 
 
 def feasible(task, hands, rng, reach):
@@ -70,6 +70,12 @@ def undecided(hands, rng):
     return tuple(hand if rng.random() < 0.6 else None for hand in hands)
 
 
+def first_goals(name, count):
+    """A task's first goals alone."""
+    goals = [list(goal) for goal in load_task(name).goals[:count]]
+    return changed(name, goals=goals, initial_hands="R" * count)
+
+
 def angles_of(task, hands, q):
     """Absolute link angles of the chosen arms, goal by goal; none where a hand is undecided."""
     decided = [(g, hand) for g, hand in enumerate(hands) if hand is not None]
@@ -79,40 +85,6 @@ def angles_of(task, hands, q):
 
 def bound(root, box, multipliers, longest):
     return root.lagrangian(multipliers, longest).bound(box)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_relaxation_never_exceeds_a_true_path(name):
-    """For any path, hands undecided, and any box around its link angles and every split.
-
-    What is cut off a box never holds the path, for the least slack that keeps it of interest.
-    """
-    rng = np.random.default_rng(7)
-    checked = cut = 0
-    for task, hands, q, length in itertools.islice(paths(name), 0, None, 4):
-        for chosen in (hands, undecided(hands, rng)):
-            root = RELAXED.Relaxation(task, chosen, (), True)
-            box, angles = root.first_box(length), angles_of(task, chosen, q)
-            assert np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
-            for _ in range(5):
-                relaxed = root.solve(box)
-                lagrangian = root.lagrangian(relaxed.multipliers, length)
-                least = lagrangian.bound(box)
-                assert least <= length + 1e-9
-                left = lagrangian.within(box, length - least + 1e-9)
-                assert np.all((left[:, 0] <= angles) & (angles <= left[:, 1]))
-                cut += int(np.any(left != box))
-                checked += 1
-                if not len(box):
-                    break
-                below, above = RELAXED.split(box, relaxed)
-                inside = np.all((below[:, 0] <= angles) & (angles <= below[:, 1]))
-                tighter = below if inside else above
-                assert (tighter[:, 1] - tighter[:, 0]).sum() < (box[:, 1] - box[:, 0]).sum()
-                assert np.all((tighter[:, 0] <= angles) & (angles <= tighter[:, 1]))
-                box = tighter
-    assert checked >= 4
-    assert cut
 
 
 FAILURES = {
@@ -145,22 +117,45 @@ def failing(change, rng, share):
     return Failing
 
 
-@pytest.mark.parametrize("failure", FAILURES)
-@pytest.mark.parametrize("name", NAMES)
-def test_any_solution_of_the_solver_gives_a_bound(name, failure, monkeypatch):
-    rng = np.random.default_rng(3)
-    monkeypatch.setattr(clarabel, "DefaultSolver", failing(FAILURES[failure], rng, 1.0))
-    for task, hands, q, length in itertools.islice(paths(name), 0, None, 4):
-        chosen = undecided(hands, rng)
-        root, angles = RELAXED.Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
-        box = np.stack([angles - rng.random(len(angles)), angles + rng.random(len(angles))], 1)
-        for _ in range(3):
-            relaxed = root.solve(box)
-            lagrangian = root.lagrangian(relaxed.multipliers, length)
-            assert lagrangian.bound(box) <= length + 1e-9
-            assert np.isfinite(relaxed.q).all()
-            left = lagrangian.within(box, length - lagrangian.bound(box) + 1e-9)
-            assert np.all((left[:, 0] <= angles) & (angles <= left[:, 1]))
+@pytest.mark.parametrize(
+    ("name", "failure"),
+    [*((name, None) for name in NAMES), *(("two-armed-1", each) for each in FAILURES)],
+)
+def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
+    """For any path, hands undecided, boxes around its link angles and parts of them, and whatever
+    the solver says. What is cut off a box never holds the path, for the least slack that keeps it
+    of interest.
+    """
+    rng, cuts = np.random.default_rng(7), []
+    if failure:
+        monkeypatch.setattr(clarabel, "DefaultSolver", failing(FAILURES[failure], rng, 1.0))
+    for task, hands, q, length in itertools.islice(paths(name), 0, None, 8 if failure else 4):
+        for chosen in (hands, undecided(hands, rng)):
+            root, angles = RELAXED.Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
+
+            def holds(box, angles=angles):
+                return np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
+
+            near = angles[:, None] + rng.random((len(angles), 2)) * [-1.0, 1.0]
+            for box in (root.first_box(length), near):
+                assert holds(box)
+                for _ in range(4 if len(box) else 1):
+                    relaxed = root.solve(box)
+                    assert np.isfinite(relaxed.q).all()
+                    lagrangian = root.lagrangian(relaxed.multipliers, length)
+                    least = lagrangian.bound(box)
+                    assert least <= length + 1e-9
+                    left = lagrangian.within(box, length - least + 1e-9)
+                    assert holds(left)
+                    cuts.append(np.any(left != box))
+                    if len(box):
+                        below, above = RELAXED.split(box, relaxed)
+                        half = below if holds(below) else above
+                        assert holds(half)
+                        assert (half[:, 1] - half[:, 0]).sum() < (box[:, 1] - box[:, 0]).sum()
+                        box = half
+    assert len(cuts) >= 8
+    assert failure or any(cuts)
 
 
 @pytest.mark.parametrize("failure", FAILURES)
@@ -173,10 +168,10 @@ def test_a_proof_with_a_solver_that_fails_is_loose(failure, monkeypatch):
 
 @pytest.mark.filterwarnings("ignore:Solution may be inaccurate")
 @pytest.mark.parametrize(
-    ("name", "nodes"),
-    [("two-armed/v1/i037", 40), ("redundancy/v1/i010", 40), ("one-armed/v1/i025", 40)],
+    ("name", "goals", "nodes"),
+    [("two-armed/v1/i037", 5, 80), ("redundancy/v1/i010", 2, 60), ("one-armed/v1/i025", 5, 60)],
 )
-def test_the_bound_is_that_of_cvxpy(name, nodes, monkeypatch):
+def test_the_bound_is_that_of_cvxpy(name, goals, nodes, monkeypatch):
     """At 200 nodes in all: numbers that are changed in place give what CVXPY's multipliers give."""
     checked, longest, solve = [], 8.0, RELAXED.Relaxation.solve
     stated = functools.cache(RELAXED.Relaxation.state)
@@ -198,7 +193,7 @@ def test_the_bound_is_that_of_cvxpy(name, nodes, monkeypatch):
         return relaxed
 
     monkeypatch.setattr(RELAXED.Relaxation, "solve", both)
-    PROOF.certify(load_task(name), 800, nodes)
+    PROOF.certify(first_goals(name, goals), 800, nodes)
     assert len(checked) >= nodes
 
 
@@ -275,7 +270,7 @@ def test_the_least_of_a_term_is_exact():
 SMALL = Robot(left_links=(1.0,), right_links=(1.2,))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(10))
 def test_the_proof_agrees_with_an_exhaustive_search(seed):
     """Two goals, one link an arm, the base on a rail: every path on a fine grid."""
     rng = np.random.default_rng(seed)
@@ -295,9 +290,8 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
         layers = []
         for hand, goal in zip(hands, task.goals, strict=True):
             # All angles and points of the disc: the base follows from the hand's x.
-            angle = np.linspace(-3, 4, 2801)  # a quarter of a step apart
-            q = np.zeros((angle.size, 4))
-            q[:] = task.q0
+            angle = np.linspace(-3, 4, 1401)  # half a step apart
+            q = np.tile(task.q0, (angle.size, 1))
             q[:, task.robot.joints(hand)] = angle[:, None]
             off = task.robot.forward_kinematics(q, hand) - np.array(goal)
             half = np.sqrt(np.maximum(task.radius**2 - off[:, 1] ** 2, 0.0))
@@ -305,7 +299,7 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
             q, off, half = q[near], off[near], half[near]
             sides = np.tile(q, (9, 1, 1))
             sides[..., 0] = np.linspace(-1, 1, 9)[:, None] * half - off[:, 0]
-            layers.append(np.unique(sides.reshape(-1, 4).round(3), axis=0))
+            layers.append(sides.reshape(-1, 4))
         first, second = layers
         # The hand that does not reach keeps its joints: the nearest posture in those that move.
         moving = [0, 2 + (hands[1] == "right")]
@@ -319,13 +313,10 @@ def test_the_proof_agrees_with_an_exhaustive_search(seed):
     assert ticks >= math.floor(least / PAPER.step) + 2 - merged - 4
 
 
-TWO = [list(goal) for goal in load_task("ascending").goals[:2]]
-
-
 @pytest.mark.parametrize(
     ("task", "claim", "most_nodes", "proven"),
     [
-        (changed("ascending", goals=TWO, initial_hands="RR"), 191, 300, 191),
+        (first_goals("ascending", 2), 191, 300, 191),
         # A goal in line needs the base alone: 1.9 less the disc, and the tick that ends it.
         (changed("ascending", goals=[[6.5, 0.1]], initial_hands="R"), 191, 500, 191),
         # On this instance few cone programmes prove less than the distances alone.
