@@ -13,12 +13,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
-from coartic import PAPER, Robot, Task, execute, load_task
+from coartic import PAPER, corrective_trial, execute, load_task
 from coartic.motion.solution import Movement, hand_sequences
 from coartic.robot import directions
 from coartic.tasks.task import hands_of, letters_of
 from tests.support.processes import programs
-from tests.support.strategies import UNEVEN, changed, make_trials, uneven_task
+from tests.support.strategies import (
+    UNEVEN,
+    changed,
+    make_trials,
+    steps_from,
+    tiny_task,
+    uneven_task,
+)
 
 (PROOF,) = programs("optima", "certificate")
 RELAXED, LAGRANGIAN, SPEED = (sys.modules[n] for n in ("relaxation", "lagrangian", "speed"))
@@ -36,34 +43,14 @@ def test_offsets_are_exact_maxima(half, normal):
     assert offset == pytest.approx(true, abs=1e-4)
 
 
-def feasible(task, hands, rng, reach):
-    """Configurations that put each hand at its goal, near the start; None where it fails."""
-    q, configurations = np.array(task.q0), []
-    free = np.ones(task.robot.dof, dtype=bool)
-    free[:2] = ["x" not in task.locked_base, "y" not in task.locked_base]
-    for hand, goal in zip(hands, task.goals, strict=True):
-        (other,) = {"left", "right"} - {hand}
-        moving = free.copy()
-        moving[task.robot.joints(other)] = False
-        q = q + reach * rng.standard_normal(q.shape) * moving
-        for _ in range(20):
-            miss = np.array(goal) - task.robot.forward_kinematics(q, hand)
-            jacobian = task.robot.jacobian(q, hand) * moving
-            q = q + jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(2), miss)
-        if np.hypot(*miss) > 0.09:
-            return None
-        configurations.append(q)
-    return np.array(configurations)
-
-
-def paths(name):
-    """True paths of a task: hands, configurations ``(G, dof)``, length."""
-    task, rng = load_task(name), np.random.default_rng(len(name))
-    for letters in hand_sequences(task):
-        q = feasible(task, hands_of(letters), rng, 0.3)
-        if q is not None:
-            steps = np.diff(np.vstack([task.q0, q]), axis=0)
-            yield task, hands_of(letters), q, float(np.linalg.norm(steps, axis=1).sum())
+def paths(name, every):
+    """Paths of the corrective process, near the shortest ones, with every so many hand sequences:
+    task, hands, configurations ``(G, dof)``, lengths of the steps."""
+    task = load_task(name)
+    for letters in hand_sequences(task)[::every]:
+        q = corrective_trial(task, letters).configurations
+        steps = np.linalg.norm(steps_from(task.q0, q), axis=1)
+        yield task, hands_of(letters), q, steps
 
 
 def undecided(hands, rng):
@@ -129,7 +116,8 @@ def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
     rng, cuts = np.random.default_rng(7), []
     if failure:
         monkeypatch.setattr(clarabel, "DefaultSolver", failing(FAILURES[failure], rng, 1.0))
-    for task, hands, q, length in itertools.islice(paths(name), 0, None, 8 if failure else 4):
+    for task, hands, q, steps in paths(name, 8 if failure else 4):
+        length = steps.sum()
         for chosen in (hands, undecided(hands, rng)):
             root, angles = RELAXED.Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
 
@@ -231,14 +219,9 @@ def test_dynamic_programming_finds_the_soonest_of_all_sequences(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_path_is_as_long_as_its_spans_say(name):
     rng = np.random.default_rng(8)
-    for task, hands, q, _ in itertools.islice(paths(name), 0, None, 2):
-        steps = np.linalg.norm(np.diff(np.vstack([task.q0, q]), axis=0), axis=1)
-        for chosen in (
-            hands,
-            undecided(hands, rng),
-            (*hands[:2], *(None,) * (len(q) - 2)),
-            (None,) * len(q),
-        ):
+    for task, hands, q, steps in paths(name, 2):
+        none = (None,) * len(q)
+        for chosen in (hands, undecided(hands, rng), (*hands[:2], *none[2:]), none):
             spans, least = SPEED.spans_of(task, chosen)
             assert np.all(spans @ steps >= least)
             assert len(least)
@@ -246,17 +229,12 @@ def test_every_path_is_as_long_as_its_spans_say(name):
 
 def test_the_least_of_a_term_is_exact():
     rng = np.random.default_rng(4)
-    task = load_task("two-armed-2")
-    root = RELAXED.Relaxation(task, hands_of("RLRR"), (), False)
     for _ in range(12):
-        low = rng.uniform(-8, 8, 16)
+        low, (slopes, sizes, towards) = rng.uniform(-8, 8, 16), rng.standard_normal((3, 16))
         box = np.stack([low, low + rng.uniform(0, 9, 16)], 1)
-        pulls, forces = rng.standard_normal((4, 10)), rng.standard_normal((4, 2))
-        speeds = rng.standard_normal(len(SPEED.spans_of(task, hands_of("RLRR"))[1]))
-        lagrangian = root.lagrangian((pulls, forces, speeds), 1.0)
+        lagrangian = LAGRANGIAN.Lagrangian(1.0, slopes, np.abs(sizes), 3 * towards)
         sampled = np.linspace(*box.T, 1001)
-        _, slopes, sizes, towards = lagrangian
-        values = slopes * sampled + sizes * np.cos(sampled - towards)
+        values = slopes * sampled + np.abs(sizes) * np.cos(sampled - 3 * towards)
         true = values.min(axis=0)
         least = LAGRANGIAN.least(*lagrangian[1:], *box.T)
         assert np.all(least <= true + 1e-12)
@@ -267,23 +245,14 @@ def test_the_least_of_a_term_is_exact():
         assert gone.any()
 
 
-SMALL = Robot(left_links=(1.0,), right_links=(1.2,))
-
-
 @pytest.mark.parametrize("seed", range(10))
 def test_the_proof_agrees_with_an_exhaustive_search(seed):
     """Two goals, one link an arm, the base on a rail: every path on a fine grid."""
     rng = np.random.default_rng(seed)
-    task = Task(
-        name="small",
-        robot=SMALL,
-        locked_base=("y",),
-        start={"left": (1.2,), "right": (0.4,)},
-        goals=tuple(
-            (round(x, 3), round(y, 3)) for x, y in rng.uniform((-2, -0.7), (2, 0.9), (2, 2))
-        ),
-        initial_hands="RR",
-    )
+    goals = rng.uniform((-2, -0.7), (2, 0.9), (2, 2)).round(3).tolist()
+    start = {"left": [1.2], "right": [0.4]}
+    robot = {"left_links": [1.0], "right_links": [1.2]}
+    task = tiny_task(robot=robot, locked_base=["y"], start=start, goals=goals)
     assert not PROOF.mergeable(task, hands_of("RR"))
     least = np.inf
     for hands in itertools.product(task.hands, repeat=2):
@@ -356,16 +325,16 @@ def test_no_hand_is_faster_than_the_fastest(locked):
 
 def on_a_circle(start, angles):
     """Both hands on one circle about a locked base, which each follows with a joint of its own."""
-    arm = {"left_links": (1.0,), "right_links": (1.0,)}
-    return Task(
-        name="circle",
-        robot=Robot(**arm, left_shoulder=(0.0, 0.0), right_shoulder=(0.0, 0.0)),
-        locked_base=("x", "y"),
-        start={"left": (start,), "right": (0.0,)},
-        goals=tuple(map(tuple, directions(angles).round(6).tolist())),
+    links, shoulder = [1.0], [0.0, 0.0]
+    return tiny_task(
+        robot={"left_links": links, "right_links": links,
+               "left_shoulder": shoulder, "right_shoulder": shoulder},
+        locked_base=["x", "y"],
+        start={"left": [start], "right": [0.0]},
+        goals=directions(angles).round(6).tolist(),
         radius=0.02,
         initial_hands="best-of-all",
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -5,7 +5,6 @@ import lzma
 import re
 import sqlite3
 import subprocess
-import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -22,6 +21,7 @@ from coartic.tasks.families import named_by, shipped_families
 from coartic.tasks.optima import best_shipped, essence
 from coartic.tasks.task import hands_of
 from tests.support.processes import ROOT, programs
+from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
 FOLDER = ROOT / "studies" / "optima"
@@ -175,12 +175,6 @@ def test_better_rewards_of_a_folder_are_taken_over(tmp_path):
     assert known["ascending", "task", "still"]["reward"] == -292
 
 
-def test_a_solution_with_another_reward_is_refused():
-    movements = SHIPPED.movements_of(ENTRIES[ASCENDING]["solution"])
-    with pytest.raises(CoarticError, match="does not come to -291"):
-        SHIPPED.solution_in_short(load_task("ascending"), movements, -291)
-
-
 def prove(monkeypatch, capsys, folder, *asked):
     """What ``prove.py`` prints, in this process, and its log."""
     monkeypatch.setattr(PROVE, "ProcessPoolExecutor", ThreadPoolExecutor)
@@ -214,36 +208,39 @@ def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(
 
 
 def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refused():
-    row = {"task": "two-armed/v1/i002", "base": "task", "other_arm": "free", "reward": -255}
+    key = "two-armed/v1/i002", *SHIPPED.FREE
+    row = ENTRIES[key] | {"nodes": 1}
     with pytest.raises(CoarticError, match="i002: bound -256 is below -255"):
-        SHIPPED.take_proof(SHIPPED.read(), row | {"bound": -256, "nodes": 1})
-    entry = ENTRIES["two-armed/v1/i002", *SHIPPED.FREE]
-    better = row | {key: entry[key] for key in ("hands", "solution")} | {"bound": -255, "nodes": 1}
+        SHIPPED.take_proof(SHIPPED.read(), row | {"bound": -256})
     known = SHIPPED.read()
-    known["two-armed/v1/i002", *SHIPPED.FREE]["reward"] = -300
-    assert SHIPPED.take_proof(known, better)
+    known[key]["reward"] = -300
+    assert SHIPPED.take_proof(known, row)
     assert known == ENTRIES
-    with pytest.raises(CoarticError, match="the solution does not come to -254"):
-        SHIPPED.take_proof(known, better | {"reward": -254})
+    for refused in (
+        lambda: SHIPPED.take_proof(known, row | {"reward": -254}),
+        lambda: SHIPPED.solution_in_short(
+            load_task(key[0]), SHIPPED.movements_of(row["solution"]), -254
+        ),
+    ):
+        with pytest.raises(CoarticError, match="the solution does not come to -254"):
+            refused()
 
 
 def test_a_better_solution_is_found_on_the_way():
     """From the open subproblems of least bound, if the reward that is known is poor."""
     entry = ENTRIES["two-armed/v1/i001", *SHIPPED.FREE] | {"reward": -400}
-    row = PROVE.prove(entry, 0.5)
+    row = PROVE.prove(entry, 0.2)
     assert -400 < row["reward"] <= row["bound"]
     execution = execute(load_task(row["task"]), SHIPPED.movements_of(row["solution"]))
     assert (execution.reward, execution.hands) == (row["reward"], row["hands"])
 
 
-def test_a_task_of_ones_own_is_searched_and_proven(tmp_path):
-    task = load_task("ascending").model_copy(update={"name": "mine", "goals": ((6.0, 0.5),)})
-    task = task.model_copy(update={"initial_hands": "R", "provenance": {}})
-    task.save(tmp_path / "mine.toml")
-    command = [sys.executable, FOLDER / "prove.py", tmp_path / "mine.toml", "--out", tmp_path]
-    sentence = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "mine.toml (base task, other arm free): -1" in sentence
-    assert ", proven optimal, " in sentence
+def test_a_task_of_ones_own_is_searched_and_proven(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "mine.toml"
+    tiny_task(goals=[[6.0, 0.5]]).save(file)
+    (sentence,), (row,) = prove(monkeypatch, capsys, tmp_path, file)
+    assert sentence.startswith(f"{file} (base task, other arm free): {row['reward']}, proven opti")
+    assert -200 < row["reward"] == row["bound"] < -100
 
 
 def test_the_table_is_of_the_shipped_data():
