@@ -17,10 +17,10 @@ from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families
 from coartic.tasks.task import address_of, task_text
 from tests.support.processes import ROOT, program
-from tests.support.suites import InProcess, unpacked
+from tests.support.suites import InProcess
 
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
-STUDIES = [folder for folder in ALL if (folder / "suite.toml").exists()]
+STUDIES = [folder.name for folder in ALL if (folder / "suite.toml").exists()]
 """Studies of runs; the others have protocols of their own."""
 SMALL = ROOT / "tests" / "studies"
 INSTANCES = {
@@ -45,17 +45,10 @@ def comparable(table, path):
     return table.drop(columns=[*ends, *(resampled & {*table})])
 
 
-@pytest.fixture(scope="module", params=STUDIES, ids=lambda folder: folder.name)
-def measured(request, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    study = program(request.param / "study.py")
-    stored = load(unpacked(SMALL / request.param.name, folder))
-    return request.param, study, study.measure(stored)
-
-
-def test_tables_are_those_of_version_1(measured, tmp_path):
-    folder, _, tables = measured
-    for path in (SMALL / folder.name).glob("*.csv"):
+@pytest.mark.parametrize("name", STUDIES)
+def test_tables_are_those_of_version_1(name, measured, tmp_path):
+    _, _, tables = measured(name)
+    for path in (SMALL / name).glob("*.csv"):
         ours, theirs = tables[path.stem], read(path)
         if path.stem == "claims":
             assert ours.p_holm.tolist() == pytest.approx([*theirs.p_holm], abs=0.03, nan_ok=True)
@@ -63,8 +56,10 @@ def test_tables_are_those_of_version_1(measured, tmp_path):
         pd.testing.assert_frame_equal(ours, theirs, rtol=1e-4, atol=1e-9, check_dtype=False)
 
 
-def test_draws_its_results(measured, tmp_path):
-    _, study, tables = measured
+@pytest.mark.parametrize("name", STUDIES)
+def test_draws_its_results_and_has_the_name_of_its_suite(name, measured, tmp_path):
+    study, _, tables = measured(name)
+    assert load_suite(str(ROOT / "studies" / name / "suite.toml")).name == name
     tables["results"].to_csv(tmp_path / "results.csv")
     drawing = figures.picture(study.draw(read(tmp_path / "results.csv")), ".svg")
     assert drawing.count(b"<path") > 20
@@ -96,16 +91,9 @@ def test_writes_a_study_and_without_tables_its_figure_and_page(tmp_path):
 
 def test_families_of_studies_are_what_they_were():
     families = own_families(sorted((ROOT / "studies").glob("*/*.v[0-9]*.toml")))
-    drawn = {name: instance_of(families[address_of(name).family], address_of(name))
-             for name in INSTANCES}  # fmt: skip
-    hashes = {name: hashlib.sha256(task_text(task).encode()).hexdigest()[:16]
-              for name, task in drawn.items()}  # fmt: skip
-    assert hashes == INSTANCES
-
-
-@pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)
-def test_suite_has_the_name_of_its_folder(folder):
-    assert load_suite(str(folder / "suite.toml")).name == folder.name
+    for name, due in INSTANCES.items():
+        task = instance_of(families[address_of(name).family], address_of(name))
+        assert hashlib.sha256(task_text(task).encode()).hexdigest()[:16] == due
 
 
 def test_the_page_on_studies_has_a_whole_study(tmp_path):

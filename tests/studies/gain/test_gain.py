@@ -4,9 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic.analysis import load
-from tests.support.processes import ROOT, programs
-from tests.support.suites import unpacked
+from tests.support.processes import programs
 
 (GAIN,) = programs("gain", "study")
 
@@ -56,16 +54,15 @@ def test_a_learner_that_gains_nothing_covers_no_gain():
     assert rows["arm"].isna().all()
 
 
-def test_cells_are_means_over_runs(tmp_path):
+def test_cells_are_means_over_runs(measured):
     """Of each run's ticks and its own signatures, in loops over runs."""
-    study = load(unpacked(ROOT / "tests" / "studies" / "gain", tmp_path))
-    cells = GAIN.measure_cells(study)
+    _, study, tables = measured("gain")
     runs = [
         (named, run.task, run.trials, float(run.reward) - run.corrective_best, arm)
         for (_, run), arm in zip(study.runs.iterrows(), study.signature("arm"), strict=True)
         for named in [next(name for key, name in GAIN.NAMES.items() if run.method.startswith(key))]
     ]
-    for row in cells.to_dict("records"):
+    for row in tables["cells"].reset_index().to_dict("records"):
         mine = [
             measured for named, task, trials, *measured in runs
             if (task, named) == (row["task"], row["name"]) and row["trials"] in (0, trials)

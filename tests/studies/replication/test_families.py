@@ -61,16 +61,22 @@ def with_signatures(study, **values):
     return MadeUp(study, **vars(study), **parts)
 
 
-def test_claims_of_generality(monkeypatch):
+@pytest.fixture(scope="module")
+def rising():
+    """Rewards of all conditions and of random search on eight instances of each family."""
+    centres = {**RISING, EC4: lambda n: -540 - n, RANDOM_SEARCH: -580}
+    return rewarded(centres, families=ONE + TWO, count=8)
+
+
+def test_claims_of_generality(monkeypatch, rising):
     alone = SimpleNamespace(reward=ALONE, completed=True)
     monkeypatch.setattr(reader, "corrective_trial", lambda task, hands: alone)
-    centres = {**RISING, EC4: lambda n: -540 - n, RANDOM_SEARCH: -580}
-    study = with_signatures(rewarded(centres, families=ONE + TWO, count=12))
+    study = with_signatures(rising)
     entries = STUDY.judge_by_first([study])
     of_signatures = ["other-arm-coarticulation-in-general", "arm-coarticulation-in-general"]
     for name in ("learning-improves-in-general", "proficiency-rises-in-general", *of_signatures):
         assert entries.replicates[name] == "supported", entries.evidence[name]
-    of_random_search = with_signatures(rewarded(centres, families=ONE + TWO), of_random_search=1.0)
+    of_random_search = with_signatures(rising, of_random_search=1.0)
     # No more than random search shows:
     judged = claims.judge_claims(of_random_search, of_signatures)
     assert set(judged.more_than_selection) == {"undecided"}
@@ -80,9 +86,9 @@ def test_claims_of_generality(monkeypatch):
     assert "fewer than 3 instances of one-armed/v1" in jerk
 
 
-def test_a_claim_that_one_family_does_not_judge_says_what_the_others_show():
+def test_a_claim_that_one_family_does_not_judge_says_what_the_others_show(rising):
     """Random search improves on the corrective process on two tasks of a family alone."""
-    study = with_signatures(rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8))
+    study = with_signatures(rising)
 
     def by_hands(name, task, label):
         if label == RANDOM_SEARCH and task.startswith("long/") and int(task[-1]) > 1:
@@ -99,10 +105,9 @@ def test_a_claim_that_one_family_does_not_judge_says_what_the_others_show():
     assert "long/v1, more than random search" not in shown
 
 
-def test_hands_are_learned_where_they_differ_from_the_closest():
+def test_hands_are_learned_where_they_differ_from_the_closest(rising):
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
-    rewards = rewarded(RISING | {RANDOM_SEARCH: -580}, families=ONE + TWO, count=8)
-    study = with_signatures(rewards, of_random_search=0.1)
+    study = with_signatures(rising, of_random_search=0.1)
 
     def verdict(more):
         def signature_of(name, task, label, *, replay=False):

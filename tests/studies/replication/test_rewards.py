@@ -14,11 +14,16 @@ from tests.support.made_up import runs_of, study_of
 from tests.support.processes import ROOT, programs
 
 FOLDER = ROOT / "studies" / "replication"
-REWARDS, SOLUTIONS, STUDY = programs("replication", "rewards", "solutions", "study")
+REWARDS, STUDY = programs("replication", "rewards", "study")
 
 
-def test_solutions_are_of_the_run_with_the_median_reward(traced):
-    data = SOLUTIONS.measure_solutions(traced)
+@pytest.fixture(scope="module")
+def tables(traced):
+    return STUDY.measure([traced.folder])
+
+
+def test_solutions_are_of_the_run_with_the_median_reward(traced, tables):
+    data = tables["solutions"]
     ticks = -data.groupby(["task", "condition"], sort=False).reward.sum()
     for (name, condition), of_run in ticks.items():
         if condition == "initial":
@@ -46,8 +51,8 @@ def test_published_differences():
     assert data.runs.to_dict() == {"": 3, "RRLR": 0, "RRRR": 2, "LRLR": 1}
 
 
-def test_numbers_are_made_again_from_the_runs(traced):
-    rewards = REWARDS.compare_rewards(traced)
+def test_numbers_are_made_again_from_the_runs(traced, tables):
+    rewards = tables["rewards"]
     assert len(rewards) > 5
     by_id = traced.runs.set_index("run_id").reward.astype(float)
     for row in rewards[rewards.runs > 0].itertuples():
@@ -58,8 +63,7 @@ def test_numbers_are_made_again_from_the_runs(traced):
         assert row.difference == pytest.approx(ours.mean() - row.published, nan_ok=True)
 
 
-def test_the_page_of_a_folder_has_verdicts_evidence_and_what_is_missing(traced, tmp_path):
-    tables = STUDY.measure([traced.folder])
+def test_the_page_of_a_folder_has_verdicts_evidence_and_what_is_missing(tables, tmp_path):
     for name, table in tables.items():
         table.to_csv(tmp_path / f"{name}.csv")
     STUDY.write(tmp_path)
