@@ -9,7 +9,6 @@ import pytest
 from coartic import CoarticError, Task, load_task
 from coartic.analysis import load, ranking
 from coartic.analysis.sections import FIGURES, TABLES
-from coartic.runs.shipped import open_shipped
 
 
 def elements(page, name):
@@ -59,12 +58,11 @@ def test_shipped_results_are_read_as_a_study(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "shipped").mkdir()
     study = load("shipped")
-    with open_shipped("comparison") as store:
-        assert len(study.runs) == len(store.runs()) > 3_000
-    run = study.executed("ascending", "corrective-alone/best-hands").runs[0]
-    assert run.reward == max(study.sequences("ascending").reward.dropna())
-    few = study.runs[study.runs.run == 0]
-    ranked = ranking(few)
+    assert study.suite == "comparison"
+    assert len(study.runs) > 3_000
+    (alone,) = study.cells["ascending", "corrective-alone/best-hands"].reward
+    assert alone == max(study.sequences("ascending").reward.dropna())
+    ranked = ranking(study.runs[study.runs.run == 0])
     assert ranked.missing["dual-process (EC1, EC4)"] == 0
     assert ranked.missing["dual-process/EC1"] > 0
     assert len(next(study.rewards())[1]) > 0

@@ -60,7 +60,8 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
     hit, stored = evidence.records[:2]
     goal, hand = hit % goals, trials.hands[evidence.trial, hit % goals]
 
-    ratio = (residual**2).sum(axis=1) / (scale**2 + noise**2 * weights.power(2).sum(axis=1))
+    shared = noise**2 * evidence.shared(kappa)
+    ratio = (residual**2).sum(axis=1) / (scale**2 + shared.diagonal())
     middle = np.median(ratio / stats.chi2.median(dimensions))
     is_far = ratio > middle * stats.chi2.isf(RARE, dimensions)
     is_false = np.isin(evidence.records[1:], hit[is_far]).any(axis=0)
@@ -68,8 +69,7 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
     variance = np.where(use, scale**2, 4.0)  # of what is not used: nothing is expected
     precision = sparse.diags_array(1 / variance)
     if noise:
-        covariance = noise**2 * (weights @ weights.T).toarray() + np.diag(variance)
-        precision = linalg.inv(covariance)
+        precision = linalg.inv(shared + np.diag(variance))
     scores, diagonal = precision @ residual, precision.diagonal()
     noises = noise**2 * (weights.T @ scores)
     postures = trials.postures.reshape(-1, task.robot.dof)[: len(noises)] - noises

@@ -8,7 +8,8 @@ of the postures in it (the hit, the stored posture, the start, the next stored p
 B: residuals are N(0, σ² s² + τ² B Bᵀ).
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from models import HANDS, landings, starts, tables_before
@@ -25,7 +26,8 @@ ELSEWHERE = 0.02
 noise can make a movement cross the goal at once or not; the residual then has an SD of 1."""
 
 
-class Evidence(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Evidence:
     """Evidence on a model in the trials of a subject: m postures and n choices of a hand."""
 
     kappas: tuple
@@ -46,6 +48,7 @@ class Evidence(NamedTuple):
     explored: np.ndarray
     """Probability of the chosen hand in exploration, shape ``(n,)``."""
 
+    @lru_cache(maxsize=16)  # noqa: B019 - a search asks again and again at one value
     def at(self, kappa):
         """Return residuals ``(m, dof)`` and shares ``(m,)`` at a value of κ."""
         if len(self.nodes) == 1:
@@ -70,17 +73,23 @@ class Evidence(NamedTuple):
         shape = len(share), int(self.records.max()) + 1
         return sparse.csr_array((each[there], (row[there], self.records[there])), shape)
 
+    @lru_cache(maxsize=4)  # noqa: B019
+    def shared(self, kappa):
+        """Return B Bᵀ, the covariance of residuals in units of the motor noise, squared."""
+        weights = self.weights(kappa)
+        return (weights @ weights.T).toarray()
+
     def covariance(self, sigma, kappa, noise, residual):
         """Return the covariance of residuals, or its diagonal if they are independent, and where
         hits landed elsewhere."""
         variance = (sigma * self.at(kappa)[1]) ** 2
-        b = self.weights(kappa) if noise else None
-        total = variance + (noise**2 * b.power(2).sum(axis=1) if noise else 0.0)
+        shared = self.shared(kappa) if noise else None
+        total = variance + (noise**2 * shared.diagonal() if noise else 0.0)
         square = (residual**2).sum(axis=1)
         here = np.log(1 - ELSEWHERE) - (self.sizes * np.log(total) + square / total) / 2
         elsewhere = here < np.log(ELSEWHERE) - square / 2
         variance = np.where(elsewhere, 1.0, variance)
-        full = noise**2 * (b @ b.T).toarray() + np.diag(variance) if noise else variance
+        full = noise**2 * shared + np.diag(variance) if noise else variance
         return full, elsewhere
 
     def log_likelihood(self, sigma, kappa, noise):

@@ -10,6 +10,7 @@ import argparse
 import os
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more are slower on a machine that others use
@@ -73,7 +74,7 @@ def bias(task, condition, trials, log_sigma, kappa):
     """
     simulated = np.exp(log_sigma), kappa, SIMULATED
     evidence = evidence_in(task, condition, trials, "informed", simulated=simulated)
-    each = [most_likely(evidence._replace(nodes=nodes), 0.0)[0] for nodes in evidence.nodes]
+    each = [most_likely(replace(evidence, nodes=nodes), 0.0)[0] for nodes in evidence.nodes]
     return np.mean(each, axis=0) - [log_sigma, kappa]
 
 

@@ -76,11 +76,11 @@ def practise(averages, trials, rng):
             yield trial, goal, ticks / 100, [angle + rng.gauss(0, MOTOR) for angle in q]
 
 
-def main():
+def main(trials=100):
     """Print the recording as CSV."""
     print("subject,trial,goal,hand,duration,right_1,right_2,right_3")
     for subject, averages in (("p1", False), ("p2", True)):
-        for trial, goal, duration, q in practise(averages, 100, random.Random(subject)):
+        for trial, goal, duration, q in practise(averages, trials, random.Random(subject)):
             angles = ",".join(f"{angle:.3f}" for angle in q)
             print(f"{subject},{trial},{goal},right,{duration:.2f},{angles}")
 

@@ -63,12 +63,12 @@ def at_equal_gain(cells, how="linear"):
     rows = []
     for _, of_task in cells.groupby("task", sort=False):
         learner = of_task[(of_task.name == "learner") & (of_task[gain] > 0)].sort_values(gain)
+        measured = {name: learner.dropna(subset=name) for name in SIGNATURES}
         for row in of_task[of_task.name != "learner"].to_dict("records"):
             most = learner[gain].max() if len(learner) else -np.inf
             status = BELOW if row[gain] < 0 else BEYOND if row[gain] > most else "compared"
             out = {key: row[key] for key in ("group", "task", "name", "trials")}
-            for name in SIGNATURES:
-                known = learner.dropna(subset=name)
+            for name, known in measured.items():
                 covered = status == "compared" and len(known) and known[gain].max() >= row[gain]
                 gains, values = np.append(0.0, known[gain]), np.append(0.0, known[name])
                 nearest = values[np.abs(gains - row[gain]).argmin()]

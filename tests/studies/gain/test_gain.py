@@ -16,9 +16,6 @@ def planted(*rows):
     return cells.assign(group="one-armed", task="a", trials=1, **others)
 
 
-LEARNER = ("learner", 10.0, 2.0), ("learner", 20.0, 6.0)
-
-
 @pytest.mark.parametrize(
     ("how", "gain", "at"),
     [
@@ -30,21 +27,20 @@ LEARNER = ("learner", 10.0, 2.0), ("learner", 20.0, 6.0)
         ("nearest", 6.0, 2.0),
         ("nearest", 16.0, 6.0),
         ("same hands", 15.0, 4.0),
+        ("linear", -0.1, "gain below 0"),
+        ("linear", 20.1, "beyond the learner"),
     ],
 )
 def test_the_learner_is_interpolated_between_its_gains(how, gain, at):
-    (row,) = GAIN.at_equal_gain(planted(*LEARNER, ("CMA-ES", gain, 7.0)), how).to_dict("records")
-    assert row["status"] == "compared"
-    assert (row["arm"], row["first"]) == (7.0 - at, 3.5 - at / 2)
-
-
-@pytest.mark.parametrize(
-    ("gain", "status"), [(-0.1, "gain below 0"), (20.1, "beyond the learner"), (20.0, "compared")]
-)
-def test_what_the_learner_does_not_gain_is_counted_and_not_compared(gain, status):
-    (row,) = GAIN.at_equal_gain(planted(*LEARNER, ("CMA-ES", gain, 7.0))).to_dict("records")
-    assert row["status"] == status
-    assert np.isnan(row["arm"]) == (status != "compared")
+    """What it does not gain is counted, and not compared."""
+    learner = ("learner", 10.0, 2.0), ("learner", 20.0, 6.0)
+    (row,) = GAIN.at_equal_gain(planted(*learner, ("CMA-ES", gain, 7.0)), how).to_dict("records")
+    if isinstance(at, str):
+        assert row["status"] == at
+        assert np.isnan(row["arm"])
+    else:
+        assert row["status"] == "compared"
+        assert (row["arm"], row["first"]) == (7.0 - at, 3.5 - at / 2)
 
 
 def test_a_learner_that_gains_nothing_covers_no_gain():

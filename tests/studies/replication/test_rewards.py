@@ -91,15 +91,6 @@ def test_spreads_against_normal_samples():
     assert np.isnan(REWARDS.spread_p(values[:9], 3.0, 20))
 
 
-def test_interval_against_an_exact_value_is_students():
-    ours = np.random.default_rng(14).normal(-484, 4, 12)
-    interval = REWARDS.difference_to_published(ours, -484, None, 20)
-    one_run = REWARDS.difference_to_published(ours, -484, 3.0, 1)  # has no spread
-    assert repr(one_run) == repr(interval)  # NaN, too
-    expected = stats.ttest_1samp(ours, -484).confidence_interval(0.95)
-    assert (interval.low, interval.high) == pytest.approx((expected.low + 484, expected.high + 484))
-
-
 @pytest.mark.parametrize(
     ("low", "high", "expected"),
     [
@@ -115,13 +106,19 @@ def test_verdicts(low, high, expected):
     assert REWARDS.equivalence(Estimate(0.0, low, high), 5.0) == expected
 
 
-def test_interval_of_two_samples_is_welchs():
+def test_interval_is_welchs_and_against_an_exact_value_students():
     rng = np.random.default_rng(15)
     ours, theirs = rng.normal(-503, 5, 20), rng.normal(-502, 3, 15)
-    expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
-    published = REWARDS.difference_to_published(ours, theirs.mean(), theirs.std(ddof=1), 15)
-    assert published.n == (20, 15)
-    assert (published.low, published.high) == pytest.approx((expected.low, expected.high))
+
+    def ends(sd, runs):
+        difference = REWARDS.difference_to_published(ours, theirs.mean(), sd, runs)
+        return difference.low, difference.high
+
+    welchs = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
+    assert ends(theirs.std(ddof=1), 15) == pytest.approx((welchs.low, welchs.high))
+    students = stats.ttest_1samp(ours - theirs.mean(), 0.0).confidence_interval(0.95)
+    assert ends(None, 20) == ends(3.0, 1) == pytest.approx((students.low, students.high))
+    assert REWARDS.difference_to_published(ours, 0.0, 1.0, 15).n == (20, 15)
     assert math.isnan(REWARDS.difference_to_published([1.0], 2.0, 1.0, 3).low)
     point = REWARDS.difference_to_published(np.ones(4), 3.0, 0.0, 4)
     assert (point.low, point.high) == (-2.0, -2.0)
