@@ -62,7 +62,7 @@ def test_parameters_of_the_plain_learner_are_found():
 def rough(people, noise=0.0):
     """The row of one subject, without intervals, which take long."""
     trials, condition = FIT.trials_of(people, TASK), FIT.condition_for(TASK)
-    plan = FIT.plan_for(TASK)
+    plan = PROTOCOLS.plan_of(TASK.name)
     return FIT.fit_subject(TASK, condition, trials, noise=noise, plan=plan, intervals=False)
 
 
@@ -129,7 +129,7 @@ def test_what_cannot_be_fitted_is_refused(people):
         FIT.fit(people, metres_task())
 
 
-@pytest.mark.parametrize(("subjects", "simulated"), [("s", 19), ("p1", 19), ("p2", 39)])
+@pytest.mark.parametrize(("subjects", "simulated"), [("s", 19), ("p1", 9), ("p2", 39)])
 def test_how_to_shows_what_the_command_prints(
     subjects, simulated, tmp_path, monkeypatch, capsys, fewer_simulated
 ):

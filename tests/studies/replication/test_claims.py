@@ -528,8 +528,8 @@ def study(tmp_path_factory):
     ]
     planned = [cell_on(load_task(task), KNOWN[method]) for task, method in cells]
     folder = tmp_path_factory.mktemp("claims")
-    study = run_and_write(folder, planned, runs=4, trials=600, executor=InProcess())
-    study.runs["trials"] = study.runs.trials.replace(600, 10_000)  # as long as the paper's
+    study = run_and_write(folder, planned, runs=3, trials=300, executor=InProcess())
+    study.runs["trials"] = study.runs.trials.replace(300, 10_000)  # as long as the paper's
     return study
 
 

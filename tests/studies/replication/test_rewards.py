@@ -64,7 +64,8 @@ def test_numbers_are_made_again_from_the_runs(traced, tables):
 
 
 def test_the_page_of_a_folder_has_verdicts_evidence_and_what_is_missing(tables, tmp_path):
-    for name, table in tables.items():
+    few = tables["solutions"].query("task == 'ascending'")  # each run has panels of its own
+    for name, table in (tables | {"solutions": few}).items():
         table.to_csv(tmp_path / f"{name}.csv")
     STUDY.write(tmp_path)
     page = (tmp_path / "page.html").read_text("utf-8")
