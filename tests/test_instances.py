@@ -9,19 +9,24 @@ from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics.instances import other_tasks, task_mean
 
 
+def width(estimate):
+    return estimate.high - estimate.low
+
+
+def due(variance, n, rel):
+    """Twice 1.96 times the root of a variance over a number."""
+    return pytest.approx(2 * 1.96 * math.sqrt(variance / n), rel=rel)
+
+
 def test_width_of_the_interval():
-    """The root of the variance of instances over their number, twice 1.96 times."""
     centres = np.linspace(-1, 1, 40)
     plain = other_tasks({"a": [np.full(3, c) for c in centres]})
     assert plain.value == pytest.approx(0)
-    assert plain.high - plain.low == pytest.approx(
-        2 * 1.96 * centres.std(ddof=1) / math.sqrt(40), rel=0.08
-    )
+    assert width(plain) == due(centres.var(ddof=1), 40, 0.08)
     # Runs add their own: variance 1 of each of 4.
     runs = np.array([-1.0, 1.0, -1.0, 1.0]) * math.sqrt(3 / 4)
     noisy = other_tasks({"a": [c + runs for c in centres]})
-    wider = math.sqrt((centres.var(ddof=1) + 3 / 4 / 4) / 40)
-    assert noisy.high - noisy.low == pytest.approx(2 * 1.96 * wider, rel=0.08)
+    assert width(noisy) == due(centres.var(ddof=1) + 3 / 4 / 4, 40, 0.08)
 
 
 def test_the_interval_of_few_instances_by_counting():
@@ -61,8 +66,7 @@ def test_given_tasks_are_strata():
     runs = rng.normal(0, 1, (4, 20))
     mean = task_mean([100 * i + runs[i] for i in range(4)])
     assert mean.value == pytest.approx(150 + runs.mean())
-    error = math.sqrt(sum(of_task.var() / 20 for of_task in runs)) / 4
-    assert mean.high - mean.low == pytest.approx(2 * 1.96 * error, rel=0.1)
+    assert width(mean) == due(runs.var(axis=1).sum() / 4**2, 20, 0.1)
     assert task_mean([[1.0] * 4, [5.0] * 40]).value == 3.0  # each counts the same
     with pytest.raises(ValueError, match="needed is a sample at least"):
         task_mean([])

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coartic.analysis import SIGNATURES, judging
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
-from tests.support.made_up import MadeUp, made
+from coartic.analysis import judging
+from coartic.analysis.methods import EC2, EC4, RANDOM_SEARCH
+from tests.support.made_up import MadeUp
 from tests.support.processes import programs
 from tests.test_random_tasks import ALONE, ONE, RISING, TWO, hands_of, rewarded
 
@@ -21,43 +21,30 @@ def _fewer_resamples(monkeypatch):
     monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
 
 
-def made_up_signatures(study, hand=1.0, idle=0.3, of_random_search=0.5):
-    """Signatures of the learner, and of random search: that share of them, more by a little."""
-    by_cell = {}
-    for name in study.tasks:
-        for label in (EC1, EC2, EC3, EC4, RANDOM_SEARCH):
-            if (name, label) in study.cells:
-                number = int(name[-3:])
-                values = {
-                    "arm": np.array([2.0, 3.0 + 0.1 * number]),
-                    "first": np.array([5.0, 6.0 + 0.1 * number]),
-                    "whole": np.array([9.0, 8.0 + 0.1 * number]),
-                }
-                if len(study.tasks[name].hands) > 1:
-                    values["hand"] = np.array([hand, hand, hand - 0.1 * (number == 0)])
-                    values["other arm"] = np.array([idle + 0.01 * number])
-                if label == RANDOM_SEARCH:
-                    off = 0.001 * (number - 2)
-                    values = {name: of_random_search * of + off for name, of in values.items()}
-                by_cell[name, label] = values
-    return by_cell
+def with_signatures(study, of_random_search=0.5):
+    """A study whose runs are not executed: their signatures are made up, those of random search as
+    a share of the learner's, more by a little."""
 
+    def signature_of(name, task, label, *, replay=False):
+        number = int(task[-3:])
+        values = {
+            "arm": [2.0, 3.0 + 0.1 * number],
+            "first": [5.0, 6.0 + 0.1 * number],
+            "whole": [9.0, 8.0 + 0.1 * number],
+        }
+        if len(study.tasks[task].hands) > 1:
+            values["hand"] = [1.0, 1.0, 1.0 - 0.1 * (number == 0)]
+            values["other arm"] = [0.3 + 0.01 * number]
+        shown = np.array(values.get(name, ()))
+        if label == RANDOM_SEARCH:
+            return of_random_search * shown + 0.001 * (number - 2)
+        return shown
 
-def with_signatures(study, **values):
-    """A study whose runs are not executed: their signatures are made up."""
-    by_cell = made_up_signatures(study, **values)
-    signatures = {(name, *cell): of_cell.get(name, np.empty(0))
-                  for cell, of_cell in by_cell.items() for name in SIGNATURES}  # fmt: skip
-    with_hands = {
-        cell: {"" if cell[0] == "hand" else hands_of(cell[1]): values}
-        for cell, values in signatures.items()
-        if len(values)
-    }
+    def by_hands(name, task, label):
+        values = signature_of(name, task, label)
+        return {"" if name == "hand" else hands_of(task): values} if len(values) else {}
 
-    def by_hands(*cell):
-        return with_hands.get(cell, {})
-
-    parts = {"signature_of": made(signatures), "signature_by_hands": by_hands}
+    parts = {"signature_of": signature_of, "signature_by_hands": by_hands}
     return MadeUp(study, **vars(study), **parts)
 
 
