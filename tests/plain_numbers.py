@@ -5,6 +5,7 @@ import json
 import lzma
 import sqlite3
 import tempfile
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -16,68 +17,54 @@ ALONE = {"ascending": -319, "descending": -333, "two-armed-1": -532, "two-armed-
 """Rewards of the corrective process alone with its best hands."""
 
 
-def read(path):
-    """Rows of view ``runs`` and of view ``solutions``, as dictionaries."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "runs.sqlite"
-        file.write_bytes(lzma.decompress(path.read_bytes()))
-        base = sqlite3.connect(file)
-        base.row_factory = sqlite3.Row
-        tables = [
-            [dict(row) for row in base.execute(f"SELECT * FROM {view}")]
-            for view in ("runs", "solutions")
-        ]
-        base.close()
-    return tables
+LEARNER = "dual-process/EC1", "dual-process/EC4"
+METHODS = {
+    "learner": LEARNER, "cma": ("cma-es/bandit",) * 2,
+    "hill climbing": ("hill-climbing",) * 2, "random search": ("random-search",) * 2,
+}  # fmt: skip
+"""Methods on tasks with one arm and with two."""
 
 
 def numbers(path=SHIPPED):
     """Return the numbers by name."""
-    runs, movements = read(path)
-    ticks = {}
-    for move in movements:
-        ticks.setdefault(move["run_id"], {}).setdefault(move["goal"], []).append(move["ticks"])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "runs.sqlite"
+        file.write_bytes(lzma.decompress(path.read_bytes()))
+        with closing(sqlite3.connect(file)) as base:
+            return {name: float(value) for name, value in computed(base)}
 
-    def of(method, task, setting=""):
-        key = method, task, setting
-        return [r for r in runs if (r["method"], r["task"], r["setting"]) == key]
 
-    def rewards(*cell):
-        return np.array([run["reward"] for run in of(*cell)], dtype=float)
+def computed(base):
+    """Yield the numbers with their names, from views ``runs`` and ``solutions``."""
+
+    def of(column, method, task, setting=""):
+        query = f"SELECT {column} FROM runs WHERE method = ? AND task = ? AND setting = ?"
+        return np.array([value for (value,) in base.execute(query, (method, task, setting))])
 
     def first(method, task):
-        (alone,) = of("corrective-alone/given", task)
-        before = sum(ticks[alone["run_id"]][1])
-        return np.mean([sum(ticks[run["run_id"]][1]) - before for run in of(method, task)])
+        ticks = "SELECT sum(ticks) FROM solutions s WHERE s.run_id = runs.run_id AND goal = 1"
+        return of(f"({ticks})", method, task).mean()
 
-    def mean_over_tasks(score, one, two):
-        return np.mean([score(one if task in ("ascending", "descending") else two, task)
-                        for task in BEST])  # fmt: skip
+    def reward(*cell):
+        return of("reward", *cell).mean()
 
-    def gap(method, task):
-        return (BEST[task] - rewards(method, task).mean()) / abs(BEST[task])
-
-    def share(method, task):
-        return (rewards(method, task).mean() - ALONE[task]) / (BEST[task] - ALONE[task])
-
-    learner = "dual-process/EC1", "dual-process/EC4"
-    result = {}
     for task in ("ascending", "descending"):
-        for method in (learner[0], "random-search"):
-            result[f"first {task} {method}"] = first(method, task)
-            result[f"whole {task} {method}"] = rewards(method, task).mean() - ALONE[task]
-    for name, methods in (("learner", learner), ("cma", ("cma-es/bandit",) * 2),
-                          ("hill climbing", ("hill-climbing",) * 2),
-                          ("random search", ("random-search",) * 2)):  # fmt: skip
-        result[f"gap {name}"] = mean_over_tasks(gap, *methods)
-        result[f"share {name}"] = mean_over_tasks(share, *methods)
-    ec2 = [run["hands"] for run in of("dual-process/EC2", "two-armed-1")]
-    result["EC2 RRLR"] = ec2.count("RRLR")
-    ec3 = [run["hands"] for run in of("dual-process/EC3", "two-armed-2")]
-    result["EC3 RLRR"] = ec3.count("RLRR")
-    result["RLRR random search"] = rewards("random-search", "two-armed-2", "hands=RLRR").mean()
-    result["EC4 two-armed-2"] = rewards(learner[1], "two-armed-2").mean()
-    return {name: float(value) for name, value in result.items()}
+        for method in (LEARNER[0], "random-search"):
+            yield (
+                f"first {task} {method}",
+                first(method, task) - first("corrective-alone/given", task),
+            )
+            yield f"whole {task} {method}", reward(method, task) - ALONE[task]
+    for name, methods in METHODS.items():
+        mean = {task: reward(methods["armed" in task], task) for task in BEST}
+        yield f"gap {name}", np.mean([mean[task] / best - 1 for task, best in BEST.items()])
+        yield f"share {name}", np.mean([
+            (mean[task] - ALONE[task]) / (best - ALONE[task]) for task, best in BEST.items()
+        ])  # fmt: skip
+    yield "EC2 RRLR", (of("hands", "dual-process/EC2", "two-armed-1") == "RRLR").sum()
+    yield "EC3 RLRR", (of("hands", "dual-process/EC3", "two-armed-2") == "RLRR").sum()
+    yield "RLRR random search", reward("random-search", "two-armed-2", "hands=RLRR")
+    yield "EC4 two-armed-2", reward(LEARNER[1], "two-armed-2")
 
 
 if __name__ == "__main__":
