@@ -130,6 +130,9 @@ def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
                 for _ in range(3 if len(box) else 1):
                     relaxed = root.solve(box)
                     assert np.isfinite(relaxed.q).all()
+                    pulls, forces, speeds = relaxed.multipliers
+                    for much in ((pulls, forces, speeds + 1), (0 * pulls, 0 * forces, speeds + 9)):
+                        assert root.lagrangian(much, length).bound(box) <= length + 1e-9
                     lagrangian = root.lagrangian(relaxed.multipliers, length)
                     least = lagrangian.bound(box)
                     assert least <= length + 1e-9
@@ -302,6 +305,10 @@ def test_two_goals_hit_at_once_count_once():
     assert PROOF.mergeable(task, hands_of("LR")) == (0, 1)
     assert PROOF.mergeable(task, hands_of("LL")) == (0,)
     assert PROOF.mergeable(task, (None, None)) == (0, 1)
+    for apart, both in ((0.19, (1,)), (0.21, ())):
+        goals = [[5.0, 1.0], [5.0 + apart, 1.0]]
+        overlapping = tiny_task(goals=goals, radius=0.1)
+        assert PROOF.mergeable(overlapping, hands_of("RR"))[-1:] == both
     alone = [Movement(1, "left", "corrective"), Movement(2, "right", "corrective")]
     assert execute(task, alone).ticks == 0
     assert PROOF.certify(task, 1, 50).ticks == 0
