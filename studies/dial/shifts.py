@@ -2,6 +2,7 @@
 
 import runpy
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -68,15 +69,29 @@ def tabulate_shifts(shifts):
     return table
 
 
+def by_task(rows, setting, column, family):
+    """Return the means of a column under a setting on the tasks of a family that have values."""
+    rows = rows[(rows.setting == setting) & (rows.family == family)]
+    return rows.groupby("task")[column].mean().dropna()
+
+
+def in_each(sentence, values, bound=0.0, side="greater", families=FAMILIES):
+    """Test in every family the mean over tasks of ``values(family)`` against a bound."""
+    return all_of(*(mean_beyond(f"{family}: {sentence}", values(family), bound, side)
+                    for family in families))  # fmt: skip
+
+
 def judge_shifts(shifts):
     """The claims on an announced change, registered before any test instance was run."""
 
-    def of(column, setting, family):
-        rows = shifts[(shifts.setting == setting) & (shifts.family == family)]
-        return rows.set_index("task")[column]
+    def of(column, setting=PLANNER):
+        return partial(by_task, shifts, setting, column)
+
+    def quicker(family):
+        return of("log_half", PAPER)(family) - of("log_half")(family)
 
     how = "one-tailed bootstrap tests over 30 random tasks, one-armed and two-armed: "
-    families = FAMILIES[:2]
+    in_both = partial(in_each, families=FAMILIES[:2])
     return judge({
         "drift-makes-the-shift-quick": (
             "With κ = 1 and little noise half of the shift takes less than a fifth of the paper's"
@@ -84,26 +99,21 @@ def judge_shifts(shifts):
             f"{how}the logarithm of the trials to half of the shift is lower by more than that of "
             f"{TIMES:g}"
             "; refuted where it takes more",
-            all_of(*(mean_beyond(f"{family}: 10^{{}} times fewer trials",
-                                 of("log_half", PAPER, family) - of("log_half", PLANNER, family),
-                                 float(np.log10(TIMES))) for family in families)),
+            in_both("10^{} times fewer trials", quicker, float(np.log10(TIMES))),
         ),
         "drift-shifts-within-ten-trials": (
             "After ten trials with κ = 1 and little noise, between a tenth and nine tenths of the"
             " shift is there: more than in the paper's learner, less than in a planner.",
             f"{how}the share after ten trials above 0.1 and below 0.9"
             "; refuted where it is not between",
-            all_of(*(mean_beyond(f"{family}: the share is {{}}",
-                                 of("share_10", PLANNER, family), bound, side)
-                     for family in families for bound, side in ((0.1, "greater"), (0.9, "less")))),
+            all_of(*(in_each("the share is {}", of("share_10"), *beyond, families=[family])
+                     for family in FAMILIES[:2] for beyond in ((0.1, "greater"), (0.9, "less")))),
         ),
         "shift-is-of-the-change": (
             "With κ = 1 and little noise less than half of the shift is there after as much "
             "practice without a change.",
             f"{how}the shift without a change, projected, below 0.5"
             "; refuted where it is more",
-            all_of(*(mean_beyond(f"{family}: the share is {{}}",
-                                 of("unchanged", PLANNER, family), 0.5, "less")
-                     for family in families)),
+            in_both("the share is {}", of("unchanged"), 0.5, "less"),
         ),
     })  # fmt: skip

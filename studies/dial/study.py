@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from settings import AFTER, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TIMES, TRIALS
-from shifts import judge_shifts, measure_shifts, tabulate_shifts
+from shifts import by_task, in_each, judge_shifts, measure_shifts, tabulate_shifts
 
-from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
+from coartic.analysis import all_of, figures, judge, means, write_study
 
 POINTS = 5.0
 """Points of the gain that count as a difference, set before the runs."""
@@ -63,18 +63,11 @@ def tabulate(runs):
 def judge_claims(runs):
     """The claims, as they were registered before any random test task was run."""
 
-    def of(setting, column, family):
-        rows = runs[(runs.setting == setting) & (runs.family == family)]
-        return rows.groupby("task")[column].mean().dropna()
-
-    def in_each(sentence, compare, bound=0.0, families=FAMILIES):
-        return all_of(*(mean_beyond(f"{family}: {sentence}", compare(family), bound)
-                        for family in families))  # fmt: skip
-
     def more(first, second, column="gain_100"):
-        return lambda family: of(first, column, family) - of(second, column, family)
+        return lambda family: (
+            by_task(runs, first, column, family) - by_task(runs, second, column, family)
+        )
 
-    two_armed = FAMILIES[1:]
     how = "one-tailed bootstrap tests over 40 random tasks, in each family, of the gain "
     return judge({
         "information-in-exploration-brings-much": (
@@ -123,7 +116,7 @@ def judge_claims(runs):
             f"{how}after 10,000 trials: without drift more than {POINTS:g} points more"
             "; refuted where it gains more",
             in_each("{} points more without drift", more(PAPER, "1 0.05 start", "gain_10000"),
-                    POINTS, two_armed),
+                    POINTS, families=FAMILIES[1:]),
         ),
         "drawn-drift-is-as-good": (
             "A drift that each trial draws gains as much after 100 trials as κ = 0.3, to five "
@@ -138,9 +131,9 @@ def judge_claims(runs):
             f"{how}: on long tasks after 100 trials more than {POINTS:g} points more, on two-armed "
             "and redundancy tasks after 10,000 less",
             all_of(
-                in_each("{} points more", more("hands", PAPER), POINTS, ("long",)),
-                in_each("{} points less", more(PAPER, "hands", "gain_10000"), 0.0,
-                        ("two-armed", "redundancy")),
+                in_each("{} points more", more("hands", PAPER), POINTS, families=("long",)),
+                in_each("{} points less", more(PAPER, "hands", "gain_10000"),
+                        families=("two-armed", "redundancy")),
             ),
         ),
     })  # fmt: skip

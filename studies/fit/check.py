@@ -42,13 +42,13 @@ STILL = 1e-6
 """Spread of postures, or of ticks as a share, below which trials are equal."""
 
 
-def statistics_of(task, condition, trials, model, fitted, noise, plan):
+def statistics_of(task, condition, trials, model, fitted, noise):
     """Return :data:`STATISTICS` by name, and a pair of the share and the SD of single outliers;
     None if no hit shows anything. ``fitted``: σ, ε and κ of the model; ``noise``: SD of motor
-    noise; ``plan`` as of :func:`models.plan_for`."""
+    noise."""
     sigma, _, kappa = fitted
     drifts = DRIFTS if model == "drawn" else (kappa,)
-    evidence = evidence_in(task, condition, trials, model, plan, kappas=drifts)
+    evidence = evidence_in(task, condition, trials, model, kappas=drifts)
     if not len(evidence.trial):
         return None
     number = np.unique(evidence.trial, return_inverse=True)[1]
@@ -116,7 +116,7 @@ def statistics_of(task, condition, trials, model, fitted, noise, plan):
     return statistics, (is_single.mean(), np.sqrt(spread))
 
 
-def compare(task, condition, trials, model, fitted, noise, plan):
+def compare(task, condition, trials, model, fitted, noise):
     """Compare a person with simulated people; parameters as of :func:`statistics_of`.
 
     Returns
@@ -128,9 +128,9 @@ def compare(task, condition, trials, model, fitted, noise, plan):
     """
     begin = int(np.flatnonzero(np.isfinite(trials.rewards))[0])
     trials = Trials(*(each[begin:] for each in trials))
-    recorded, (share, spread) = statistics_of(task, condition, trials, model, fitted, noise, plan)
+    recorded, (share, spread) = statistics_of(task, condition, trials, model, fitted, noise)
     people = simulate(task, model, *fitted, seeds=range(SIMULATED), trials=len(trials.hands),
-                      condition=condition, plan=plan,
+                      condition=condition,
                       first=(trials.hands[0], trials.postures[0]))  # fmt: skip
     people = [trials_of(person, task) for _, person in people.groupby("subject")]
 
@@ -145,7 +145,7 @@ def compare(task, condition, trials, model, fitted, noise, plan):
             seen = np.where(lost[..., None], np.nan, postures + added)
             known = np.where(lost.any(axis=1), np.nan, rewards)
             seen = Trials(np.where(lost, -1, hands), seen, known)
-            each.append(statistics_of(task, condition, seen, model, fitted, noise, plan))
+            each.append(statistics_of(task, condition, seen, model, fitted, noise))
         each = [one for one in each if one]
         found = {name: np.array([one[name] for one, _ in each]) for name in STATISTICS}
         return found, np.mean([single for _, (single, _) in each])

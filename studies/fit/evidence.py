@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from models import HANDS, landings, starts, tables_before
+from models import HANDS, landings, plan_for, starts, tables_before
 from scipy import linalg, sparse
 
 DRIFTS = (0.0, 0.03, 0.1, 0.3, 1.0)
@@ -139,12 +139,11 @@ def prior_of(elsewhere):
     return np.log(np.where(elsewhere, ELSEWHERE, 1 - ELSEWHERE)).sum()
 
 
-def evidence_in(task, condition, trials, model, plan=None, simulated=None, kappas=None):
+def evidence_in(task, condition, trials, model, simulated=None, kappas=None):
     """Return the evidence on a model in the trials of a subject, at drifts ``kappas``; the
-    planner's ``plan`` replaces tables where it has the hand, ``simulated`` as of
-    :func:`landings`."""
+    planner's plan replaces tables where it has the hand, ``simulated`` as of :func:`landings`."""
     rule = {"informed": "best", "drawn": "best", "planner": "memoryless"}.get(model, model)
-    plan = plan if model == "planner" else None
+    plan = plan_for(task) if model == "planner" else None
     rows = tables_before(task, condition, trials, rule)
     q = starts(task, trials, rows)
     follows = (rows.hand == (plan[0][rows.goal] if plan else rows.greedy)).to_numpy()

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from check import compare, misfits, refuse_without_null_space, why_not
 from evidence import DRIFTS, NODES, evidence_in
-from models import condition_for, plan_for, trials_of
+from models import condition_for, trials_of
 from scipy import optimize, stats
 from sentences import CLEAR, LEARNERS, MODELS, sentence
 
@@ -97,15 +97,15 @@ def with_intervals(evidence, noise, log_sigma, kappa, off):
     return Estimate(*sigmas).columns("sigma") | Estimate(*kappas).columns("kappa")
 
 
-def fit_subject(task, condition, trials, *, noise, plan, intervals=True):
+def fit_subject(task, condition, trials, *, noise, intervals=True):
     """Fit all models to the trials of a subject; a dictionary of numbers, ``misfit`` in words, and
     ``model`` and ``others`` as of :func:`judge`. ``sigma``, ``epsilon`` and ``kappa`` are of *keep
     the best, informed*; ``bic_`` of each model. With ``intervals``, σ and κ have intervals, and
-    their bias is taken off. ``noise`` as of :func:`fit`, ``plan`` of :func:`models.plan_for`."""
+    their bias is taken off. ``noise`` as of :func:`fit`."""
     row, fitted = {}, {}
     for model in MODELS:
         if model not in LEARNERS[1:]:  # which have the same tables
-            evidence = evidence_in(task, condition, trials, model, plan)
+            evidence = evidence_in(task, condition, trials, model)
         count = int(evidence.sizes.sum()) + len(evidence.follows)
         free, total, epsilon, kappa = 1, 0.0, 0.0, 0.0
         if len(condition.hands) > 1:
@@ -136,7 +136,7 @@ def fit_subject(task, condition, trials, *, noise, plan, intervals=True):
     model, others = judge(row)
     ratios = {}
     for name in (model, *others):  # one of those that BIC cannot distinguish may fit
-        each = compare(task, condition, trials, name, fitted[name], noise, plan)
+        each = compare(task, condition, trials, name, fitted[name], noise)
         ratios = ratios or each
         if not misfits(each):
             ratios = each
@@ -166,7 +166,6 @@ def fit(frame, task, *, condition=None, noise=0.0):
     refuse_without_null_space(task, condition)
     if other := {*frame.hand} - {*condition.hands}:
         raise CoarticError(f"{condition.id} does not use the {other.pop()} hand, the data do")
-    plan = plan_for(task)
     for subject, of_subject in frame.groupby("subject", sort=False):
         trials = trials_of(of_subject, task)
         hits = (trials.hands >= 0).sum(axis=1)
@@ -179,7 +178,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
         if why := why_not(task, condition, trials):
             warnings.warn(f"subject {subject} is left out: {why}", stacklevel=2)
             continue
-        rows.append(row | fit_subject(task, condition, trials, noise=noise, plan=plan))
+        rows.append(row | fit_subject(task, condition, trials, noise=noise))
     return pd.DataFrame(rows)
 
 

@@ -18,6 +18,7 @@ from coartic.motion.trial import reach_goals
 
 HANDS = ("left", "right")
 """Hands in the order in which arrays count them."""
+_PLANS = {}
 
 
 class Trials(NamedTuple):
@@ -58,9 +59,12 @@ def explored_by(task, condition):
 
 def plan_for(task):
     """Return hands (places in HANDS) and postures ``(G, dof)`` at the goals of a planner, which
-    sees the current goal and the next."""
-    done = execute(task, run_method(TwoGoals(), task)[0].solution)
-    return np.array(["LR".index(letter) for letter in done.hands]), done.configurations
+    sees the current goal and the next; made once for each task."""
+    if (key := task.model_dump_json()) not in _PLANS:
+        done = execute(task, run_method(TwoGoals(), task)[0].solution)
+        hands = np.array(["LR".index(letter) for letter in done.hands])
+        _PLANS[key] = hands, done.configurations
+    return _PLANS[key]
 
 
 def projection(jacobian, explored):

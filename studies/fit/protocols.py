@@ -9,7 +9,6 @@ not done again. It takes about two hours of one core.
 import os
 import sys
 import zlib
-from functools import cache
 from pathlib import Path
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a process for each core
@@ -18,7 +17,7 @@ import numpy as np
 import pandas as pd
 from check import STATISTICS
 from fit import MODELS, fit_subject
-from models import condition_for, plan_for, tables_before, trials_of
+from models import condition_for, tables_before, trials_of
 from simulate import FOREIGN, simulate
 
 from coartic import load_task
@@ -51,24 +50,18 @@ def cells():
             for repeat in range(repeats) for task in tasks]  # fmt: skip
 
 
-@cache
-def plan_of(name):
-    """Return :func:`models.plan_for` of a task by its name, from a cache."""
-    return plan_for(load_task(name))
-
-
 def recover(cell):
     """Simulate and fit people of every model of :data:`PEOPLE`; a frame with a row for each."""
     name, trials, data, _ = cell
     task, rows, (noise, lost, given) = load_task(name), [], DATA[data]
-    plan, seed = plan_of(name), zlib.crc32(repr(cell).encode())
+    seed = zlib.crc32(repr(cell).encode())
     for person, model in enumerate(PEOPLE):
         rng = np.random.default_rng([seed, person])
         sigma = np.exp(rng.uniform(np.log(0.01), np.log(0.1)))
         epsilon = rng.uniform(0.05, 0.5)
         kappa = rng.uniform(0.0, 1.0) if model == "informed" else 0.0
         frame = simulate(task, model, sigma, epsilon, kappa, seeds=[[seed, person, 1]],
-                         trials=trials, plan=plan)  # fmt: skip
+                         trials=trials)  # fmt: skip
         joints = [*task.robot.joint_names]
         motor = noise * rng.standard_normal((len(frame), len(joints)))
         if data == "lapses":
@@ -83,7 +76,7 @@ def recover(cell):
         row = dict(zip(("task", "trials", "data", "repeat", "person", "true"),
                        (*cell, person, model), strict=True))  # fmt: skip
         try:
-            estimates = fit_subject(task, condition, there, noise=given, plan=plan,
+            estimates = fit_subject(task, condition, there, noise=given,
                                     intervals=model in ("best", "informed"))  # fmt: skip
         except np.linalg.LinAlgError:
             estimates = {}

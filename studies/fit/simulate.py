@@ -21,8 +21,7 @@ RECENT = 10
 """Trials that ``recent`` remembers."""
 
 
-def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, plan=None,
-             first=None):  # fmt: skip
+def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition=None, first=None):
     """Return the hits of simulated people, one for each seed, as
     :func:`coartic.analysis.read_hits` does.
 
@@ -32,8 +31,6 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
         One of :data:`fit.MODELS` or :data:`FOREIGN`.
     sigma, epsilon, kappa : float or array_like, shape (people,)
         SD of exploration (length unit and rad), exploration rate of hands, drift.
-    plan : tuple of ndarray, optional
-        Hands and postures of the planner; by default those of :func:`models.plan_for`.
     first : tuple of ndarray, optional
         Hands and postures that all but planners aim at in trial 1; by default they have the task's
         initial hands and correct.
@@ -48,7 +45,7 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
     masks = explored_by(task, condition)
     value = np.full((people, goals, 3, 2), -np.inf)
     stored = np.full((people, goals, 3, 2, dof), np.nan)
-    plan = (plan or plan_for(task)) if model == "planner" else None
+    plan = plan_for(task) if model == "planner" else None
     rows, past = [], {}
     for trial in range(trials):
         for entry, kept in past.items():

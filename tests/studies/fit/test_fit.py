@@ -62,8 +62,7 @@ def test_parameters_of_the_plain_learner_are_found():
 def rough(people, noise=0.0):
     """The row of one subject, without intervals, which take long."""
     trials, condition = FIT.trials_of(people, TASK), FIT.condition_for(TASK)
-    plan = PROTOCOLS.plan_of(TASK.name)
-    return FIT.fit_subject(TASK, condition, trials, noise=noise, plan=plan, intervals=False)
+    return FIT.fit_subject(TASK, condition, trials, noise=noise, intervals=False)
 
 
 @pytest.mark.parametrize("model", ["drawn", "memoryless", "planner"])
