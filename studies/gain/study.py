@@ -63,14 +63,14 @@ def at_equal_gain(cells, how="linear"):
     rows = []
     for _, of_task in cells.groupby("task", sort=False):
         learner = of_task[(of_task.name == "learner") & (of_task[gain] > 0)].sort_values(gain)
-        measured = {name: learner.dropna(subset=name) for name in SIGNATURES}
+        curves = {name: np.vstack([[0.0, 0.0], learner[[gain, name]].dropna()]).T
+                  for name in SIGNATURES}  # fmt: skip
+        most = learner[gain].max() if len(learner) else -np.inf
         for row in of_task[of_task.name != "learner"].to_dict("records"):
-            most = learner[gain].max() if len(learner) else -np.inf
             status = BELOW if row[gain] < 0 else BEYOND if row[gain] > most else "compared"
             out = {key: row[key] for key in ("group", "task", "name", "trials")}
-            for name, known in measured.items():
-                covered = status == "compared" and len(known) and known[gain].max() >= row[gain]
-                gains, values = np.append(0.0, known[gain]), np.append(0.0, known[name])
+            for name, (gains, values) in curves.items():
+                covered = status == "compared" and len(gains) > 1 and gains[-1] >= row[gain]
                 nearest = values[np.abs(gains - row[gain]).argmin()]
                 at = nearest if how == "nearest" else np.interp(row[gain], gains, values)
                 out[name] = row[name] - at if covered else np.nan

@@ -191,14 +191,14 @@ def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(
     task, reward = next((e["task"], e["reward"]) for e in family if e["reward"] != e["bound"])
     folder, names = tmp_path / "optima", (task, "two-armed/v1/i002..i003")
     asked = monkeypatch, capsys, folder, *names, "--seconds"
-    shown, log = prove(*asked, "0.1")
+    shown, log = prove(*asked, "0.05")
     assert [row["task"] for row in log] == [names[0]]  # the others are proven
     assert shown[0].startswith(f"{task} (base task, other arm free): {reward}, no solution ")
     with (folder / SHIPPED.LOG).open("a") as file:
         file.write('{"task": "two-armed/v1/i0')
-    assert prove(*asked, "0.1") == ([], log)
-    _, longer = prove(*asked, "0.2")
-    assert [row["asked"] for row in longer] == [0.1, 0.2]
+    assert prove(*asked, "0.05") == ([], log)
+    _, longer = prove(*asked, "0.1")
+    assert [row["asked"] for row in longer] == [0.05, 0.1]
     known = SHIPPED.read()
     key = SHIPPED.key_of(log[0])
     assert not SHIPPED.take_proof(known, log[0])
@@ -229,7 +229,7 @@ def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refuse
 def test_a_better_solution_is_found_on_the_way():
     """From the open subproblems of least bound, if the reward that is known is poor."""
     entry = ENTRIES["two-armed/v1/i001", *SHIPPED.FREE] | {"reward": -400}
-    row = PROVE.prove(entry, 0.2)
+    row = PROVE.prove(entry, 0.1)
     assert -400 < row["reward"] <= row["bound"]
     execution = execute(load_task(row["task"]), SHIPPED.movements_of(row["solution"]))
     assert (execution.reward, execution.hands) == (row["reward"], row["hands"])
