@@ -237,7 +237,7 @@ def test_a_better_solution_is_found_on_the_way():
 
 def test_a_task_of_ones_own_is_searched_and_proven(tmp_path, monkeypatch, capsys):
     file = tmp_path / "mine.toml"
-    tiny_task(goals=[[6.0, 0.5]]).save(file)
+    tiny_task(goals=[[6.0, 0.5]], hands=["right"]).save(file)
     (sentence,), (row,) = prove(monkeypatch, capsys, tmp_path, file)
     assert sentence.startswith(f"{file} (base task, other arm free): {row['reward']}, proven opti")
     assert -200 < row["reward"] == row["bound"] < -100
