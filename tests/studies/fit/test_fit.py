@@ -45,6 +45,12 @@ def test_the_simulated_learner_is_the_packages(name, condition):
         assert (person.groupby("trial").ticks.sum() == -run.rewards).all()
 
 
+def test_the_planner_is_at_every_goal_with_its_hand():
+    for goal, hand, q in zip(TASK.goals, *sys.modules["models"].plan_for(TASK), strict=True):
+        place = TASK.robot.forward_kinematics(q, ("left", "right")[hand])
+        assert np.hypot(*(place - goal)) <= TASK.radius
+
+
 def test_parameters_of_the_plain_learner_are_found():
     """Its movements, tables and null spaces share no code with the package's kernels."""
     truth = {"sigma": 0.03, "epsilon": 0.25, "kappa": 0.5}

@@ -48,6 +48,8 @@ def test_a_learner_that_gains_nothing_covers_no_gain():
     rows = GAIN.at_equal_gain(planted(("learner", -3.0, 2.0), *gains))
     assert rows.status.tolist() == ["beyond the learner", "beyond the learner", "gain below 0"]
     assert rows["arm"].isna().all()
+    (row,) = GAIN.at_equal_gain(planted(("learner", 3.0, np.nan), gains[1])).to_dict("records")
+    assert np.isnan(row["arm"])  # what is not known of the learner is not compared
 
 
 def test_cells_are_means_over_runs(measured):
