@@ -74,6 +74,19 @@ def bound(root, box, multipliers, longest):
     return root.lagrangian(multipliers, longest).bound(box)
 
 
+def test_the_disc_of_an_undecided_hand_holds_both_hands():
+    """A straight arm that points away from the other shoulder is on its circle."""
+    task, straight = load_task("two-armed-2"), np.zeros((2001, 10))
+    middle, radius = RELAXED.disc_of(task, None)
+    far = []
+    for hand in task.hands:
+        q = straight.copy()
+        q[:, task.robot.arm(hand).first] = np.linspace(-math.pi, math.pi, len(q))
+        away = np.linalg.norm(task.robot.forward_kinematics(q, hand) - middle, axis=1)
+        far.append(task.radius + away.max())
+    assert radius - 1e-4 < max(far) <= radius + 1e-12
+
+
 FAILURES = {
     "inexact": lambda each, rng: each + rng.choice([1e-3, 1.0]) * rng.standard_normal(each.shape),
     "wrong sign": lambda each, rng: -each,
