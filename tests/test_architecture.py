@@ -119,10 +119,11 @@ def test_no_imports_go_round_in_circles():
 
 
 @cache
-def public_names():
-    """Names that a reference page names, by module: its members, or the page's choice of them."""
+def modules_on_pages():
+    """Of each module on a reference page its members, and those that the page chooses or leaves
+    out."""
     paths = {module_of(path): path for path in sources()}
-    names = {}
+    found = []
     for page in sorted((ROOT / "docs" / "reference" / "python").glob("*.md")):
         directives = re.findall(r"automodule:: (\S+)\n((?:   :.*\n)*)", page.read_text("utf-8"))
         for module, text in directives:
@@ -130,9 +131,26 @@ def public_names():
             chosen, left_out = (
                 {*options.get(key, "").split(", ")} - {""} for key in ("members", "exclude-members")
             )
-            members = chosen or members_of(tree_of(paths[module]))
-            names[module] = names.get(module, set()) | (members - left_out)
+            found.append((module, members_of(tree_of(paths[module])), chosen, left_out))
+    return found
+
+
+@cache
+def public_names():
+    """Names that a reference page names, by module: its members, or the page's choice of them."""
+    names = {}
+    for module, members, chosen, left_out in modules_on_pages():
+        names[module] = names.get(module, set()) | ((chosen or members) - left_out)
     return names
+
+
+def test_reference_pages_name_what_is_there_and_all_of_it():
+    """A module that a page names whole has each of its public names on a page; of a module from
+    which a page chooses, the other names are internal."""
+    on_pages = set().union(*public_names().values())
+    for module, members, chosen, _ in modules_on_pages():
+        assert chosen <= members, module
+        assert chosen or members <= on_pages, module
 
 
 def members_of(tree):
