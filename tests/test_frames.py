@@ -136,6 +136,7 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
             ("column reward is in by and in columns", ["reward"]),
         )),
         ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
+        ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
         ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
         *(("targets are", frames.ecdf, {}, (gaps,)) for gaps in ([], 0.1, [-0.1], ["a"], [50])),
     ],

@@ -164,6 +164,8 @@ def test_splits_never_mix_and_a_seed_gives_the_same(options, split):
     vector = TaskVectorEnv(3, "two-armed/v1", count=8, **options)
     for seeds in (5, np.uint8(5), np.arange(5, 8), [np.int32(5), 6, 7]):
         assert vector.reset(seed=seeds)[1]["task"].tolist() == names[5:8]
+    env.reset(seed=5)  # without a seed generators go on
+    assert vector.reset()[1]["task"][0] == env.reset()[1]["task"]
 
 
 def test_where_the_corrective_process_fails_the_posture_takes_its_place():
@@ -223,6 +225,8 @@ def test_what_else_is_refused():
         (ValueError, "it must be 'rgb_array'", lambda: TaskEnv("ascending", render_mode="human")),
         (ValueError, "the action of robot 1 is not finite", lambda: vector.step(missing)),
         (ValueError, "the action is not finite", lambda: single.step(missing[1])),
+        (ValueError, "actions has masked entries",
+         lambda: vector.step(np.ma.masked_invalid(missing))),
         (ValueError, r"shape \(1, 3\); it must be \(1, 6\)", lambda: single.step(np.zeros(3))),
         (ValueError, "did you mean 'coartic/Ascending-v2'", lambda: score("coartic/Ascending-v1")),
         (TypeError, "must be an environment of coartic or its id", lambda: score(no_environment)),

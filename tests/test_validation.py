@@ -123,6 +123,7 @@ FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be at least 2"),
     (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be at most 8"),
     (family("[2, 3]", "[5, 3]"), "goals is [5, 3]; it should have the lower number first"),
+    (family("[4, 4]", "[5, 4]"), "links is [5, 4]; it should have the lower number first"),
     (family("[-5, 5]", "[5, -5]"), "region.x is [5, -5]; it should have the lower number first"),
     (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
@@ -133,6 +134,7 @@ SUITES = [
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
     (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
     (SUITE + "grid = {noise_sd = []}", "blocks[0].grid.noise_sd is []; it needs at least 1 item"),
+    (suite('["dual-process/EC1"]', "[]"), "blocks[0].methods is []; it needs at least 1 item"),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; it should be a whole number"),
     (suite('["ascending"]', "3"), "blocks[0].tasks is 3; it should be a list"),
     (SUITE + "run = 3", "blocks[0].run is an unknown key; did you mean 'runs'?"),
@@ -540,6 +542,7 @@ def test_only_findings_are_joined(wrong):
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
         (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),
         (lambda: movements_of("RR", "x"), "targets"),
+        (lambda: coartic.hand_sequences("two-armed-1", ["L"]), "list of .* 'left' and 'right'"),
         (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
         (
             lambda: ExplorationCondition("x", ("right",), True, True, "all"),
@@ -589,6 +592,8 @@ def test_no_wrong_movement_gets_an_error_of_python(field):
 @pytest.mark.parametrize(
     ("call", "usual", "name", "value"),
     [
+        (Task, {"goals": [(6, 2)]}, "locked_base", "xy"),
+        (Task, {"goals": [(6, 2)]}, "hands", "left"),
         (Task, {}, "goals", "x"),
         (plan_suite, {"suite": "paper"}, "tasks", "ascending"),
         (plan_suite, {"suite": "paper"}, "methods", "EC1"),
