@@ -401,10 +401,12 @@ def own_suite(folder, line):
     return suite
 
 
-def test_any_condition_is_a_setting_of_a_method():
-    fields = {"base": "EC3", "modify_other": True, "epsilon": 0.4, "drift": [0, 0.3], "pull": 0.01}
+def test_any_condition_is_a_setting_of_a_method(tmp_path):
+    fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
+    suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
+    (job,) = plan_suite(suite)
     (method,) = (each for each in METHODS if each.name == "dual-process/custom")
-    _, execution, _ = solve(method, "two-armed-1", seed=3, trials=40, **fields)
+    _, execution, _ = solve(method, "two-armed-1", seed=3, **job.cell.parameters)
     rules = replace(CONDITIONS["EC3"], modify_other=True, epsilon=0.4, drift=(0.0, 0.3), pull=0.01)
     assert execution.reward == learn("two-armed-1", rules, seed=3, trials=40).reward
 

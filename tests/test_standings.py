@@ -211,6 +211,8 @@ def test_an_own_method_stands_next_to_others_on_the_tasks_that_it_solved():
     assert math.isnan(rows.difference_low.iloc[1])  # of two runs there is no interval
     texts = render.texts_of(TABLES["own"], rows, "difference")
     assert texts[1].startswith(number(100 * rows.difference.iloc[1], 1))  # per cent, as the gaps
+    same = TABLES["own"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))
+    assert same.difference_low.iloc[1] < 0  # runs with the same seeds are not matched
 
 
 def with_parameters():
