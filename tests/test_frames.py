@@ -138,7 +138,8 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
         ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
         ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
         ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
-        *(("targets are", frames.ecdf, {}, (gaps,)) for gaps in ([], 0.1, [-0.1], ["a"], [50])),
+        *(("targets are", frames.ecdf, {}, (gaps,))
+          for gaps in ([], 0.1, [-0.1], ["a"], [np.nan], [50])),
     ],
 )  # fmt: skip
 def test_arguments_that_cannot_be_meant_are_refused(words, compute, changes, arguments):
