@@ -20,6 +20,7 @@ from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
+from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
@@ -49,6 +50,7 @@ def test_run_resumes(coartic, tmp_path):
     assert code == 0
     assert f"coartic report '{out}'" in " ".join(text.split())
     assert text.startswith("2 runs in ")
+    assert max(map(len, text.splitlines())) <= max(80, len(str(out)) + 40)
     assert "Runs: 2/2\n" in error  # plain lines without a terminal
     made_with = load(out).made_with
     assert made_with["packages"]["numba"]
@@ -60,6 +62,7 @@ def test_a_crashed_run_makes_the_exit_code(coartic, tmp_path, monkeypatch):
     monkeypatch.setattr(pool, "Local", lambda _: Failing(0))
     code, text, _ = coartic(*SMALL, "--out", tmp_path)
     assert (code, "1 failed" in text) == (1, True)
+    assert coartic("verify", tmp_path)[0] == 0
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])
@@ -110,10 +113,16 @@ def test_reproduce(coartic, tmp_path):
     out = tmp_path / "out"
     assert coartic(*SMALL, "--out", out)[0] == 0
     first, second = load(out).runs.run_id
+    (tmp_path / "earlier").mkdir()  # a folder that cannot be read is next to it
+    (tmp_path / "earlier" / RUNS_FILE).write_text("no database")
     code, text, _ = coartic("reproduce", first, "--in", tmp_path)
     assert code == 0
     assert text.splitlines()[-1] == "Performed again: identical."
-    assert "1 run performed again: none with another" in coartic("verify", out, "--again", 1)[1]
+    assert "earlier" in coartic("reproduce", "0123456789", "--in", tmp_path)[2]
+    part = tmp_path / "part"  # of an array, and of all methods those for one arm
+    own = ("--methods", "dual-process/*", "--runs", "2..3")
+    assert coartic(*SMALL, *own, "--out", part)[0] == 0
+    assert "1 run performed again: none with another" in coartic("verify", part, "--again", 1)[1]
     edit(out, "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?", second)
     code, text, _ = coartic("verify", out, "--again", 2)
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
