@@ -295,14 +295,15 @@ def test_results_are_packed_again_where_they_have_not_changed(
 
 @pytest.mark.usefixtures("in_this_process")
 def test_command(packed, parts, tmp_path, coartic):
-    """A method is written by a command and run beside the shipped results; a colleague includes
-    the folder with another one, without the method's file."""
+    """A method is written by a command, run beside the shipped results, and there when that is
+    repeated; a colleague includes the folder with another one, without the method's file."""
     mine, out = tmp_path / "my_search.py", tmp_path / "out"
     small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
     assert coartic("new", "my-search", "--out", mine)[0] == 0
     own = ("--method-file", mine, "--include", "shipped", "--out", out)
     code, text, _ = coartic("run", "paper", *own, *small)
     assert (code, text[:16]) == (0, "8 runs (4 reused")
+    assert coartic("run", "paper", *own, *small)[1].startswith("8 runs (8 reused)")
     theirs = load(packed).runs
     assert set(load(out).runs.method) == {"my-search", *theirs.method}
     assert set(theirs.run_id) < set(load(out).runs.run_id)
