@@ -125,7 +125,8 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     movements = (Movement(1, "left", "path", edges, 3, np.array([edges / 7, edges])),)
     solution = Score(-3, "L", movements)
     first = next(iter(written[0].values()))
-    run = replace(first, scores={"solution": solution, "replay": solution})
+    outcome = replace(first.outcome, environment={"commit": {"id": "c0de", "dirty": True}})
+    run = replace(first, scores={"solution": solution, "replay": solution}, outcome=outcome)
 
     def some():
         yield run
@@ -144,6 +145,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
             store.write([unlike])
     with open_store(tmp_path) as store:
         assert plain(store.run(run.id)) == plain(run)
+        assert store.runs().commit.tolist() == ["c0de+"]
 
 
 MANY = {"runs": 30, "trials": 30}
@@ -282,6 +284,7 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     report = perform_here(tmp_path)
     assert (report.stale, report.present, report.done) == (9, 0, 9)
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
+    assert "leaving out" not in repr(replace(report, stale=0))
     same_results(load(tmp_path), undisturbed)
     with open_store(tmp_path) as store:
         assert len(store.ids()) == 18
