@@ -125,4 +125,4 @@ def test_machine_code_of_several_processes_goes_together(tmp_path):
     (tmp_path / "slots.py").write_text(SLOTS, encoding="utf-8")
     for links in (8, 4):
         assert apart(reaches, tmp_path, [links]) == ([links], 0)
-    assert apart(reaches, tmp_path, [1, 3, 4, 5]) == ([4, 4, 4, 8], 2)
+    assert apart(reaches, tmp_path, [1, 3, 5, 11]) == ([4, 4, 8, 11], 2)

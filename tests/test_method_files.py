@@ -56,9 +56,9 @@ def code_with(folder, **changed):
 
 
 def test_what_counts_as_the_code_of_a_method(tmp_path):
-    """Numbers in it and in what it imports and reads, wherever the file is."""
+    """Numbers in it and in what it imports and reads, wherever the file is; comments do not."""
     first = code_with(tmp_path)
-    assert code_with(tmp_path / "elsewhere") == first
+    assert code_with(tmp_path / "elsewhere", **{"mine_helper.py": "STEP = 1  # m"}) == first
     assert registry([tmp_path / "mine.py"])["nearest-hand"].code == first
     changes = (
         {"mine_helper.py": "STEP = 2"},
