@@ -47,6 +47,8 @@ def test_families_count_alike_whatever_their_number_of_instances():
     assert math.isnan(none.low)
     with pytest.raises(ValueError, match="one instance"):
         other_tasks({})
+    with pytest.raises(ValueError, match="at least one value"):
+        other_tasks({"a": [[1.0], [], [2.0]]})
 
 
 def test_the_interval_ends_at_what_runs_can_make():
