@@ -16,6 +16,7 @@ from coartic import (
     initial_hands,
     load_task,
 )
+from coartic.analysis.sections import TABLES
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
@@ -151,6 +152,7 @@ def test_failures_are_kept_as_data(tmp_path):
     assert list(study.runs.status) == ["infeasible"] * 4
     assert study.runs.reason.str.len().min() > 20
     assert study.runs.reward.isna().all()
+    assert TABLES["methods"](study).solved.tolist() == [0, 0]
     assert list(study.runs.failed_trials[:2]) == [5, 5]
     assert [np.isnan(curve).tolist() for _, curve in study.rewards()] == [[True] * 5] * 2
     assert study.solutions.empty
