@@ -13,7 +13,7 @@ SUITES := comparison $(if $(FULL),ablations)
 STORED := comparison ablations families
 STUDIES ?= $(filter-out replication,$(notdir $(wildcard studies/[a-z]*)))
 
-.PHONY: benchmark test check format docs shipped findings studies speed release-check setup clean
+.PHONY: benchmark test check format docs shipped shipped-check findings studies speed release-check setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -49,8 +49,12 @@ speed: $(READY)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py $(if $(LONG),--long)
 
 # The wheel and the source distribution of the last commit, each run in an empty environment.
-release-check: $(READY)
+release-check: shipped-check
 	COARTIC_PACKAGES=1 $(BIN)/python -m pytest tests/test_packages.py
+
+# Shipped runs, performed again: one of each cell of the comparison, and of each method on each family.
+shipped-check: $(READY)
+	$(BIN)/python docs/scripts/check_shipped.py
 
 # The results that are shipped, anew, by the present code: packed where they are as before. With
 # CHANGED=1 also where they are not.

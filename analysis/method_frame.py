@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Collection, Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -36,7 +36,13 @@ OWN_COLOR = "brown"
 """Colour of methods from files: no built-in method has it."""
 
 
-def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
+LATE_MARK = " ‡"
+"""Mark behind the title of a method that loaded files of the user's too late."""
+
+
+def methods_of(
+    runs: pd.DataFrame, declared: Mapping[str, MethodInfo], marked: Collection[str] = ()
+) -> pd.DataFrame:
     """Return a row for each method with its setting, and for each pair of learners that
     :func:`_joined_learners` joins: built-in methods in the order of ``methods.toml``, then methods
     from files in the order of the suite.
@@ -47,6 +53,8 @@ def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.Dat
         As :attr:`.Study.runs`, in the order of the suite.
     declared : mapping of str to MethodInfo
         Declaration of each method, by its id without a setting.
+    marked : collection of str, optional
+        Ids of methods whose titles get :data:`LATE_MARK`.
 
     Returns
     -------
@@ -65,7 +73,7 @@ def methods_of(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.Dat
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
             "parts": (label,),
-            "title": title_of(base, setting),
+            "title": title_of(base, setting) + LATE_MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,

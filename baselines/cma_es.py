@@ -97,6 +97,7 @@ class CMAES(Method):
     generation."""
 
     name = "cma-es/bandit"
+    version = 2
     title = "CMA-ES, a bandit over hand sequences"
     citation = _CITATION + (
         " P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
@@ -140,6 +141,7 @@ class GoalByGoal(Method):
     with this hand after the hand before."""
 
     name = "cma-es/goal-by-goal"
+    version = 2
     title = "CMA-ES, hands chosen goal by goal"
     citation = _CITATION
     information = OPTIMISER_INFORMATION

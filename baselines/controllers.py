@@ -51,7 +51,7 @@ class Leg(NamedTuple):
     """Numbers of control steps: all, and those in which level 1 and level 2 bind."""
 
 
-class StuckError(Exception):
+class _StuckError(Exception):
     """The hand does not reach the goal."""
 
 
@@ -90,14 +90,14 @@ class Controller(ABC):
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
         """Simulate control steps until the hand of the first of ``aims`` is in its goal, from the
         end of the leg ``before``, or, for None, from the task's start; return them as a leg.
-        Further aims are the goals ahead. Raises StuckError if the hand comes no nearer to its goal,
-        and MethodError if the solver fails."""
+        Further aims are the goals ahead. Raises _StuckError if the hand comes no nearer to its
+        goal, and MethodError if the solver fails."""
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         _, tolerance = model.tolerances(radius)
         short = beyond_reach(self.task, hand, self.task.goals[goal], tolerance)
         if short > radius:
-            raise StuckError(
+            raise _StuckError(
                 f"{name} ends {short:.3g} short of it with the base "
                 f"locked in {' and '.join(self.task.locked_base)}"
             )
@@ -110,7 +110,7 @@ class Controller(ABC):
                 nearest, since = distance, 0
             since += 1
             if since > _STALL_STEPS:
-                raise StuckError(
+                raise _StuckError(
                     f"{name} is still {distance:.3g} from its centre "
                     f"after {len(waypoints)} control steps and comes no nearer"
                 )
@@ -206,8 +206,8 @@ class Control(Method):
             for index, hands in enumerate(candidates)
         ]
         heapq.heapify(heap)
-        legs: dict[Any, Leg | StuckError] = {}  # sequences share their beginnings
-        stuck: list[StuckError] = []
+        legs: dict[Any, Leg | _StuckError] = {}  # sequences share their beginnings
+        stuck: list[_StuckError] = []
         while heap:
             ticks, changes, index, path = heapq.heappop(heap)
             hands, goal = candidates[index], len(path)
@@ -228,10 +228,10 @@ class Control(Method):
             if plan not in legs:
                 try:
                     legs[plan] = controller.leg(path[-1] if path else None, plan[-1])
-                except StuckError as error:
+                except _StuckError as error:
                     legs[plan] = error
             leg = legs[plan]
-            if isinstance(leg, StuckError):
+            if isinstance(leg, _StuckError):
                 stuck.append(leg)
             else:
                 heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*path, leg)))

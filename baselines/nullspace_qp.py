@@ -86,6 +86,7 @@ class LeastMotion(Control):
     """Null-space control with the least joint changes."""
 
     name = "nullspace-qp/least-motion"
+    version = 2
     title = "Prioritised null-space QP, least motion"
     citation = (
         "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "

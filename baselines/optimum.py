@@ -49,6 +49,7 @@ class OptimumSearch(Method):
     """The shortest path over all hand sequences, in whole ticks."""
 
     name = "optimum/search"
+    version = 2
     title = "Optimum: dynamic programming over postures"
     citation = (
         "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "

@@ -73,6 +73,7 @@ class PostureBasedParameters(Parameters):
 class PostureBased(Method):
     """Posture-based planning that looks at ``horizon`` goals at a time, one or two."""
 
+    version = 2
     horizon: ClassVar[Literal[1, 2]]
     citation = (
         "D. A. Rosenbaum, R. J. Meulenbroek, J. Vaughan, C. Jansen (2001). Posture-based "

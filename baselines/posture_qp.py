@@ -171,6 +171,7 @@ class CurrentGoal(Control):
     """Posture QP that looks at the current goal alone."""
 
     name = "posture-qp/current-goal"
+    version = 2
     title = "Posture QP, current goal"
     citation = (
         "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "

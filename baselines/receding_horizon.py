@@ -60,6 +60,7 @@ class RecedingHorizon(Method):
     again."""
 
     name = "receding-horizon"
+    version = 2
     title = "Receding-horizon planning of the shortest path"
     citation = (
         "D. Q. Mayne, J. B. Rawlings, C. V. Rao, P. O. M. Scokaert (2000). Constrained model "

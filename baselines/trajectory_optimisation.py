@@ -93,6 +93,7 @@ def cheapest_plan(
 class TrajectoryOptimisation(Method):
     """The cheapest plan by one cost."""
 
+    version = 2
     cost: ClassVar[Cost]
     stochastic = False
     Parameters = TrajectoryParameters

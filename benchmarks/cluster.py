@@ -113,12 +113,12 @@ _kept = threading.local()
 
 def _remote(job: Job) -> list[Outcome]:
     """Perform a job on the machine of a Dask worker, in a process that ends at its time limit.
-    Raises CoarticError if the method has other code on this machine."""
+    Raises CoarticError if the method has another version or code on this machine."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.cell.method
-    here = current_code(method.where, method.name)
-    if here != method.code:
-        text = f"method {method.name!r} has code {here} on a Dask worker and {method.code} where "
+    here = current_code(method)
+    if here != method.version:
+        text = f"method {method.name!r} is {here} on a Dask worker and {method.version} where "
         raise CoarticError(f"{text}the suite was started; install the same version everywhere")
     if not hasattr(_kept, "workers"):
         _kept.workers = Workers(Local(1), stays=True)
@@ -127,4 +127,7 @@ def _remote(job: Job) -> list[Outcome]:
     except CoarticError:  # such as a removed folder
         del _kept.workers
         raise
-    return [replace(outcome, environment=current_environment()) for outcome in outcomes]
+    here_too = current_environment()
+    return [
+        replace(outcome, environment=here_too | (outcome.environment or {})) for outcome in outcomes
+    ]

@@ -1,9 +1,9 @@
 """Include the runs of other folders: shipped results, or results of another machine or person.
 
 Folders go together if they have the same suite, seed and trial budget, the same task for each name
-and the same code for each method. Versions of coartic and of libraries, and machines, may differ.
-Every solution of another folder is executed and scored again; the hash of their file guards the
-shipped results.
+and the same version or code of each method. Versions of coartic and of libraries, and machines, may
+differ. Every solution of another folder is executed and scored again; the hash of their file guards
+the shipped results.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from coartic.benchmarks.scoring import score
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
+from coartic.runs.method_info import same_run
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.record import Run
 from coartic.runs.shipped import SHIPPED, open_shipped
@@ -65,7 +66,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
             del sources[SHIPPED]  # all its runs are there
         with target.transaction():
             target.replace_plan(joined, made_with())
-            origin = dict.fromkeys(target.ids(), str(out))
+            origin = dict.fromkeys(map(same_run, target.ids()), str(out))
             for name, source in sources.items():
                 _copy_runs(name, source, target, origin)
     return joined
@@ -92,7 +93,7 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
     _check_together(plan[0], parts)
     methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
     for job in plan:  # failures are performed again where the code is here
-        if methods[job.cell.method.name].code == job.cell.method.code:
+        if methods[job.cell.method.name].version == job.cell.method.version:
             methods[job.cell.method.name] = job.cell.method
     jobs: dict[str, Job] = {}
     for job in itertools.chain(plan, *plans.values()):
@@ -163,36 +164,43 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
     for where, cell in ((where, job.cell) for where, part in parts.items() for job in part):
         name, method = cell.task.name, cell.method
         agree(where, f"task {name!r}", f"definition {hash_of(cell.definition)[:8]}")
-        hint = ": leave it out of one of them, or give it another name"
-        agree(where, f"method {method.name!r}", f"code {method.code}", hint)
+        kind = "version" if method.is_ours else "code"
+        hint = ": leave it out of one of them" + ", or give it another name" * (not method.is_ours)
+        agree(where, f"method {method.name!r}", f"{kind} {method.version}", hint)
         cell_named = f"{cell.label} on {name}"
         agree(where, f"the list of parameters of {cell_named}", sorted(cell.parameters))
         for key, value in cell.parameters.items():
             agree(where, f"{key} of {cell_named}", value)
 
 
-def _copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
+def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
     """Copy the runs of a source's plan that the target lacks, each scored again unless shipped.
-    ``origin`` gives the folder of each run of the target by run id, and gets the copied runs.
+    ``origin`` gives the folder of each run of the target (:func:`.same_run`), and gets the copied
+    runs.
 
     Raises CoarticError if a run does not score as stored, or if the target has another result.
     """
-    there = target.runs().set_index("run_id").result.to_dict()
+    stored = target.runs()
+    pairs = zip(stored.run_id, stored.result, strict=True)
+    there = {same_run(run_id): (run_id, result) for run_id, result in pairs}
     for _, cell in source.runs().groupby(["task", "method", "setting"], sort=False):
         results = dict(zip(cell.run_id, cell.result, strict=True))
-        for run_id in results.keys() & there.keys():
-            if results[run_id] == there[run_id]:
+        runs = list[Run]()
+        for run_id, result in results.items():
+            held, held_result = there.get(same_run(run_id), ("", ""))
+            if held and held_result == result:
                 continue
             run = source.run(run_id)
-            if changes := compare_runs(target.run(run_id), run):  # of what both runs keep
+            if not held:
+                runs.append(run)
+            elif changes := compare_runs(target.run(held), run):  # of what both runs keep
                 which = f"run {run.number} of {run.cell.method.name} on {run.cell.task.name}"
-                where = f"{origin[run_id]} and {name} ({run_id})"
+                where = f"{origin[same_run(run_id)]} and {name} ({run_id})"
                 raise CoarticError(f"{which} differs in {where}: {changes[0]}")
-        runs = [source.run(run_id) for run_id in results if run_id not in there]
         if runs and name != SHIPPED:  # their file has a hash
             _check_scores(name, runs, results)
         target.write(runs)
-        origin |= {run.id: name for run in runs}
+        origin |= {same_run(run.id): name for run in runs}
 
 
 def _check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from coartic.benchmarks.code_identity import code_of
+from coartic.benchmarks.own_code import code_of
 from coartic.benchmarks.pool import CONTEXT, MORE_FILES, start_process
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
@@ -120,15 +120,11 @@ def _methods_of_module(
     for method in methods:
         _check_declaration(method, origin)
         try:
-            code = code_of(file, tuple(file.parent / name for name in method.files))
+            code = code_of(method, file)
         except OSError as error:
             raise CoarticError(
                 f"{origin}: method {method.name!r} declares a file that cannot be read: "
                 f"{error.filename}"
-            ) from None
-        except (SyntaxError, ValueError) as error:
-            raise CoarticError(
-                f"{origin}: it imports what is no Python: {error_line(error)}"
             ) from None
         yield method_info(method, origin, str(file), code)
     if not methods:

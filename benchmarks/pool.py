@@ -26,19 +26,27 @@ import tempfile
 import time
 from collections import defaultdict, deque
 from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from multiprocessing import connection
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from coartic.benchmarks.provenance import arithmetic
 from coartic.benchmarks.worker import answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import write_atomically
 from coartic.internal.interruption import blocked_signals
 from coartic.internal.text import error_line, plain
-from coartic.internal.threads import ONE_THREAD, begin_worker, end_group, environment, threads_for
+from coartic.internal.threads import (
+    begin_worker,
+    end_group,
+    environment,
+    threads_for,
+    worker_variables,
+)
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
 from coartic.runs.plan import Job
@@ -294,6 +302,7 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
         descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
         for stream in (1, 2):
             os.dup2(descriptor, stream)
+    arithmetic()  # before a method can change what computes it
     _bound_resources(workers)
     process, number = os.getpid(), 0
     while pipe.poll(_IDLE_S):
@@ -378,8 +387,9 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 
 
 def start_process(process: Any) -> None:
-    """Start a process of :data:`CONTEXT` with one thread for BLAS, without running the main program
-    again in it. Raises OSError or EOFError if the process does not start."""
+    """Start a process of :data:`CONTEXT` that computes as workers do
+    (:func:`coartic.internal.threads.worker_variables`), without running the main program again in
+    it. Raises OSError or EOFError if the process does not start."""
     try:
         os.getcwd()
     except FileNotFoundError:
@@ -393,7 +403,7 @@ def start_process(process: Any) -> None:
         if 0 <= resource.getrlimit(resource.RLIMIT_NOFILE)[0] < _LEAST_FILES:  # -1: no limit
             raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
     main = sys.modules["__main__"]
-    with environment(ONE_THREAD | safe):
+    with environment(worker_variables() | safe):
         if _START == "forkserver":
             from multiprocessing import resource_tracker
 
@@ -405,3 +415,17 @@ def start_process(process: Any) -> None:
                 process.start()
         finally:
             sys.modules["__main__"] = main
+
+
+@contextlib.contextmanager
+def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Open a pool of processes that compute as the workers of a suite do, for programs that run
+    methods or proofs themselves: the same bits on every x86-64 processor.
+
+    Examples
+    --------
+    >>> with process_pool(2) as pool:  # doctest: +SKIP
+    ...     rows = list(pool.map(solve_task, names))
+    """
+    with environment(worker_variables()), ProcessPoolExecutor(processes, CONTEXT) as pool:
+        yield pool

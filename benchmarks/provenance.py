@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import os
 import platform
 import re
@@ -19,7 +20,7 @@ import numpy as np
 
 import coartic
 from coartic.internal.text import LONGEST_LINE, plain
-from coartic.internal.threads import ONE_THREAD, threads_for
+from coartic.internal.threads import threads_for, worker_variables
 from coartic.motion.compile import FINGERPRINT, PACKAGE
 
 _LIBRARIES = (
@@ -37,8 +38,8 @@ _LIBRARIES = (
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Return versions, platform and commit of this process: always the same dictionary, not to be
-    changed."""
+    """Return versions, platform and commit of this process, and the variables of its workers:
+    always the same dictionary, not to be changed."""
     processor = platform.processor()
     with contextlib.suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
@@ -51,9 +52,9 @@ def current_environment() -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
         "platform": plain(platform.platform(), LONGEST_LINE),
-        "processor": plain(f"{processor} (arithmetic {_arithmetic()})", LONGEST_LINE),
+        "processor": plain(processor, LONGEST_LINE),
         "cores": threads_for(-1),
-        "threads": ONE_THREAD,
+        "threads": dict(worker_variables()),
     }
 
 
@@ -100,10 +101,17 @@ def _commit_of_checkout() -> dict[str, Any] | None:
         return None
 
 
-def _arithmetic() -> str:
-    """Return a hash of the bits of eigenvectors and logarithms. Where the hash is the same, NumPy
-    and its linear algebra round alike; they choose their instructions by the processor, and the
-    processor's name says little on virtual machines."""
+@cache
+def arithmetic() -> str:
+    """Return how this process rounds, as hashes of bits: of eigenvectors and logarithms by NumPy
+    and its linear algebra, and of functions by the C library. Where a hash is the same, that
+    library rounds alike; a processor's name says little on virtual machines."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
-    computed = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix))
-    return hashlib.sha256(b"".join(each.tobytes() for each in computed)).hexdigest()[:8]
+    by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
+    numbers = np.abs(matrix).ravel().tolist()
+    by_libm = [[*map(each, numbers)] for each in (math.exp, math.log, lambda x: math.pow(x, 0.3))]
+    hashes = [
+        hashlib.sha256(b"".join(np.asarray(each).tobytes() for each in computed)).hexdigest()[:8]
+        for computed in (by_numpy, by_libm)
+    ]
+    return "NumPy {}, libm {}".format(*hashes)

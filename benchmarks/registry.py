@@ -6,7 +6,6 @@ Method files are imported in separate processes (:mod:`coartic.benchmarks.method
 from __future__ import annotations
 
 import importlib
-import inspect
 import re
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,13 +16,13 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.method_files import begin_reader
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, plain, unknown
 from coartic.internal.toml_files import check_file
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.method import MODULES
+from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
 
 _RESERVED = (METHOD_PREFIX, "optimum/")
@@ -37,13 +36,13 @@ Registry = Mapping[str, MethodInfo]
 _INFOS = TypeAdapter(list[MethodInfo])
 
 
-def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> dict[str, MethodInfo]:
-    """Return every known method by id, built-in ones first; ``with_code`` as in :func:`built_in`.
+def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
+    """Return every known method by id, built-in ones first.
 
     Raises CoarticError for a file that cannot be loaded or holds no method, and as :func:`check_id`
     does.
     """
-    infos = dict(built_in(with_code=with_code))
+    infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
         for info in _methods_of_file(path):
             check_id(info.name, info.origin, infos)
@@ -52,35 +51,29 @@ def registry(method_files: Iterable[Path] = (), *, with_code: bool = True) -> di
 
 
 @cache
-def built_in(*, with_code: bool = True) -> Mapping[str, MethodInfo]:
-    """Return the built-in methods by id: always the same mapping, not to be changed.
-
-    ``with_code``: with the hash of their code, which takes half a second, otherwise with ``""``.
-    Runs need it, lists of methods do not.
-    """
-    infos: dict[str, MethodInfo] = {}
-    for name in MODULES:
-        module = importlib.import_module(name)
-        code = code_of(Path(inspect.getfile(module))) if with_code else ""
-        infos |= {
-            method.name: method_info(method, BUILT_IN, name, code) for method in module.METHODS
-        }
-    return infos
+def built_in() -> Mapping[str, MethodInfo]:
+    """Return the built-in methods by id: always the same mapping, not to be changed."""
+    return {
+        method.name: method_info(method, BUILT_IN, name, f"{MODEL_VERSION}.{method.version}")
+        for name in MODULES
+        for method in importlib.import_module(name).METHODS
+    }
 
 
-_parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
+_asking = threading.Lock()
+"""Held while a process that reads a file is asked: threads would take each other's answers."""
 
 
-def current_code(where: str, name: str) -> str:
-    """Return the hash of the present code of a method that is imported from ``where``; ``none`` if
-    its file no longer defines it. Raises CoarticError for a file that cannot be used."""
-    with _parsing:
-        if where.endswith(".py"):
-            if where not in READERS:  # a reader imports the file again for every question
-                list(_methods_of_file(Path(where)))
-            infos = READERS[where]("", "methods")
-            return next((info["code"] for info in infos if info["name"] == name), "none")
-        return code_of(Path(inspect.getfile(importlib.import_module(where))))
+def current_code(method: MethodInfo) -> str:
+    """Return the code (:attr:`MethodInfo.code`) that a method has here; ``none`` if its file no
+    longer defines it. Raises CoarticError for a file that cannot be used."""
+    if method.is_ours:
+        return built_in()[method.name].code
+    with _asking:
+        if method.where not in READERS:  # a reader imports the file again for every question
+            list(_methods_of_file(Path(method.where)))
+        infos = READERS[method.where]("", "methods")
+    return next((info["code"] for info in infos if info["name"] == method.name), "none")
 
 
 def check_id(name: str, origin: str, registered: Registry) -> None:

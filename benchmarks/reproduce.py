@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
@@ -18,8 +19,9 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.motion.solution import hint_of
+from coartic.runs.method_info import same_run
 from coartic.runs.plan import Job
-from coartic.runs.record import PARTS, Run, too_long
+from coartic.runs.record import LATE, PARTS, Run, too_long
 from coartic.runs.store import RUNS_FILE, open_store
 from coartic.trajectories import Trajectory, trajectory
 
@@ -30,7 +32,7 @@ def find_run(prefix: str, folder: Path) -> Run:
     Raises CoarticError if there is no such run, or more than one, or one with different results in
     two folders; without such a run also for a folder that cannot be read.
     """
-    if not prefix or not set(prefix) <= set("0123456789abcdef-"):
+    if not prefix or not set(prefix) <= set("0123456789abcdef-."):
         raise CoarticError(
             f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c: "
             "column run_ids of a report's tables names the runs of each row."
@@ -41,30 +43,32 @@ def find_run(prefix: str, folder: Path) -> Run:
         raise CoarticError(
             f"cannot read {folder}: {error.strerror}. Name a folder with --in."
         ) from None
-    folders_of, unread = defaultdict[str, list[Path]](list), list[CoarticError]()
+    places_of = defaultdict[tuple[str, str], list[tuple[Path, str]]](list)
+    unread = list[CoarticError]()
     for path in sorted(folder.rglob(RUNS_FILE)):
         try:
             with open_store(path.parent) as store:
                 for run_id in store.ids(prefix):
-                    folders_of[run_id].append(path.parent)
+                    places_of[same_run(run_id)].append((path.parent, run_id))
         except CoarticError as error:
             unread.append(error)
-    if unread and not folders_of:
+    if unread and not places_of:
         raise unread[0]
-    if not folders_of:
+    if not places_of:
         raise CoarticError(
             f"there is no run {prefix!r} in {folder}. Name another folder with --in."
         )
-    if len(folders_of) > 1:
-        some = ", ".join(sorted(folders_of)[:4]) + (", ..." if len(folders_of) > 4 else "")
-        raise CoarticError(f"{prefix!r} is the beginning of {len(folders_of)} runs: {some}")
-    ((run_id, places),) = folders_of.items()
+    if len(places_of) > 1:
+        ids = sorted(places[0][1] for places in places_of.values())
+        some = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
+        raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs: {some}")
+    (places,) = places_of.values()
     runs = list[Run]()
-    for place in places:
+    for place, run_id in places:
         with open_store(place) as store:
             runs.append(store.run(run_id))
         if changes := compare_runs(runs[0], runs[-1]):
-            where = f"{places[0]} and {place}: {changes[0]}"
+            where = f"{places[0][0]} and {place}: {changes[0]}"
             raise CoarticError(f"run {run_id} differs in {where}. Name one folder with --in.")
     return runs[0]
 
@@ -90,20 +94,32 @@ def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[
         yield from score(job, outcomes)
 
 
-def perform_again(run: Run, registered: Registry) -> Run:
-    """Perform a stored run again with the present code of its method, and return the new run, which
-    is not stored. ``registered`` must have the method. Raises CoarticError if the method no longer
-    takes the parameters of the run."""
-    method = registered[run.cell.method.name]
-    try:
-        method.complete(run.cell.parameters)
-    except CoarticError as error:
-        version = plain(str((run.outcome.environment or {}).get("coartic")), 20)
-        raise CoarticError(
-            f"run {run.id} cannot be performed here: {error}. Version {version} of coartic made it."
-        ) from None
-    cell = replace(run.cell, method=method)
-    return next(perform_in_order([replace(run.job, cell=cell)]))
+def perform_runs_again(
+    runs: Sequence[Run], registered: Registry, executor: Local | None = None
+) -> Iterator[tuple[Run, Run]]:
+    """Perform stored runs again, by the methods that are here, and yield each with the new run,
+    which is not stored, in the order in which they finish. ``registered`` must have the methods.
+
+    Raises CoarticError if a method no longer takes the parameters of a run.
+    """
+    of_job = dict[int, Run]()
+    jobs = list[Job]()
+    for run in runs:
+        method = registered[run.cell.method.name]
+        try:
+            method.complete(run.cell.parameters)
+        except CoarticError as error:
+            version = plain(str((run.outcome.environment or {}).get("coartic")), 20)
+            raise CoarticError(
+                f"run {run.id} cannot be performed here: {error}. Version {version} of coartic "
+                "made it."
+            ) from None
+        jobs.append(replace(run.job, cell=replace(run.cell, method=method)))
+        of_job[id(jobs[-1])] = run
+    with closing((executor or Local()).perform(jobs)) as answers:
+        for job, outcomes in answers:
+            (again,) = score(job, outcomes)
+            yield of_job[id(job)], again
 
 
 def perform_some_again(
@@ -111,21 +127,23 @@ def perform_some_again(
 ) -> Iterator[tuple[str, list[str]]]:
     """Perform at most ``count`` runs of a folder again, spread over its cells, and yield the id of
     each run with its differences to the stored run (:func:`compare_runs`). Runs count whose methods
-    still have the code of the run. Raises CoarticError if there is no such run."""
+    still have the version or code of the run. Raises CoarticError if there is no such run."""
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
             plan[position].run_id(number)
             for position, number, *_ in store.present()
             if (method := plan[position].cell.method).name in registered
-            and registered[method.name].code == method.code
+            and registered[method.name].code == method.version
         ]
         if not ids:
-            raise CoarticError(f"{folder} has no run of a method whose code is the same here")
+            raise CoarticError(
+                f"{folder} has no run of a method that has the same version or code here"
+            )
         step = max(1, len(ids) // count)
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]
-    for run in chosen:
-        yield run.id, compare_runs(run, perform_again(run, registered))
+    for run, again in perform_runs_again(chosen, registered):
+        yield run.id, compare_runs(run, again)
 
 
 def doubts_of(run: Run) -> Iterator[str]:
@@ -159,10 +177,14 @@ def doubts_of(run: Run) -> Iterator[str]:
 
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Return the differences between the results of two runs, in words, an empty list for equal
-    results. Times and environments do not count, nor rewards that one run does not keep."""
+    results. Times and environments do not count, nor rewards that one run does not keep, nor files
+    that were loaded late: earlier runs of a process may have loaded them."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
-    first, second = a.to_row(), b.to_row()
+    first, second = (
+        run.to_row() | {"details": {k: v for k, v in run.outcome.details.items() if k != LATE}}
+        for run in (a, b)
+    )
     changes = [
         f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"
         for name in ("status", "reason", "details", *Meter.COUNTS)

@@ -28,8 +28,9 @@ from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
+from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
-from coartic.runs.record import Run
+from coartic.runs.record import Run, late_import
 from coartic.runs.store import Store, writing
 
 _EXECUTORS = {
@@ -51,14 +52,17 @@ class Progress:
     """Runs of the plan."""
     present: int = 0
     """Runs of the plan that the folder had before."""
-    stale: int = 0
-    """Runs that the folder had before from another version of the code."""
+    stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    """Runs that the folder has from another version or code of their method (:meth:`Store.stale`).
+    They are kept, and no report shows them."""
     done: int = 0
     """Runs performed by this call."""
     failed: int = 0
     """Runs of the plan that are not ok."""
     crashed: int = 0
     """Runs of the plan that crashed."""
+    late: dict[str, list[str]] = field(default_factory=dict)
+    """Files that runs of the folder loaded too late, by method (:meth:`Store.late_imports`)."""
     others: Counter[int] = field(default_factory=Counter)
     """Runs of earlier commands in the folder that the plan does not ask for, by the seed of their
     suite. They are kept, and no report shows them."""
@@ -88,6 +92,15 @@ class Progress:
             self.took[method] += seconds
 
     @property
+    def unused(self) -> Iterator[str]:
+        """Sentences on the runs of other versions of their methods, a sentence for each method."""
+        for (method, old, now), count in self.stale.items():
+            changed = f"by version {old}, and here it is {now}"
+            if not (VERSION.fullmatch(old) and VERSION.fullmatch(now)):
+                changed = "from before a change of its code, or of what this imports or reads"
+            yield f"Not used: {counted(count, 'run')} of {method} {changed}. They are kept."
+
+    @property
     def time_left(self) -> float:
         """Seconds that the missing runs will take, from the mean times of performed runs; NaN until
         a quarter is done."""
@@ -108,7 +121,7 @@ class Progress:
         left_out = [
             f"{counted(count, 'run')} {what}"
             for count, what in (
-                (self.stale, "made by a different version of the code"),
+                (self.stale.total(), "by another version of their method"),
                 (self.others.total(), "of earlier commands, which are kept"),
             )
             if count > 0
@@ -210,7 +223,8 @@ def perform(
     with writing(folder) as store:
         store.replace_plan(plan, made_with())
         progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
-        progress.others[plan[0].seed] -= progress.stale
+        progress.others[plan[0].seed] -= progress.stale.total()
+        progress.late = store.late_imports()
         missing = _missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.cell.method.name] += len(job.numbers)
@@ -233,7 +247,9 @@ def perform(
                         progress.finish(run)
                         watch(progress, run.cell)
             jobs = alone
-        for doubt in chain.from_iterable(map(doubts_of, first.values())):
+        known, progress.late = progress.late, store.late_imports()
+        late = [late_import(*each) for each in progress.late.items() if each[0] not in known]
+        for doubt in chain(late, chain.from_iterable(map(doubts_of, first.values()))):
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress

@@ -28,7 +28,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
             status=status,  # type: ignore[arg-type]
             reason="" if is_ok else plain(reason, LONGEST_REASON) or "it gave no reason",
             parts={},
-            environment=outcome.environment or current_environment(),
+            environment=current_environment() | (outcome.environment or {}),
         )
         scores = {part: _score_of(task, part, each) for part, each in parts.items() if is_ok}
         runs.append(Run(replace(job, numbers=(number,)), final, scores, now()))

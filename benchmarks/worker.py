@@ -14,13 +14,16 @@ import time
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import TypeAdapter
 
-from coartic.benchmarks.provenance import process_peak_mb
+from coartic.benchmarks.own_code import libraries, own_files
+from coartic.benchmarks.provenance import arithmetic, process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.text import counted, error_line
 from coartic.method import (
@@ -34,7 +37,7 @@ from coartic.method import (
 from coartic.motion.trial import trials_outside
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job
-from coartic.runs.record import PARTS, Outcome, Times, movement_data, movement_from
+from coartic.runs.record import LATE, PARTS, Outcome, Times, movement_data, movement_from
 
 _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
@@ -150,9 +153,12 @@ def perform_job(job: Job) -> list[Outcome]:
     warm = name in _seen
     _seen.add(name)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
+    imported: frozenset[str] | None = None
     try:
         with _seeing_generators(not (cell.method.is_ours or cell.method.stochastic)):
             method = cell.method.configure(cell.parameters)
+            if not cell.method.is_ours:
+                imported = _own_files_of(cell.method.key)
             results: Sequence[Any]
             if (reason_not := method.why_not(outline_of(cell.task))) is not None:
                 raise MethodError("infeasible", str(reason_not))
@@ -169,12 +175,29 @@ def perform_job(job: Job) -> list[Outcome]:
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     runs = len(sessions)
     times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
-    pairs = zip(results, sessions, strict=True)
-    return [_outcome_of(cell.method, result, session, times) for result, session in pairs]
+    about: dict[str, Any] = {"arithmetic": arithmetic()}
+    late: list[str] = []
+    if imported is not None:
+        about["libraries"] = libraries()
+        late = sorted(Path(path).name for path in own_files() - imported)
+    outcomes = [
+        replace(_outcome_of(cell.method, result, session, times), environment=about)
+        for result, session in zip(results, sessions, strict=True)
+    ]
+    if late:
+        outcomes = [replace(each, details=each.details | {LATE: late}) for each in outcomes]
+    return outcomes
 
 
 _seen: set[str] = set()
 """Ids of the methods that this process has run."""
+
+
+@cache
+def _own_files_of(_key: tuple[str, str, str]) -> frozenset[str]:
+    """Return the files of the user's that were loaded before the first run of a method, by its
+    :attr:`MethodInfo.key`."""
+    return frozenset(own_files())
 
 
 def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:

@@ -637,6 +637,12 @@ class Method(ABC):
     stochastic: ClassVar[bool] = True
     """True if the seed matters; other methods are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
+    version: ClassVar[int] = 1
+    """Raised by whoever changes what its runs give, by a default as well: no run of an earlier
+    version goes with later ones."""
+    later: ClassVar[frozenset[str]] = frozenset()
+    """Parameters that it got after runs of it were out. While one has its default, it is left out
+    of what a run is known by, so that earlier runs stay runs of the same method."""
     files: ClassVar[tuple[str, ...]] = ()
     """Data files in the folder of the method's file. They count as its code."""
     quick: ClassVar[Mapping[str, Any]] = {}

@@ -7,6 +7,9 @@ from typing import NamedTuple
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 
+MODEL_VERSION = 1
+"""Version of what all results come from: robot, movement, session, objective, optimisers, scoring.
+Whoever changes what runs give there raises it, and no earlier run goes with later ones."""
 PAPER_RADIUS = 0.1
 """θ^g of the paper's tasks, length unit."""
 

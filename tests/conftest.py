@@ -9,13 +9,14 @@ import sys
 import pytest
 from hypothesis import settings
 
+from coartic.internal.threads import worker_variables
+
 # While modules are imported and tests collected, nothing is garbage: see the end of this file.
 gc.disable()
 
-# One worker, one core: BLAS threads wait for each other by spinning. NumPy reads this when it is
-# first imported.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+# As in the processes of a suite: one thread, and the same bits on every processor. NumPy reads this
+# when it is first imported.
+os.environ.update(worker_variables())
 
 # The same examples every time: a run that fails says something of the code, not of its luck.
 # Others are tried with --hypothesis-profile=new.

@@ -326,6 +326,17 @@ def test_one_kinematic_module():
             assert not pattern.search(path.read_text(encoding="utf-8")), path
 
 
+def test_processes_that_compute_are_started_in_one_place():
+    """Others would round as their processor does."""
+    home = {f"benchmarks/{name}.py" for name in ("pool", "method_files", "cluster")}
+    home |= {"coartic/internal/threads.py", "benchmarks/reproduce.py"}
+    pattern = re.compile(r"ProcessPoolExecutor\(|\bPool\(|\bProcess\(|import multiprocessing")
+    paths = [*sources(), *(ROOT / "studies").rglob("*.py"), *(ROOT / "docs").rglob("*.py")]
+    for path in paths:
+        if path.relative_to(ROOT).as_posix() not in home:
+            assert not pattern.search(path.read_text(encoding="utf-8")), path
+
+
 def test_no_module_is_imported_but_undeclared():
     declared = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     aliases = {"pydantic_core": "pydantic", "llvmlite": "numba", "click": "typer", "PIL": "pillow",

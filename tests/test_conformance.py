@@ -113,8 +113,11 @@ def test_what_a_session_shows_cannot_be_written():
     assert session.q0.tolist() == task.q0.tolist()
 
 
-OUTSIDE = {"objective": 6, "learn": 9, "execute": 1, "session": 4, "environments in a thread": 5}
-"""Trials that each way around a session makes."""
+OUTSIDE = {
+    "objective": 6, "learn": 9, "execute": 1, "session": 4, "initial hands": 1,
+    "environments in a thread": 5,
+}  # fmt: skip
+"""Trials that each way around a session makes, in every run."""
 
 
 @pytest.mark.parametrize("means", OUTSIDE)
@@ -122,8 +125,9 @@ def test_trials_outside_the_session_stop_a_run(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
     if "environment" in means:
         pytest.importorskip("gymnasium")
-    outcome = outcome_of(methods["test/outsider"], means=means)
+    outcome, again = (outcome_of(methods["test/outsider"], means=means) for _ in range(2))
     assert outcome.status == "crashed"
+    assert again.reason == outcome.reason
     made = "1 trial" if OUTSIDE[means] == 1 else f"{OUTSIDE[means]} trials"
     assert f"made {made} outside its session" in outcome.reason
 

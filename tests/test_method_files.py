@@ -9,7 +9,6 @@ import pytest
 
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
-from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.registry import registry
 from tests.support.suites import ROOT
 
@@ -52,14 +51,13 @@ def code_with(folder, **changed):
     for name, text in (FILES | changed).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
-    return code_of(folder / "mine.py", (folder / "w",))
+    return registry([folder / "mine.py"])["nearest-hand"].code
 
 
 def test_what_counts_as_the_code_of_a_method(tmp_path):
     """Numbers in it and in what it imports and reads, wherever the file is; comments do not."""
     first = code_with(tmp_path)
     assert code_with(tmp_path / "elsewhere", **{"mine_helper.py": "STEP = 1  # m"}) == first
-    assert registry([tmp_path / "mine.py"])["nearest-hand"].code == first
     changes = (
         {"mine_helper.py": "STEP = 2"},
         {"mine_parts/more.py": "def more(x):\n    return x + 2"},

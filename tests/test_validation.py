@@ -261,7 +261,7 @@ def test_a_name_as_tables_and_figures_have_it_is_understood(name, meant):
 
 
 def test_a_renamed_method_is_known_by_its_present_id():
-    present = set(built_in(with_code=False))
+    present = set(built_in())
     assert set(RENAMED.values()) < present
     assert not set(RENAMED) & present
     meant = did_you_mean("nullspace-qp/next-goal", present)

@@ -13,7 +13,7 @@ import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
 from coartic.analysis.method_frame import GROUPS, joined_label
-from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH
+from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH, title_of
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.standings import common_tasks, reference
 from coartic.analysis.study import Study, cached, one_by_one
@@ -31,6 +31,7 @@ from coartic.analysis.words import (
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
+from coartic.runs.record import late_import
 
 Made = TypeVar("Made")
 RUNS = 20
@@ -116,6 +117,14 @@ def limits(study: Study) -> dict[str, Any]:
         "side_by_side": bool(runs.together.max() > 1),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
         "processor": made_with["processor"],
+        "earlier": sorted(
+            {
+                f"{title_of(m.name)} {m.version}"
+                for m in study.declared.values()
+                if m.code != m.version
+            }
+        ),
+        "late": [late_import(*each) for each in study.late_imports.items()],
         "cores": made_with["cores"],
     }
 

@@ -90,6 +90,9 @@ def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
     if unlike:
         pairs.append(("Unlike the paper", "; ".join(unlike)))
+    if what["earlier"]:
+        pairs.append(("Of 4.0.0", f"runs of {', '.join(what['earlier'])}"))
+    pairs += [("‡", sentence) for sentence in what["late"]]
     if what["failed"]:
         failed = f"{what['failed']} of {counted(what['runs'], 'run')}: {'; '.join(what['reasons'])}"
         pairs.append(("Failed", failed))
@@ -153,7 +156,7 @@ def cite(
     from coartic.runs.store import open_store
 
     if folder is None:
-        text = bibliography(built_in(with_code=False), analysis=analysis)
+        text = bibliography(built_in(), analysis=analysis)
     else:
         with open_store(folder) as store:
             plan, made_with = store.plan(), store.made_with()

@@ -141,7 +141,7 @@ def list_(
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
-    registered, families = registry(method_file or [], with_code=False), shipped_families()
+    registered, families = registry(method_file or []), shipped_families()
     if name is None:  # all names, to fit one screen
         names = given.method_names(registered)
         return say_pairs(
@@ -239,7 +239,7 @@ def reproduce(
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
+    from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again
     from coartic.runs.plan import in_words
 
     run = find_run(run_id, folder)
@@ -259,9 +259,10 @@ def reproduce(
             ("Result", result),
         ]
     )
-    again, code = perform_again(run, registered), registered[name].code
-    if code != cell.method.code:
-        say(f"Another version of the code made the run ({cell.method.code}; this is {code}).")
+    ((_, again),) = perform_runs_again([run], registered)
+    code = registered[name].code
+    if code != cell.method.version:
+        say(f"Another version of the method made the run ({cell.method.version}; here is {code}).")
     changes = compare_runs(run, again)
     if changes:
         say("Performed again, it is different:", *(f"- {difference}" for difference in changes))
@@ -337,7 +338,7 @@ def new(
     path = Path(given.file_name(name)) if out is None else out
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
-    check_id(name, "coartic new", registry(with_code=False))
+    check_id(name, "coartic new", registry())
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     file = quote(str(path))

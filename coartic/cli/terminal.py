@@ -103,12 +103,12 @@ class Display:
         """Show the progress and the last run; before the first run (``cell`` None) what the folder
         holds already."""
         from coartic.analysis.methods import title_of
+        from coartic.runs.record import late_import
 
         self.done, total = progress.done, progress.total
         if cell is None:
-            if progress.stale:
-                count = counted(progress.stale, "run")
-                self.line(f"Ignoring {count} made by a different version of the code.")
+            for sentence in progress.unused:
+                self.line(sentence)
             if held := +progress.others:
                 seeds = " and ".join(map(str, sorted(held)))
                 self.others = f"{counted(held.total(), 'run')} of seed {seeds}"
@@ -117,6 +117,8 @@ class Display:
             if progress.present:
                 coming = counted(total - progress.present, "run")
                 self.line(f"Already there: {progress.present} of {total}; to come: {coming}.")
+                for each in progress.late.items():
+                    self.line(f"{late_import(*each)}.")
         if progress.present == total:
             return
         there, seconds, left = progress.present + progress.done, progress.time_left, ""

@@ -6,16 +6,18 @@ import contextlib
 import itertools
 import multiprocessing
 import os
+import platform
 import shutil
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from importlib import metadata
 from numbers import Integral
 from pathlib import Path
 
 from coartic.internal.interruption import ENDING
-from coartic.internal.limits import check_limits
 
 MOST_JOBS = 10_000
 ONE_THREAD = dict.fromkeys(
@@ -31,11 +33,30 @@ ONE_THREAD = dict.fromkeys(
 """Environment variables of a worker, which has one thread, as BLAS threads of workers compete."""
 
 
+@cache
+def worker_variables() -> dict[str, str]:
+    """Return the environment variables of a process in which methods run: one thread, and on x86-64
+    the same instructions for NumPy and its linear algebra, so that all processors round alike.
+
+    OpenBLAS takes its kernels for Nehalem, which need no more than NumPy itself; NumPy leaves out
+    its loops for AVX-512, whose names depend on its version. Both read this when they are loaded.
+    """
+    if platform.machine() not in ("x86_64", "AMD64"):
+        return ONE_THREAD
+    major, minor = map(int, metadata.version("numpy").split(".")[:2])
+    names = "X86_V4,AVX512_ICL,AVX512_SPR"
+    if (major, minor) < (2, 4):
+        names = "AVX512F,AVX512CD,AVX512_SKX,AVX512_CLX,AVX512_CNL,AVX512_ICL"
+    return ONE_THREAD | {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": names}
+
+
 def threads_for(jobs: int) -> int:
     """Return the number of threads or processes that ``jobs`` means: ``jobs`` itself, or for -1 the
     number of cores. Raises ValueError for anything else that is not from 1 to 10,000.
     """
     if not (isinstance(jobs, Integral) and jobs == -1):
+        from coartic.internal.limits import check_limits  # which needs NumPy
+
         check_limits("jobs", jobs, 1, MOST_JOBS)
         return jobs
     if hasattr(os, "sched_getaffinity"):

@@ -747,15 +747,19 @@ def search_initial_hands(
     if not task.initial_is_policy:
         return task.initial_hands, {}
     ordered = tuple(hand for hand in HANDS if hand in allowed)
-    return _search_by_policy(task.model_dump_json(), ordered, model, outside)
+    chosen, spent = _search_by_policy(task.model_dump_json(), ordered, model)
+    if outside:
+        count_trials(spent["initial_trials"])
+    return chosen, spent
 
 
 @lru_cache(maxsize=64)
 def _search_by_policy(
-    task_json: str, hands: tuple[Hand, ...], model: MotionModel, outside: bool
+    task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
     """Search for the hand sequence of trial 0 by the policy of a task, given as JSON; arguments and
-    results are those of :func:`search_initial_hands`. The last 64 results are kept.
+    results are those of :func:`search_initial_hands`, whose caller counts the trials. The last 64
+    results are kept.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)
@@ -763,7 +767,7 @@ def _search_by_policy(
         candidates = [letters_of([hand] * goals) for hand in hands]
     else:
         candidates = sequences_with(hands, goals, task.name)
-    ranked = ranked_sequences(task, candidates, model=model, outside=outside)
+    ranked = ranked_sequences(task, candidates, model=model, outside=False)
     best, reward, reason, _ = ranked[0]
     if reward is None:
         raise NotApplicableError(

@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import inspect
 import json
+import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -24,6 +25,30 @@ from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
 """Origin of this project's methods."""
+_OF_4_0_0 = frozenset(
+    {
+        *("a376743cb1ef", "292a8ac3c3d1", "091fc0a85706", "92d917aefff4", "e170d8157b57"),
+        *("c78f0b6537fb", "87012e34e985", "1463a2ac660d", "4e5457291651", "c3960228006c"),
+        "e69d581d1096",
+    }
+)
+"""Hashes by which coartic 4.0.0 knew the code of its methods."""
+_VERSION_OF_4_0_0 = "1.1"
+VERSION = re.compile(r"\d+\.\d+")
+"""Code of a built-in method, versions of model and method, in place of a hash."""
+
+
+def version_of(code: str) -> str:
+    """Return the version that a stored ``code`` of a method stands for: the code itself, except for
+    the hashes of coartic 4.0.0, whose methods are version 1.1 each."""
+    return _VERSION_OF_4_0_0 if code in _OF_4_0_0 else code
+
+
+def same_run(run_id: str) -> tuple[str, str]:
+    """Return the digits of a run's id, and the version for which its code stands: two runs with
+    these are one, whatever version of coartic stored them."""
+    digits, _, code = run_id.partition("-")
+    return digits, version_of(code)
 
 
 @dataclass(frozen=True)
@@ -43,7 +68,8 @@ class MethodInfo:
     origin: str
     """``built in``, or the path of a method file."""
     code: str
-    """Hash of the code that the method's results come from."""
+    """Versions of model and method, such as ``1.2``; for a method file, the hash of what its
+    results come from (:mod:`coartic.benchmarks.own_code`)."""
     where: str = field(default="", compare=False)
     """Module or method file that a worker imports; not stored."""
 
@@ -51,6 +77,11 @@ class MethodInfo:
     def is_ours(self) -> bool:
         """True for a built-in method of coartic."""
         return self.origin == BUILT_IN
+
+    @property
+    def version(self) -> str:
+        """The code, in the form in which codes are compared (:func:`version_of`)."""
+        return version_of(self.code)
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -69,8 +100,8 @@ class MethodInfo:
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all parameters, defaults included, as plain data. Raises CoarticError for a wrong
-        parameter."""
+        """Return all parameters, defaults included, as plain data, except those of
+        :attr:`Method.later` that have their defaults. Raises CoarticError for a wrong parameter."""
         return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
@@ -120,7 +151,12 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         text = f"method {method.name!r}: {wrong} (its parameters: {listed})"
         raise CoarticError(text) from None
     if question == "complete":
-        return json.loads(json.dumps(typed.model_dump(mode="json")))
+        values = json.loads(json.dumps(typed.model_dump(mode="json")))
+        return {
+            name: value
+            for name, value in values.items()
+            if name not in method.later or value != _defaults(method)[name]
+        }
     task = Outline(*outline)._replace(hands=tuple(outline[3]))
     try:
         return method(typed).why_not(task)
@@ -133,22 +169,26 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
     """Return the info of a method; the other arguments are fields of :class:`MethodInfo`."""
-    fields = method.Parameters.model_fields.items()
-    defaults = {
-        name: None if field.is_required() else field.get_default(call_default_factory=True)
-        for name, field in fields
-    }
     return MethodInfo(
         name=method.name,
         title=method.title,
         citation=method.citation,
         information=tuple(sorted(item.value for item in method.information)),
         stochastic=method.stochastic,
-        defaults=json.loads(json.dumps(defaults, default=str)),
+        defaults=_defaults(method),
         origin=origin,
         code=code,
         where=where,
     )
+
+
+def _defaults(method: type[Method]) -> dict[str, Any]:
+    """Return the default of each parameter as plain data, None for a parameter without one."""
+    defaults = {
+        name: None if field.is_required() else field.get_default(call_default_factory=True)
+        for name, field in method.Parameters.model_fields.items()
+    }
+    return dict(json.loads(json.dumps(defaults, default=str)))
 
 
 @cache

@@ -55,7 +55,7 @@ class Cell:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the cell without the code of its method.
+        """Hash of the cell without the version or code of its method.
 
         A time limit is not a part of the cell: it can prevent a result, and cannot change one.
         """
@@ -85,11 +85,12 @@ class Job:
     suite: str = ""
     """Name of the suite that asks for the runs."""
 
-    def run_id(self, number: int) -> str:
+    def run_id(self, number: int, code: str | None = None) -> str:
         """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and
-        the hash of the method's code."""
+        ``code``, by default the method's (:attr:`MethodInfo.code`)."""
         text = f"{self.cell.digest} {self.seed} {number}"
-        return f"{hashlib.sha256(text.encode()).hexdigest()[:16]}-{self.cell.method.code}"
+        digits = hashlib.sha256(text.encode()).hexdigest()[:16]
+        return f"{digits}-{self.cell.method.code if code is None else code}"
 
     def run_seed(self, number: int) -> int:
         """Return the seed of the random numbers of a run (:func:`run_seed`)."""

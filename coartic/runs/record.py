@@ -31,6 +31,9 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """Prefixes of columns by the part of a run that they score: the solution, the first trial of a
 learner, and one noiseless greedy trial after learning."""
 PARTS = tuple(PREFIXES)
+LATE = "late_imports"
+"""Entry of the details of a run: files of the user's that a run of its process first loaded, too
+late to count as the code of its method."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
 MOST_STEPS = 1_000_000
@@ -49,6 +52,15 @@ class Score(NamedTuple):
     """Corrective movements that a solution needed."""
     other_arm_travel: float | None = None
     """Joint travel of the arm that a solution does not choose, rad."""
+
+
+def late_import(method: str, files: Sequence[str]) -> str:
+    """Return a sentence on files (:data:`LATE`) that runs of a method loaded too late."""
+    was = "was" if len(files) == 1 else "were"
+    return (
+        f"{method}: {', '.join(files)} {was} first loaded during a run, so that a change there is "
+        "not seen, and its runs stay: import it at the top of the method file"
+    )
 
 
 @dataclass(frozen=True)
@@ -87,8 +99,8 @@ class Outcome:
     """Reward of each trial; None if the trial failed or its reward is not kept."""
     times: Times = Times()
     environment: dict[str, Any] | None = None
-    """Versions, platform, processor, threads and commit; None for the environment of this
-    process."""
+    """Versions, platform, processor, variables, arithmetic and commit, or those of them that are
+    not as in the process that scores the run."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +220,7 @@ class Run:
 
 COLUMNS = (
     ("run_id", "TEXT NOT NULL UNIQUE", "id",
-     "hash of all that the result depends on: task, method, parameters, seed and code"),
+     "hash of task, method, parameters and seed, with the version or code of the method"),
     ("suite", "TEXT", "", "name of the suite"),
     ("task", "TEXT", "", "name of the task"),
     ("method", "TEXT", "", "id of the method"),
@@ -271,7 +283,8 @@ COLUMNS = (
     ("information", "TEXT", "", "information that the method declares"),
     ("parameters", "TEXT", "", "all parameters of the method, as JSON"),
     ("commit", "TEXT", "", "commit of the checkout, with + if it was changed since"),
-    ("code", "TEXT", "", "hash of the code that the result comes from"),
+    ("code", "TEXT", "",
+     "versions of model and method, such as `1.2`; of a method file a hash of its code"),
     ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
 )  # fmt: skip
 """Columns of view ``runs``, which has a row for each run of the plan; SQL, data frames and

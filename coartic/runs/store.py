@@ -16,7 +16,7 @@ import sqlite3
 import time
 import warnings
 import zlib
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from itertools import groupby
@@ -36,9 +36,11 @@ from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Movement
 from coartic.robot import Array
+from coartic.runs.method_info import version_of
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
+    LATE,
     PREFIXES,
     Outcome,
     Run,
@@ -168,8 +170,7 @@ class Store:
             self._db.execute("DELETE FROM plan")
             self._insert("suite", suite | {"environment": self._environment(environment)})
             for position, job in enumerate(plan):
-                row = _cell_row(job.cell)
-                cell = self._id_of("cells", row, "digest", "code")
+                row, (cell, _) = _cell_row(job.cell), self._cell(job.cell)
                 # A cell of an earlier command may have had other defaults.
                 latest = (_as_text(row["defaults"]), row["setting"], row["origin"], cell)
                 query = "UPDATE cells SET defaults = ?, setting = ?, origin = ? WHERE id = ?"
@@ -231,13 +232,27 @@ class Store:
         the plan, its number, its status and its time limit in s, None for no limit."""
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
-    def stale(self) -> int:
-        """Return the number of runs of the plan that other code made."""
-        query = """SELECT count(*) FROM suite JOIN plan JOIN cells AS now ON now.id = plan.cell
+    def stale(self) -> Counter[tuple[str, str, str]]:
+        """Return the number of runs of the plan that are there from another version or code of
+        their method, by the method, that version and the version of the plan."""
+        query = """SELECT now.method, old.code, now.code, count(*)
+            FROM suite JOIN plan JOIN cells AS now ON now.id = plan.cell
             JOIN cells AS old ON old.digest = now.digest AND old.code != now.code
             JOIN results ON results.cell = old.id AND suite_seed = suite.seed AND run < plan.runs
-            WHERE old.id NOT IN (SELECT cell FROM plan)"""
-        return int(self._one(query)[0])
+            WHERE old.id NOT IN (SELECT cell FROM plan) GROUP BY 1, 2, 3"""
+        return Counter(
+            {(name, version_of(old), version_of(now)): n for name, old, now, n in self._rows(query)}
+        )
+
+    def late_imports(self) -> dict[str, list[str]]:
+        """Return, by method, the files that runs of the plan first loaded while they ran
+        (``late_imports`` of their details)."""
+        query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{LATE}')
+            WHERE json_type(details, '$.{LATE}') = 'array' ORDER BY method, value"""
+        found = defaultdict[str, list[str]](list)
+        for method, name in self._rows(query):
+            found[method].append(str(name))
+        return dict(found)
 
     def others(self) -> Counter[int]:
         """Return the number of runs, stale runs too, that the plan does not ask for, by the seed of
@@ -354,12 +369,14 @@ class Store:
 
     def _write_run(self, run: Run) -> None:
         """Write a run into the tables, in place of an earlier run with its id."""
-        if earlier := self._one("SELECT id FROM results WHERE run_id = ?", run.id):
+        cell, code = self._cell(run.cell)
+        key = cell, run.job.seed, run.number
+        query = "SELECT id FROM results WHERE cell = ? AND suite_seed = ? AND run = ?"
+        if earlier := self._one(query, *key):
             for table in ("movements", "learning"):
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
-        row = run.to_row()
-        row["cell"] = self._id_of("cells", _cell_row(run.cell), "digest", "code")
+        row = run.to_row() | {"cell": cell, "run_id": run.job.run_id(run.number, code)}
         row["environment"] = self._environment(run.outcome.environment or {})
         result = self._insert("results", row)
 
@@ -407,6 +424,14 @@ class Store:
             "packages": hash_of([content.get("python"), content.get("packages")])[:8],
         }
         return self._id_of("environments", row, "content")
+
+    def _cell(self, cell: Cell) -> tuple[int, str]:
+        """Return the id and the code of the row of a cell; insert the row if it is missing. A row
+        that 4.0.0 wrote keeps its code, and is that of the version for which the code stands."""
+        for number, code in self._rows("SELECT id, code FROM cells WHERE digest = ?", cell.digest):
+            if version_of(code) == cell.method.version:
+                return number, code
+        return self._insert("cells", _cell_row(cell)), cell.method.code
 
     def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
         """Return the id of the row with the values of these keys; insert the row if it is

@@ -25,16 +25,18 @@ from coartic.runs.store import RUNS_FILE, open_store, writing
 
 def changed_runs(folder: Path) -> Iterator[str]:
     """Yield a sentence for each shipped run that a folder lacks or that has another result there,
-    whatever the version of its code.
+    whatever its version.
 
-    Raises CoarticError if another version of the code made the folder.
+    Raises CoarticError if the folder has another version of a method.
     """
     with open_store(folder) as made:
         plan = made.plan()
         for method in (job.cell.method for job in plan):
-            if method.name not in built_in() or built_in()[method.name].code != method.code:
+            here = built_in()[method.name].code if method.name in built_in() else "missing"
+            if here != method.version:
                 raise CoarticError(
-                    f"{folder}: other code of {method.name} made it: run the suite again"
+                    f"{folder} has {method.name} {method.version}, and here it is {here}: run the "
+                    "suite again"
                 )
         if (suite := plan[0].suite) not in shipped.shipped_hashes():
             return

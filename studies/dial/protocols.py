@@ -10,7 +10,7 @@ done again. It takes about an hour on two cores.
 
 import csv
 import sys
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from coartic import MethodError, execute, learn_many, load_task, objective
 from coartic.baselines.cma_es import CMAES
 from coartic.baselines.posture_based import TwoGoals
 from coartic.baselines.trajectory_optimisation import PathLength
+from coartic.benchmarks.pool import process_pool
 from coartic.method import run_method
 
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
@@ -121,7 +122,7 @@ PARTS = {
 def main(folder):
     """Run all parts on all tasks, those of the paper first."""
     Path(folder).mkdir(parents=True, exist_ok=True)
-    with ProcessPoolExecutor(2) as pool:
+    with process_pool(2) as pool:
         futures = {}
         for part, (run, columns, tasks) in PARTS.items():
             path = Path(folder) / f"{part}.csv"

@@ -6,12 +6,9 @@ writes ``recovery.csv``, a row for each simulated person. A cell is done at a ti
 not done again. It takes about two hours of one core.
 """
 
-import os
 import sys
 import zlib
 from pathlib import Path
-
-os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a process for each core
 
 import numpy as np
 import pandas as pd
@@ -21,6 +18,7 @@ from models import condition_for, tables_before, trials_of
 from simulate import FOREIGN, simulate
 
 from coartic import load_task
+from coartic.benchmarks.pool import process_pool
 
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
@@ -101,9 +99,10 @@ def main(folder):
         path.write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
     done = {*pd.read_csv(path)[COLUMNS[:4]].itertuples(index=False, name=None)}
     left = [cell for cell in cells() if cell not in done]
-    for rows in map(recover, left):
-        with path.open("a", encoding="utf-8", newline="") as file:
-            rows.to_csv(file, header=False, index=False, float_format="%.6g")
+    with process_pool(1) as pool:
+        for rows in pool.map(recover, left):
+            with path.open("a", encoding="utf-8", newline="") as file:
+                rows.to_csv(file, header=False, index=False, float_format="%.6g")
 
 
 if __name__ == "__main__":

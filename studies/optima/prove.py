@@ -12,7 +12,7 @@ import argparse
 import json
 import math
 import sys
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
 
 import shipped
@@ -22,6 +22,7 @@ from coartic import PAPER, CoarticError, MethodError, execute, load_task
 from coartic.baselines.optimum import OptimumSearch, with_locks
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
+from coartic.benchmarks.pool import process_pool
 from coartic.method import Session, run_method
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import essence
@@ -32,18 +33,23 @@ CHAINS = 20
 """Open subproblems that better solutions are sought from."""
 
 
-def entries_of(name, known):
+def entries_of(name, known, pool):
     """Return the entries of a task that have a reward, one for each restriction; of a task that
-    does not ship, the entry of the best solution that a search finds."""
-    task = load_task(name)
-    same = essence(task)
+    does not ship, the entry of the best solution that a search finds, in a process of ``pool``."""
+    same = essence(load_task(name))
     entries = [each for each in known.values() if each["essence"] == same and "reward" in each]
     if entries:
         return entries
     base, other_arm = shipped.FREE
-    result, _ = run_method(OptimumSearch(), task)
-    reward = execute(task, result.solution).reward
+    reward = pool.submit(best_found, name).result()
     return [{"task": name, "base": base, "other_arm": other_arm, "reward": reward}]
+
+
+def best_found(name):
+    """Return the best reward that a search for the optimum of a task finds."""
+    task = load_task(name)
+    result, _ = run_method(OptimumSearch(), task)
+    return execute(task, result.solution).reward
 
 
 def distance(entry):
@@ -98,11 +104,11 @@ def prove_all(names, seconds, folder, processes):
         if row["asked"] >= seconds:
             done.add(shipped.key_of(row))
     named = [each for text in names for each in named_by(text)]
-    entries = [entry for name in named for entry in entries_of(name, known)]
-    entries = [e for e in entries if distance(e) and shipped.key_of(e) not in done]
     folder.mkdir(parents=True, exist_ok=True)
     log = folder / shipped.LOG
-    with ProcessPoolExecutor(processes) as pool, log.open("a", encoding="ascii") as file:
+    with process_pool(processes) as pool, log.open("a", encoding="ascii") as file:
+        entries = [entry for name in named for entry in entries_of(name, known, pool)]
+        entries = [e for e in entries if distance(e) and shipped.key_of(e) not in done]
         tasks = [pool.submit(prove, e, seconds) for e in sorted(entries, key=distance)]
         for task in as_completed(tasks):
             file.write(f"\n{json.dumps(task.result())}\n")  # a line may have been cut off

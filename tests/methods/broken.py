@@ -142,10 +142,12 @@ class Outsider(Good):
     def details(self, session):
         task, correction = load_task("ascending"), by_correction(session)
         own = Session(task, 0, Information)
+        searched = coartic.Task(**task.model_dump() | {"initial_hands": "best-single-hand"})
         means = {
             "objective": lambda: coartic.objective(task, "RRR").many([[0.0] * 18] * 5),
             "learn": lambda: coartic.learn(task, "EC1", seed=0, trials=9),
             "execute": lambda: coartic.execute(task, correction),
+            "initial hands": lambda: coartic.initial_hands(searched),
             "session": lambda: (own.trial(correction), own.trials("RRR", np.zeros((3, 3, 10)))),
             "environments in a thread": lambda: step_in_a_thread(task),
         }

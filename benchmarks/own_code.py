@@ -1,0 +1,175 @@
+"""What the results of a method file come from: the files and packages that its import loaded.
+
+The process that has imported the file looks at them; built-in methods have a version in their
+place (:attr:`coartic.method.Method.version`).
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib
+import io
+import os
+import re
+import site
+import sys
+import sysconfig
+import tokenize
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+import coartic
+from coartic.method import MODULES, Method
+from coartic.model import MODEL_VERSION
+from coartic.motion.compile import PACKAGE
+
+OURS = {"coartic", "analysis", "baselines", "benchmarks"}
+"""The packages of this project, which are next to each other."""
+
+
+def code_of(method: type[Method], file: Path) -> str:
+    """Return the hash, 12 hexadecimal digits, of all that results of a method in a file come from.
+
+    It covers the versions of the method, of the model and of the built-in methods that the file
+    imports; the file, its declared data, and every file of the user's that its import loaded; names
+    and versions of the installed packages that these files import. Comments, blank lines, widths
+    and places of files do not count. Raises OSError for a file that cannot be read.
+    """
+    files = {*own_files(), str(file)}
+    texts = [content_of(path) for path in files]
+    imported = {name for path in files if path.endswith(".py") for name in _imports(path)}
+    parts = [f"{MODEL_VERSION}.{method.version}".encode(), *texts]
+    parts += [(file.parent / name).read_bytes() for name in method.files]
+    parts += [line.encode() for line in (*_built_in_versions(imported), *_packages(imported))]
+    hashes = sorted(hashlib.sha256(part).digest() for part in parts)
+    return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]
+
+
+def own_files() -> set[str]:
+    """Return the paths of the files of the user's that this process has loaded: of all modules but
+    the standard library's, installed packages' and this project's."""
+    found = _loaded().values()
+    return {path for path in found if not _is_installed(path) and os.path.exists(path)}
+
+
+def libraries() -> dict[str, str]:
+    """Return the version of each installed package that this process has loaded, by name."""
+    tops = {name.partition(".")[0] for name, path in _loaded().items() if _is_installed(path)}
+    names = sorted({name for top in tops for name in _distributions().get(top, ())})
+    return {name: metadata.version(name) for name in names}
+
+
+def content_of(path: str) -> bytes:
+    """Return what counts of a file: of Python its tokens without comments, blank lines and widths
+    of indentation, the same under every version of Python; of any other file each byte. Raises
+    OSError for a file that cannot be read."""
+    content = Path(path).read_bytes()
+    if not path.endswith(".py"):
+        return content
+    lines = content.splitlines(keepends=True)
+    parts, strings, begin = list[bytes](), 0, (0, 0)
+    for kind, text, start, end, _ in tokenize.tokenize(io.BytesIO(content).readline):
+        name = tokenize.tok_name[kind]
+        if name.endswith("STRING_START"):  # since Python 3.12 an f-string has tokens of its own
+            begin = begin if strings else start
+            strings += 1
+        elif name.endswith("STRING_END"):
+            strings -= 1
+            if not strings:
+                parts.append(_between(lines, begin, end))
+        elif not strings and name not in ("COMMENT", "NL", "ENCODING"):
+            parts.append(name.encode() if name in ("INDENT", "DEDENT") else text.strip().encode())
+    return b"\0".join(parts)
+
+
+def _between(lines: list[bytes], start: tuple[int, int], end: tuple[int, int]) -> bytes:
+    """Return the text from a place to another one, each a line from 1 and a letter from 0."""
+    text = [line.decode(errors="replace") for line in lines[start[0] - 1 : end[0]]]
+    text[-1] = text[-1][: end[1]]
+    text[0] = text[0][start[1] :]
+    return "".join(text).encode()
+
+
+def _loaded() -> dict[str, str]:
+    """Return the absolute path of the file of each loaded module by its name, except this project's
+    modules."""
+    files = {
+        name: os.path.abspath(path)
+        for name, module in [*sys.modules.items()]
+        if isinstance(path := getattr(module, "__file__", None), str)
+    }
+    inside = tuple(f"{folder}{os.sep}" for folder in _ours())
+    return {name: path for name, path in files.items() if not path.startswith(inside)}
+
+
+@cache
+def _ours() -> tuple[str, ...]:
+    """Return the folders of this project's packages, by the names under which they are imported and
+    where they are."""
+    folders = [str(PACKAGE), *(str(PACKAGE / name) for name in OURS - {"coartic"})]
+    return tuple({*map(os.path.abspath, folders), *map(os.path.realpath, folders)})
+
+
+@cache
+def _is_installed(path: str) -> bool:
+    """Return whether a file belongs to Python or to an installed package: editable ones do not."""
+    if {"site-packages", "dist-packages"} & {*Path(path).parts}:
+        return True
+    standard = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
+    folders = [*standard, *site.getsitepackages(), site.getusersitepackages()]
+    return any(path.startswith(f"{folder}{os.sep}") for folder in folders)
+
+
+@cache
+def _distributions() -> dict[str, list[str]]:
+    """Return the names of the installed packages that a name of an import comes from."""
+    return dict(metadata.packages_distributions())
+
+
+def _imports(path: str) -> Iterator[str]:
+    """Yield the full name of each module or attribute that a Python file imports, wherever it does,
+    and of each attribute that it takes of ``coartic``. Relative imports are left out."""
+    tree = ast.parse(Path(path).read_bytes())
+    names = {"coartic"}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+            names |= {a.asname for a in node.names if a.name == "coartic" and a.asname}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(value=ast.Name(id=name)) if name in names:
+                yield f"coartic.{node.attr}"
+
+
+def _built_in_versions(imported: Iterable[str]) -> list[str]:
+    """Return a line with id and version for each built-in method that imports reach: the methods of
+    their modules, or of the whole folder for a module without methods."""
+    names = {coartic.HOME.get(name.removeprefix("coartic."), name) for name in imported}
+    modules = set[str]()
+    for name in names:
+        if name.startswith(("coartic.baselines", "coartic.learner")):
+            inside = [each for each in MODULES if f"{name}.".startswith(f"{each}.")]
+            folder = ".".join(name.split(".")[:2])
+            modules |= {*(inside or (each for each in MODULES if each.startswith(folder)))}
+    methods = [each for name in modules for each in importlib.import_module(name).METHODS]
+    return sorted(f"{each.name} {each.version}" for each in methods)
+
+
+def _packages(imported: Iterable[str]) -> list[str]:
+    """Return a line with name and version for each installed package that imports name, without the
+    packages that this project itself needs."""
+    tops = {name.partition(".")[0] for name in imported} - OURS - sys.stdlib_module_names
+    needs = [each for each in metadata.requires("coartic") or () if "extra ==" not in each]
+    ours = {_plain_name(re.split(r"[^\w.-]", each)[0]) for each in needs}
+    names = {name for top in tops for name in _distributions().get(top, ())}
+    return sorted(f"{n} {metadata.version(n)}" for n in names if _plain_name(n) not in ours)
+
+
+def _plain_name(name: str) -> str:
+    """Return the name of a package as package indexes compare it."""
+    return re.sub(r"[-_.]+", "-", name).lower()

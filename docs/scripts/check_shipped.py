@@ -1,0 +1,99 @@
+"""Perform shipped runs again, and compare them with what is shipped, to the tick and the hand:
+``python docs/scripts/check_shipped.py``.
+
+One run of each cell of suite ``comparison``, and of the cheapest cell of each method on each family
+of suite ``families``; with ``--all`` one run of each cell of both, which takes an hour. A run of an
+earlier version than its method has here is counted as to be made again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+
+import pandas as pd
+
+from coartic.benchmarks.registry import built_in
+from coartic.benchmarks.reproduce import perform_runs_again
+from coartic.runs.method_info import version_of
+from coartic.runs.record import PARTS, Run
+from coartic.runs.shipped import open_shipped, shipped_hashes
+
+CELL = ["suite", "task", "method", "setting"]
+
+
+def shipped_runs() -> pd.DataFrame:
+    """Return all shipped runs that have a solution, the cheapest first, with their ``suite``,
+    ``version`` and ``family`` (of a task of the paper: its name)."""
+    frames = []
+    for suite in shipped_hashes():
+        with open_shipped(suite) as store:
+            frames.append(store.runs())
+    runs = pd.concat(frames)
+    runs = runs[runs.status == "ok"].sort_values(["cpu_s", "run_id"])
+    here = {name: info.code for name, info in built_in().items()}
+    version = runs.code.map(version_of)
+    return runs.assign(
+        version=version,
+        is_current=version == runs.method.map(here),
+        family=runs.task.str.partition("/")[0],
+    )
+
+
+def chosen(runs: pd.DataFrame, *, every: bool = False) -> pd.DataFrame:
+    """Return the first run of each cell of ``comparison``, and of the cheapest cell of each method
+    on each family, or with ``every`` of each cell."""
+    cells = runs.sort_values("run", kind="stable").groupby(CELL, sort=False).head(1)
+    if every:
+        return cells
+    random = cells[cells.suite != "comparison"].sort_values("cpu_s")
+    cheapest = random.groupby(["method", "setting", "family"], sort=False).head(1)
+    return pd.concat([cells[cells.suite == "comparison"], cheapest])
+
+
+def differences(rows: pd.DataFrame) -> Iterator[str]:
+    """Perform runs again and yield a sentence for each that has another result, with both results
+    and the way on. ``rows`` is as of :func:`shipped_runs`; rows of earlier versions are left out.
+    """
+    runs = list[Run]()
+    for suite, of_suite in rows[rows.is_current].groupby("suite"):
+        with open_shipped(str(suite)) as store:
+            runs += map(store.run, of_suite.run_id)
+    for run, again in perform_runs_again(runs, built_in()):
+        if (before := result_of(run)) != (now := result_of(again)):
+            yield (
+                f"{run.cell.label} on {run.cell.task.name}, run {run.number} ({run.id}), is "
+                f"shipped with {before} and gives {now} here: mend the change, or raise the "
+                "version of the method and make its runs again"
+            )
+
+
+def result_of(run: Run) -> str:
+    """Return reward, hands and ticks by movement of the parts of a run, in words."""
+    scores = {part: run.scores[part] for part in PARTS if part in run.scores}
+    ticks = [[m.ticks for m in score.movements] for score in scores.values()]
+    words = [f"{part} {score.reward} ({score.hands})" for part, score in scores.items()]
+    return f"{', '.join(words) or run.outcome.status}, ticks {ticks}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check what the command line asks for; return 1 if a run differs."""
+    parser = argparse.ArgumentParser(prog="python docs/scripts/check_shipped.py")
+    parser.add_argument("--all", action="store_true", help="one run of each cell (an hour)")
+    parser.add_argument("--release", action="store_true", help="no run may be of an old version")
+    asked = parser.parse_args(arguments)
+    runs = shipped_runs()
+    rows = chosen(runs, every=asked.all)
+    found = list(differences(rows))
+    old = runs[~runs.is_current]
+    print(f"{rows.is_current.sum()} shipped runs performed again: {len(found) or 'none'} differ.")
+    print(*(f"- {sentence}" for sentence in found), sep="\n", end="\n" * bool(found))
+    print(f"To be made again, as of earlier versions: {len(old) or 'no'} of {len(runs)} runs.")
+    for (suite, method, version), of in old.groupby(["suite", "method", "version"]):
+        print(f"- {suite}: {len(of)} of {method} {version}; here {built_in()[method].code}")
+    return int(bool(found) or (asked.release and len(old) > 0))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,185 @@
+"""Versions of built-in methods: folders of version 4.0.0, whose runs have hashes, and later."""
+
+import lzma
+import re
+
+import check_shipped
+import pytest
+
+from coartic import CoarticError
+from coartic.analysis.study import load
+from coartic.analysis.verify import check_runs
+from coartic.benchmarks.include import include_folders
+from coartic.benchmarks.planning import plan_suite
+from coartic.benchmarks.registry import built_in
+from coartic.benchmarks.reproduce import find_run
+from coartic.benchmarks.runner import perform
+from coartic.runs.method_info import same_run, version_of
+from coartic.runs.store import RUNS_FILE, open_store
+from tests.support.processes import python
+from tests.support.suites import ROOT, InProcess
+
+SAME = ["dual-process/EC1", "random-search", "hill-climbing", "corrective-alone/given"]
+CHANGED = ["cma-es/bandit", "posture-qp/current-goal"]
+"""Methods whose versions are 1.2 since version 5.0.0."""
+
+
+@pytest.fixture
+def old(tmp_path):
+    """A folder as version 4.0.0 left it."""
+    folder = tmp_path / "old"
+    folder.mkdir()
+    packed = (ROOT / "tests" / "folders" / "of_4_0_0.sqlite.xz").read_bytes()
+    (folder / RUNS_FILE).write_bytes(lzma.decompress(packed))
+    return folder
+
+
+def planned(methods=(*SAME, *CHANGED), runs=3):
+    return plan_suite("comparison", tasks=["ascending"], methods=methods, runs=runs, trials=200)
+
+
+def performed(folder, methods=(*SAME, *CHANGED), runs=3):
+    return perform(planned(methods, runs), folder, executor=InProcess())
+
+
+def numbers(study, methods=SAME):
+    """What runs of some methods came to, by method and number."""
+    runs = study.runs[study.runs.method.isin(methods)].sort_values(["method", "run"])
+    return runs[["method", "run", "seed", "reward", "hands", "result"]].to_numpy().tolist()
+
+
+def test_a_folder_of_4_0_0_is_resumed(old):
+    before = load(old)
+    assert {version_of(code) for code in before.runs.code} == {"1.1"}
+    progress = performed(old, runs=4)
+    assert (progress.present, progress.done) == (3 * 3 + 1, 3 + 4 + 1)
+    assert dict(progress.stale) == {
+        ("cma-es/bandit", "1.1", "1.2"): 3,
+        ("posture-qp/current-goal", "1.1", "1.2"): 1,
+    }
+    after = load(old)
+    kept = after.runs[after.runs.run < 3]
+    assert [row for row in numbers(after) if row[1] < 3] == numbers(before)
+    assert set(kept.run_id[kept.method.isin(SAME)]) <= {*before.runs.run_id}
+    assert check_runs(old).wrong == []
+    assert performed(old, runs=4).done == 0
+
+
+def test_a_folder_of_4_0_0_and_one_of_now_have_the_same_runs(old, tmp_path):
+    performed(tmp_path / "new", SAME)
+    assert numbers(load(tmp_path / "new")) == numbers(load(old))
+    for first, second in ((old, tmp_path / "new"), (tmp_path / "new", old)):
+        out = tmp_path / f"of {first.name}"
+        joined = include_folders(planned(SAME), [first, second], out)
+        assert perform(joined, out, executor=InProcess()).done == 0
+        assert numbers(load(out)) == numbers(load(old))
+        assert check_runs(out).wrong == []
+        with open_store(out) as store:
+            assert len({*map(same_run, store.ids())}) == len(store.ids())
+
+
+def test_runs_of_an_earlier_version_are_included_as_they_are_or_not_at_all(old, tmp_path):
+    joined = include_folders(planned(), [old], tmp_path / "all")
+    assert perform(joined, tmp_path / "all", executor=InProcess()).done == 0
+    study = load(tmp_path / "all")
+    assert {study.declared[name].version for name in CHANGED} == {"1.1"}
+    words = r"method 'cma-es/bandit' is version 1.1 in .*old and version 1.2 in this command"
+    with pytest.raises(CoarticError, match=f"{words}: leave it out of one of them"):
+        include_folders(planned(CHANGED[:1], runs=4), [old], tmp_path / "more")
+
+
+def test_a_run_is_found_in_both_forms(old, tmp_path):
+    performed(tmp_path / "new", SAME)
+    runs = load(tmp_path / "new").runs
+    (run_id,) = runs.run_id[(runs.method == "dual-process/EC1") & (runs.run == 1)]
+    assert run_id.endswith("-1.1")
+    assert find_run(run_id[:16], tmp_path).number == 1
+
+
+def test_the_terminal_says_that_a_folder_is_of_4_0_0(old, coartic, in_this_process):
+    code, text, error = coartic(
+        "run", "comparison", "--tasks", "ascending", "--methods", ",".join([*SAME, *CHANGED]),
+        "--runs", 3, "--trials", 200, "--out", old,
+    )  # fmt: skip
+    assert code == 0, error
+    text = " ".join(text.split())
+    assert re.search("Of 4.0.0 .*learner EC1 1.1", text), text
+    assert "3 runs of cma-es/bandit by version 1.1, and here it is 1.2" in " ".join(error.split())
+
+
+SLOW = {"receding-horizon"}
+"""Methods whose cheapest shipped run takes several seconds."""
+ELSEWHERE = {"dual-process/EC1-uncorrected", "dual-process/EC4-uncorrected", "dual-process/custom"}
+"""Methods without a shipped run; tests/test_short_runs.py has a run of each."""
+
+
+@pytest.mark.process
+def test_a_shipped_run_of_each_built_in_method_comes_back():
+    """To the tick and the hand: this, not the text of the code, is what makes the numbers safe."""
+    runs = check_shipped.shipped_runs()
+    assert {*runs.method} | ELSEWHERE == {*built_in()}
+    rows = runs[runs.is_current & ~runs.method.isin(SLOW)].groupby("method", sort=False).head(1)
+    assert len(rows) >= 0.75 * runs.method.nunique()
+    assert list(check_shipped.differences(rows)) == []
+
+
+def test_a_shipped_run_that_does_not_come_back_is_named(monkeypatch):
+    def another(runs, registered):
+        for run in runs:
+            score = run.solution._replace(reward=run.solution.reward - 1)
+            yield run, type(run)(run.job, run.outcome, run.scores | {"solution": score}, run.date)
+
+    monkeypatch.setattr(check_shipped, "perform_runs_again", another)
+    runs = check_shipped.shipped_runs()
+    (sentence,) = check_shipped.differences(runs[runs.method == "dual-process/EC1"].head(1))
+    assert "dual-process/EC1 on" in sentence
+    assert "raise the version of the method" in sentence
+
+
+def test_what_is_checked_before_a_release():
+    """A run of each cell of the comparison, and of each method on each family."""
+    runs = check_shipped.shipped_runs()
+    rows, every = check_shipped.chosen(runs), check_shipped.chosen(runs, every=True)
+    assert len(every) == len(runs.groupby(check_shipped.CELL))
+    assert (every.suite == "comparison").sum() == (rows.suite == "comparison").sum()
+    of_families = runs[runs.suite == "families"].groupby(["method", "setting", "family"])
+    assert len(rows) - (rows.suite == "comparison").sum() == len(of_families)
+
+
+COMPUTE = """
+from coartic.benchmarks.provenance import arithmetic
+print(arithmetic())
+"""
+
+
+@pytest.mark.process
+def test_workers_round_alike_whatever_the_environment_says(coartic, tmp_path, monkeypatch):
+    def made(folder):
+        code, _, error = coartic(
+            "run", "comparison", "--tasks", "descending", "--trials", 100, "--runs", 2, "--out",
+            tmp_path / folder, "--methods",
+            "cma-es/bandit,posture-qp/current-goal,trajectory-optimisation/path-length",
+        )  # fmt: skip
+        assert code == 0, error
+        with open_store(tmp_path / folder) as store:
+            runs = [store.run(run_id) for run_id in store.ids()]
+        return [(run.id, run.result, run.outcome.environment["arithmetic"]) for run in runs]
+
+    before = made("plain")
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", "")
+    assert made("changed") == before
+
+
+@pytest.mark.process
+def test_without_the_variables_of_workers_a_process_may_round_otherwise(record_property):
+    """What differs on this processor is recorded; where nothing does, the variables do nothing."""
+    without = {"OPENBLAS_CORETYPE": "", "NPY_DISABLE_CPU_FEATURES": ""}
+    as_a_worker, plain = (
+        python("-c", COMPUTE, **changed).stdout.split(", ") for changed in ({}, without)
+    )
+    differs = [now for now, before in zip(plain, as_a_worker, strict=True) if now != before]
+    record_property("rounds otherwise", differs)
+    if not differs:
+        pytest.skip("on this processor NumPy rounds alike with and without the variables")
+    assert [each.split()[0] for each in differs] == ["NumPy"]
