@@ -23,7 +23,6 @@ from coartic import (
 )
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
-from coartic.benchmarks.worker import OWN_GENERATOR
 from coartic.internal.text import counted
 from coartic.method import METERED
 from coartic.motion.solution import goals_without_target, hint_of
@@ -128,15 +127,7 @@ def _laws_of_runs(
         ),
         f"executed and scored on {rewards}{checked_with}{asked}",
     )  # fmt: skip
-    by_seed = chain(
-        (
-            f"declared not to be stochastic, but on {task} it makes {OWN_GENERATOR}: take random "
-            "numbers from session.rng, and declare it stochastic"
-            for task, each in first.items()
-            if OWN_GENERATOR in each.used
-        ),
-        changes("other seed", "declared not to be stochastic, but another seed on {}"),
-    )
+    by_seed = changes("other seed", "declared not to be stochastic, but another seed on {}")
     differs = next(changes("other seed", "{}"), None)
     yield _law(
         "determinism",
@@ -163,7 +154,7 @@ def _laws_of_runs(
         ),
         f"keeps to a budget of {_BUDGET} trials",
     )
-    used = {name for each in first.values() for name in each.used} - {OWN_GENERATOR}
+    used = {name for each in first.values() for name in each.used}
     unused = {item.value for item in METERED if item.value in info.information} - used
     undeclared = (
         f"on {task}: {each.reason}"

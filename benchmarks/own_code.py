@@ -16,7 +16,7 @@ import site
 import sys
 import sysconfig
 import tokenize
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -48,10 +48,10 @@ def code_of(method: type[Method], file: Path) -> str:
     return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]
 
 
-def own_files() -> set[str]:
+def own_files(known: Collection[str] = ()) -> set[str]:
     """Return the paths of the files of the user's that this process has loaded: of all modules but
-    the standard library's, installed packages' and this project's."""
-    found = _loaded().values()
+    those named in ``known``, the standard library's, installed packages' and this project's."""
+    found = {path for name, path in _loaded().items() if name not in known}
     return {path for path in found if not _is_installed(path) and os.path.exists(path)}
 
 

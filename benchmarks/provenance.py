@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
+import multiprocessing
 import os
 import platform
 import re
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import coartic
+from coartic.benchmarks.pool import CONTEXT, start_process
 from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import threads_for, worker_variables
 from coartic.motion.compile import FINGERPRINT, PACKAGE
@@ -53,6 +55,7 @@ def current_environment() -> dict[str, Any]:
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
         "platform": plain(platform.platform(), LONGEST_LINE),
         "processor": plain(processor, LONGEST_LINE),
+        "arithmetic": arithmetic(),
         "cores": threads_for(-1),
         "threads": dict(worker_variables()),
     }
@@ -69,16 +72,6 @@ def made_with() -> dict[str, Any]:
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}
-
-
-def process_peak_mb() -> float | None:
-    """Return the most memory of this process so far, MiB; None if the system does not count it."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
 def _commit_of_checkout() -> dict[str, Any] | None:
@@ -101,11 +94,23 @@ def _commit_of_checkout() -> dict[str, Any] | None:
         return None
 
 
-@cache
 def arithmetic() -> str:
-    """Return how this process rounds, as hashes of bits: of eigenvectors and logarithms by NumPy
-    and its linear algebra, and of functions by the C library. Where a hash is the same, that
-    library rounds alike; a processor's name says little on virtual machines."""
+    """Return how workers round, as hashes of bits that a process started as they are says
+    (:func:`_say_arithmetic`); empty if no process starts. Where a hash is the same, that library
+    rounds alike; a processor's name says little on virtual machines."""
+    ours, theirs = multiprocessing.Pipe(duplex=False)
+    process = CONTEXT.Process(target=_say_arithmetic, args=(theirs,), daemon=True)
+    try:
+        start_process(process)
+        theirs.close()
+        return str(ours.recv())
+    except (OSError, EOFError):
+        return ""
+
+
+def _say_arithmetic(pipe: Any) -> None:
+    """Send hashes of bits through a pipe: of eigenvectors, logarithms and powers by NumPy and its
+    linear algebra, and of functions by the C library."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
     numbers = np.abs(matrix).ravel().tolist()
@@ -114,4 +119,4 @@ def arithmetic() -> str:
         hashlib.sha256(b"".join(np.asarray(each).tobytes() for each in computed)).hexdigest()[:8]
         for computed in (by_numpy, by_libm)
     ]
-    return "NumPy {}, libm {}".format(*hashes)
+    pipe.send("NumPy {}, libm {}".format(*hashes))

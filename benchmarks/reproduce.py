@@ -13,7 +13,6 @@ from pathlib import Path
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.worker import OWN_GENERATOR
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
@@ -153,8 +152,6 @@ def doubts_of(run: Run) -> Iterator[str]:
     advice = f"see: coartic check {name}"
     if hint := hint_of(run.solution.movements):
         yield f"{name} on {task}: {hint}"
-    if OWN_GENERATOR in run.outcome.used:
-        yield f"{name} is declared not to be stochastic, but makes {OWN_GENERATOR}; {advice}"
     jobs = [replace(run.job, numbers=(number,)) for number in (run.number + 1, run.number)]
     other, again = perform_in_order(jobs)
     for change in compare_runs(run, again)[:1]:

@@ -8,22 +8,17 @@ from __future__ import annotations
 
 import json
 import logging
-import random
 import sys
 import time
 import traceback
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from coartic.benchmarks.own_code import libraries, own_files
-from coartic.benchmarks.provenance import arithmetic, process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.text import counted, error_line
 from coartic.method import (
@@ -43,6 +38,16 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
+
+
+def process_peak_mb() -> float | None:
+    """Return the most memory of this process so far, MiB; None if the system does not count it."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
 def fail(
@@ -87,51 +92,6 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
 
-OWN_GENERATOR = "a generator of its own"
-"""Among what a run used: its method, which is declared not to be stochastic, made a generator of
-random numbers, or seeded one. Generators of NumPy and of Python's own module are seen."""
-_MAKERS = (
-    *((np.random, name) for name in ("default_rng", "RandomState", "seed")),
-    *((random, name) for name in ("Random", "seed")),
-)
-_generators = list[str]()
-"""Names of the makers that the present run has called."""
-
-
-@contextmanager
-def _seeing_generators(sees: bool) -> Iterator[None]:
-    """Note in ``_generators``, emptied first, the generators of random numbers that are made in
-    this block, if ``sees``."""
-    _generators.clear()
-    with ExitStack() as stack:
-        for module, name in _MAKERS if sees else ():
-            maker = getattr(module, name)
-            stack.callback(setattr, module, name, maker)
-            setattr(module, name, _noting(maker))
-        yield
-
-
-def _noting(maker: Any) -> Any:
-    """Return a function or class that does what a maker of generators does, and notes its calls."""
-
-    def note(*args: Any, **options: Any) -> Any:
-        _generators.append(maker.__name__)
-        return maker(*args, **options)
-
-    class Noting(type):
-        """Type of a class that notes when it is called, and has the instances of the maker."""
-
-        def __call__(cls, *args: Any, **options: Any) -> Any:
-            _generators.append(maker.__name__)
-            return super().__call__(*args, **options)
-
-        def __instancecheck__(cls, thing: Any) -> bool:
-            is_maker = cls.__bases__ == (maker,)
-            return isinstance(thing, maker) if is_maker else super().__instancecheck__(thing)
-
-    return Noting(maker.__name__, (maker,), {}) if isinstance(maker, type) else note
-
-
 def perform_job(job: Job) -> list[Outcome]:
     """Perform the runs of a job in this process, and return an outcome for each in their order. An
     error of the method is an outcome, and not raised."""
@@ -153,19 +113,17 @@ def perform_job(job: Job) -> list[Outcome]:
     warm = name in _seen
     _seen.add(name)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
-    imported: frozenset[str] | None = None
+    modules = {*sys.modules}
     try:
-        with _seeing_generators(not (cell.method.is_ours or cell.method.stochastic)):
-            method = cell.method.configure(cell.parameters)
-            if not cell.method.is_ours:
-                imported = _own_files_of(cell.method.key)
-            results: Sequence[Any]
-            if (reason_not := method.why_not(outline_of(cell.task))) is not None:
-                raise MethodError("infeasible", str(reason_not))
-            if len(sessions) == 1:
-                results = [method.solve(sessions[0])]
-            else:
-                results = method.solve_together(sessions)
+        method = cell.method.configure(cell.parameters)
+        modules = {*sys.modules}
+        results: Sequence[Any]
+        if (reason_not := method.why_not(outline_of(cell.task))) is not None:
+            raise MethodError("infeasible", str(reason_not))
+        if len(sessions) == 1:
+            results = [method.solve(sessions[0])]
+        else:
+            results = method.solve_together(sessions)
         made = trials_outside() - made
         if made and not cell.method.is_ours:
             text = f"the method made {counted(made, 'trial')} outside its session, not counted"
@@ -175,17 +133,13 @@ def perform_job(job: Job) -> list[Outcome]:
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     runs = len(sessions)
     times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
-    about: dict[str, Any] = {"arithmetic": arithmetic()}
-    late: list[str] = []
-    if imported is not None:
-        about["libraries"] = libraries()
-        late = sorted(Path(path).name for path in own_files() - imported)
-    outcomes = [
-        replace(_outcome_of(cell.method, result, session, times), environment=about)
-        for result, session in zip(results, sessions, strict=True)
-    ]
-    if late:
-        outcomes = [replace(each, details=each.details | {LATE: late}) for each in outcomes]
+    pairs = zip(results, sessions, strict=True)
+    outcomes = [_outcome_of(cell.method, result, session, times) for result, session in pairs]
+    if not cell.method.is_ours:
+        used = {"libraries": libraries()}
+        outcomes = [replace(each, environment=used) for each in outcomes]
+        if late := sorted(Path(path).name for path in own_files(modules)):
+            outcomes = [replace(each, details=each.details | {LATE: late}) for each in outcomes]
     return outcomes
 
 
@@ -193,21 +147,11 @@ _seen: set[str] = set()
 """Ids of the methods that this process has run."""
 
 
-@cache
-def _own_files_of(_key: tuple[str, str, str]) -> frozenset[str]:
-    """Return the files of the user's that were loaded before the first run of a method, by its
-    :attr:`MethodInfo.key`."""
-    return frozenset(own_files())
-
-
 def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
     """Return the outcome of a run from the result of its method, or from the error that the method
     raised."""
     spent: dict[str, Any] = {
-        "used": (
-            *sorted(item.value for item in session.used),
-            *[OWN_GENERATOR][: len(_generators)],
-        ),
+        "used": tuple(sorted(item.value for item in session.used)),
         "meter": session.meter,
         "rewards": session.rewards,
         "times": times,

@@ -138,7 +138,7 @@ def test_reproduce(coartic, tmp_path):
     edit_plan(out, "UPDATE cells SET code = 'other'")
     code, _, error = coartic("verify", out, "--again", 1)
     assert code == 2
-    assert "has no run of a method whose code is the same here" in error
+    assert "has no run of a method that has the same version or code here" in error
 
 
 INTERRUPTED = """

@@ -70,7 +70,7 @@ class Mine(Method):
 
 def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "current_code", lambda *_: "c0ffee")
-    with pytest.raises(CoarticError, match=r"code c0ffee on a Dask worker.*install the same"):
+    with pytest.raises(CoarticError, match=r"is c0ffee on a Dask worker.*install the same"):
         perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 

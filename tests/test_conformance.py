@@ -11,7 +11,7 @@ from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.pool import CONTEXT
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.worker import OWN_GENERATOR, perform_job
+from coartic.benchmarks.worker import perform_job
 from coartic.method import Information, Session
 from coartic.runs.plan import Job
 from coartic.tasks.task import TASK_FOLDER
@@ -145,7 +145,6 @@ CASES = [
     ("test/taker", "information", "reveal is for this project's own compiled methods"),
     ("test/freeloader", "information", "used 'corrective process', which it does not declare"),
     ("test/lucky", "determinism", "declared not to be stochastic, but another seed"),
-    ("test/own-generator", "determinism", "on ascending it makes a generator of its own"),
     ("test/degrees", "solution", "goal 1: the target has the angle"),
     ("test/unhelpful", "failure", "ZeroDivisionError: no goal is that far"),
 ]
@@ -165,16 +164,6 @@ def test_a_solution_without_targets_is_asked_about(methods):
     asked = "on ascending, only the corrective process moves to goals 1, 2, 3, which have no target"
     assert asked in laws["solution"].finding
     assert "another seed gives the same result as well" in laws["determinism"].finding
-
-
-@pytest.mark.parametrize(
-    "maker", ["RandomState", "Random", "subclass", "seed", "scipy", "default_rng"]
-)
-def test_generators_are_seen_of_a_method_that_draws_nothing(methods, maker):
-    draws = maker == "default_rng"
-    method = replace(methods["test/own-generator"], stochastic=draws)
-    outcome = outcome_of(method, maker=maker)
-    assert (outcome.status, OWN_GENERATOR in outcome.used) == ("ok", not draws)
 
 
 @pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)

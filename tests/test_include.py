@@ -192,7 +192,7 @@ def test_what_does_not_go_together(parts, tmp_path):
         "the trial budget is None in .* and 30 in": {"trial_budget": 30},
         f"trials of {EC1} on ascending is 40 in .*left and 41 in this": {"trials": 41},
         "task 'ascending' is definition": {"cells": [cell_on(moved, KNOWN[EC1])]},
-        f"method '{EC1}' is code .* and code 0123456789ab in .*: leave it out": {
+        f"method '{EC1}' is version 1.1 .* and version 0123456789ab in .*: leave it out": {
             "cells": [cell_on(load_task("descending"), new)]
         },
     }
@@ -290,7 +290,7 @@ def test_results_are_packed_again_where_they_have_not_changed(
     edit_plan(same, "UPDATE cells SET code = '0123456789ab' WHERE method = 'dual-process/EC1'")
     with pytest.raises(SystemExit):  # whatever has changed
         pack(same, "--changed")
-    assert "other code of dual-process/EC1 made it" in capsys.readouterr().err
+    assert "has dual-process/EC1 0123456789ab" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("in_this_process")

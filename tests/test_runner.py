@@ -257,7 +257,6 @@ DOUBTS = {
     "test/random": "another result on ascending with the same seed after another run",
     "test/remembers": "another result on ascending with the same seed after another run",
     "test/lucky": "declared not to be stochastic, but another seed gives another result",
-    "test/own-generator": "declared not to be stochastic, but makes a generator of its own",
     "test/degrees": "on ascending: goal 1: the target has the angle 90",
     "test/draws": "",
 }

@@ -91,8 +91,7 @@ class Outcome:
     details: dict[str, Any] = field(default_factory=dict)
     """Further data that the method keeps, such as corrective movements by trial."""
     used: tuple[str, ...] = ()
-    """Declared information that the method used, and whether a method that is declared not to be
-    stochastic made a generator of random numbers."""
+    """Declared information that the method used."""
     meter: Meter | None = None
     """Counts of trials, of evaluations and of movements; None if the worker died."""
     rewards: list[Annotated[int, Field(gt=-(2**31), lt=2**31)] | None] = field(default_factory=list)
@@ -276,8 +275,7 @@ COLUMNS = (
     ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
     ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
     ("used", "TEXT NOT NULL", "outcome.used",
-     "declared information that the method used; `a generator of its own` if a method that is "
-     "declared not to be stochastic makes a generator of random numbers"),
+     "declared information that the method used"),
     ("result", "TEXT NOT NULL", "result",
      "hash of the outcome; runs with the same value are identical"),
     ("information", "TEXT", "", "information that the method declares"),

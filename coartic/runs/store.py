@@ -89,6 +89,15 @@ _STORED = ", ".join(
     f"{name} {kind} CHECK ({_rule(name, kind)})" for name, kind, source, _ in COLUMNS if source
 )
 _IN_VIEW = ", ".join(f'"{name}"' for name, *_ in COLUMNS)
+_ASKED = """SELECT position, results.*, suite.name AS suite, task, method, setting,
+    information, parameters, code, commit_id AS "commit", packages
+    FROM suite JOIN plan JOIN cells ON cells.id = plan.cell JOIN results
+    ON results.cell = plan.cell AND suite_seed = suite.seed AND run < plan.runs
+    JOIN environments ON environments.id = results.environment"""
+_RUNS = f"SELECT {_IN_VIEW} FROM asked ORDER BY position, run"
+_SOLUTIONS = """SELECT run_id, "order", goal, hand, kind, ticks, path
+    FROM asked JOIN movements ON result_id = asked.id AND part = 'solution'
+    ORDER BY position, run, movements."order\""""
 _SCHEMA = (
     """CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
     environment INTEGER, plan_hash TEXT)""",
@@ -111,17 +120,12 @@ _SCHEMA = (
     ticks INTEGER NOT NULL, path TEXT NOT NULL, PRIMARY KEY (result_id, part, "order"))
     WITHOUT ROWID""",
     "CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL)",
-    """CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method, setting,
-    information, parameters, code, commit_id AS "commit", packages
-    FROM suite JOIN plan JOIN cells ON cells.id = plan.cell JOIN results
-    ON results.cell = plan.cell AND suite_seed = suite.seed AND run < plan.runs
-    JOIN environments ON environments.id = results.environment""",
-    f"CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run",
-    """CREATE VIEW solutions AS SELECT run_id, "order", goal, hand, kind, ticks, path
-    FROM asked JOIN movements ON result_id = asked.id AND part = 'solution'
-    ORDER BY position, run, movements."order\"""",
+    f"CREATE VIEW asked AS {_ASKED}",
+    f"CREATE VIEW runs AS {_RUNS}",
+    f"CREATE VIEW solutions AS {_SOLUTIONS}",
 )
-"""Statements that make the tables and views, each as SQLite keeps it."""
+"""Statements that make the tables and views, each as SQLite keeps it. The views are for people and
+their scripts: this module asks by the same queries, whatever the views of a file say."""
 _PLANNED = (
     """SELECT name, seed, time_limit_s, command, date, content FROM suite
     JOIN environments ON environments.id = environment""",
@@ -327,11 +331,11 @@ class Store:
 
     def runs(self) -> pd.DataFrame:
         """Return view ``runs``, the runs of the plan in order, as a data frame (nullable types)."""
-        return self._frame("runs")
+        return self._frame(_RUNS)
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions``, a row for each movement, as a data frame (nullable types)."""
-        return self._frame("solutions")
+        return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
         """Return the movements of a part (:data:`PREFIXES`) by run id, of the first ``most`` ok
@@ -342,7 +346,7 @@ class Store:
             JOIN movements ON result_id = solved.id AND part = ? WHERE place <= ?
             ORDER BY position, run, "order\""""
         with explain_errors(self.folder):
-            rows = self._db.execute(query, (part, most))
+            rows = self._execute(query, (part, most))
             return {
                 run_id: tuple(movement_from(row[1:]) for row in of_run)
                 for run_id, of_run in groupby(map(tuple, rows), itemgetter(0))
@@ -354,7 +358,7 @@ class Store:
         query = """SELECT run_id, rewards, trials FROM asked
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
         with explain_errors(self.folder):
-            for run_id, blob, trials in self._db.execute(query):
+            for run_id, blob, trials in self._execute(query):
                 yield run_id, _unpack(blob, trials)
 
     # Rows.
@@ -448,22 +452,26 @@ class Store:
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
         return int(self._db.execute(text, [*map(_as_text, row.values())]).lastrowid or 0)
 
+    def _execute(self, query: str, values: Sequence[object] = ()) -> sqlite3.Cursor:
+        """Execute a query, in which ``asked`` is the runs of the plan."""
+        return self._db.execute(f"WITH asked AS ({_ASKED}) {query}", values)
+
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return the rows of a query."""
+        """Return the rows of a query (:meth:`_execute`)."""
         with explain_errors(self.folder):
-            return self._db.execute(query, values).fetchall()
+            return self._execute(query, values).fetchall()
 
     def _one(self, query: str, *values: object) -> Any:
         """Return the first row of a query, or None."""
         return next(iter(self._rows(query, *values)), None)
 
-    def _frame(self, view: str) -> pd.DataFrame:
-        """Return a view as a data frame, with nullable types."""
+    def _frame(self, query: str) -> pd.DataFrame:
+        """Return the rows of a query as a data frame, with nullable types."""
         import pandas as pd
 
         # astype refuses numbers that are too large
         with explain_errors(self.folder), np.errstate(invalid="ignore"):
-            rows = self._db.execute(f"SELECT * FROM {view}")
+            rows = self._execute(query)
             names = [column[0] for column in rows.description]
             frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
             return frame.astype({name: _DTYPES[name] for name in names})
@@ -639,11 +647,11 @@ def _has_tables(connection: sqlite3.Connection) -> bool:
 
     What other programs add to the file (statistics, indexes, tables, views) is let be, except
     triggers, which change what is written. Raises CoarticError for any other file, and ValueError
-    for a row that names a missing row: no view would show its run.
+    for a row that names a missing row: nothing would show its run.
     """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
-    there = [*map(tuple, connection.execute("SELECT type, sql FROM sqlite_master"))]
+    there = {kind for (kind,) in connection.execute("SELECT type FROM sqlite_master")}
     if application != _APPLICATION:
         if there:
             raise CoarticError(
@@ -658,10 +666,10 @@ def _has_tables(connection: sqlite3.Connection) -> bool:
             "it was written by coartic 3.0.0 or earlier: version 3.0.0 reads it, or says which "
             "version does; or run the suite again with another --out"
         )
-    if any(kind == "trigger" for kind, _ in there) or {*_SCHEMA} - {sql for _, sql in there}:
+    if "trigger" in there:
         raise CoarticError(
-            "its tables and views are not as coartic makes them. Restore a copy, or run the suite "
-            "again with another --out."
+            "it has a trigger, which changes what is written: restore a copy, or run the suite "
+            "again with another --out"
         )
     for table, row, missing, _ in connection.execute("PRAGMA foreign_key_check"):
         raise ValueError(f"row {row} of {table} names a row of {missing} that is not there")

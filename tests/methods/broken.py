@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from pydantic import ConfigDict
-from scipy._lib._util import check_random_state
 
 import coartic
 from coartic import load_task
@@ -177,34 +176,6 @@ class Draws(Lucky):
 
     name = "test/draws"
     stochastic = True
-
-
-class OwnGeneratorParameters(Parameters):
-    maker: str = "default_rng"
-
-
-class OwnGenerator(Good):
-    """Has a lucky seed, though it says that no seed matters."""
-
-    name = "test/own-generator"
-    Parameters = OwnGeneratorParameters
-
-    def details(self, session):
-        makers = {
-            "default_rng": lambda: np.random.default_rng(7),
-            "RandomState": lambda: np.random.RandomState(7).uniform(),
-            "Random": lambda: random.Random(7).random(),
-            "subclass": lambda: OwnRandom(7).doubled(),
-            "seed": lambda: np.random.seed(7),  # noqa: NPY002
-            "scipy": lambda: check_random_state(7),
-        }
-        makers[self.parameters.maker]()
-        assert isinstance(np.random.mtrand._rand, np.random.RandomState)
-
-
-class OwnRandom(random.Random):
-    def doubled(self):
-        return 2 * self.random()
 
 
 class Degrees(Good):

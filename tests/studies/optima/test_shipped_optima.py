@@ -177,7 +177,7 @@ def test_better_rewards_of_a_folder_are_taken_over(tmp_path):
 
 def prove(monkeypatch, capsys, folder, *asked):
     """What ``prove.py`` prints, in this process, and its log."""
-    monkeypatch.setattr(PROVE, "ProcessPoolExecutor", ThreadPoolExecutor)
+    monkeypatch.setattr(PROVE, "process_pool", ThreadPoolExecutor)
     monkeypatch.setattr("sys.argv", ["prove.py", *map(str, asked), "--out", str(folder)])
     PROVE.main()
     return capsys.readouterr().out.splitlines(), SHIPPED.read_log(folder)
