@@ -233,6 +233,7 @@ class _Report(NamedTuple):
     runs: int  # checked
     movements: int  # executed
     wrong: list[str]  # what differs, a sentence each
+    unfinished: list[str]  # what is missing of the plan, a sentence if anything is
     unchecked: list[str]  # what was not checked, a sentence each
 
 
@@ -256,7 +257,7 @@ def _check_all(db: sqlite3.Connection) -> _Report:
         AND (type = 'trigger' OR name IN ({", ".join("?" for _ in OURS)})) ORDER BY type, name"""
     if hash_of([sql for (sql,) in db.execute(query, OURS)])[:16] != SCHEMA:
         foreign = "Tables or views are not as coartic makes them, so that they may say anything."
-        return _Report(0, 0, [foreign], ["The runs."])
+        return _Report(0, 0, [foreign], [], ["The runs."])
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
     tasks = dict[int, Any]()
     wrong += [*_check_cells(db, tasks), *_check_plan(db)]
@@ -290,7 +291,8 @@ def _check_all(db: sqlite3.Connection) -> _Report:
     empty = [f"Runs without a solution: {unsolved}."] if unsolved else []
     (asked,) = db.execute("SELECT count(*) FROM asked").fetchone()
     others = [f"If the plan should ask for {runs - asked} other runs, which no report shows."]
-    return _Report(runs, movements, wrong, [*UNCHECKED, *empty, *others * (runs > asked)])
+    more = [*UNCHECKED, *empty, *others * (runs > asked)]
+    return _Report(runs, movements, wrong, [*_missing(db)], more)
 
 
 def _check_identity(row: Any) -> None:
@@ -339,11 +341,18 @@ def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]
 
 
 def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence if the plan was changed, and one if its runs are missing."""
+    """Yield a sentence if the plan was changed."""
     hashes = [row[0] for row in db.execute("SELECT plan_hash FROM suite")]
-    if hashes != [hash_of([[*row] for query in PLANNED for row in db.execute(query)])]:
+    rows = [[*row] for query in PLANNED for row in db.execute(query)]
+    if hashes != [hash_of(rows)] and (hashes or rows):
         words = "what suite, plan, cells and environments say of it was changed"
         yield f"The plan is not as it was written: {words}. No report can be made."
+
+
+def _missing(db: sqlite3.Connection) -> Iterator[str]:
+    """Yield a sentence if the plan, or a part of its runs, is not there."""
+    if not db.execute("SELECT count(*) FROM suite").fetchone()[0]:
+        yield "It has no plan yet: repeat the `coartic run` command."
     query = """SELECT runs, count(run), min(run) FROM plan LEFT JOIN asked USING (position)
         GROUP BY position"""
     counts = db.execute(query).fetchall()
@@ -403,7 +412,7 @@ def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[Mo
 
 def main() -> int:
     """Check the folder that the command line names, or else the current folder, and print what was
-    found. Returns 0 if nothing differs, 1 if something differs, 2 if it cannot be read."""
+    found. Returns 0 if nothing differs or is missing, else 1, and 2 if it cannot be read."""
     folder = Path(*sys.argv[1:])
     try:
         report = check_runs(folder)
@@ -411,9 +420,10 @@ def main() -> int:
         print(f"{folder} cannot be read: {error}.")
         return 2
     print(f"{report.runs} runs checked, {report.movements} movements executed.")
-    lines = [*(report.wrong or ["Nothing differs."]), "Not checked:", *report.unchecked]
+    lines = [*(report.wrong or ["Nothing differs."]), *report.unfinished, "Not checked:"]
+    lines += report.unchecked
     print(*("".join(c if c.isprintable() else "?" for c in line) for line in lines), sep="\n")
-    return 1 if report.wrong else 0
+    return 1 if report.wrong or report.unfinished else 0
 
 
 if __name__ == "__main__":

