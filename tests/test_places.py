@@ -23,7 +23,7 @@ COMMANDS = {
     "cite": "cite {}",
     "animate": f"animate {RUN} --in {{}} --out film.gif",
     "animate to": "animate {run} --in good --out {}/film.gif",
-    "reproduce": f"reproduce {RUN} --in {{}}",
+    "verify run": f"verify {{}} --run {RUN}",
     "draw to": "draw ascending --out {}",
     "draw into": "draw ascending --out {}/tasks.svg",
     "play": "play {}/task.toml --no-open --out page.html",
@@ -39,7 +39,7 @@ COMMANDS = {
     "method": "list --method-file {}/mine.py",
 }
 READ_FILES = ("play", "list file", "check file", "suite", "task", "family", "method")
-READ = ("run", "include", "report", "verify", "cite", "animate", "reproduce")
+READ = ("run", "include", "report", "verify", "cite", "animate", "verify run")
 WRITE = ("report to", "draw to", "draw into", "animate to", "play to", "new", "run")
 BOTH = (*READ, *WRITE, *READ_FILES, "list", "check")
 PLACES = {
