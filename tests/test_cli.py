@@ -409,11 +409,11 @@ TAKEN = (
     "list [--method-file mine.py]",
     "report out [--for-paper]",
     "report out [--out mine.py]",
-    "animate {run} --width 200 [--in out]",
-    "animate {run} --width 200 --in out [--out b.gif]",
-    "animate {run} --width 200 --in out --out b.gif [--replace]",
-    "animate {run} --width 200 --in out --out b.gif --replace [--initial]",
-    "animate {run} --width 200 --in out --out b.gif --replace [--width 300]",
+    "draw out --out a.gif --width 200 [--run {run}]",
+    "draw out --run {run} --width 200 [--out b.gif]",
+    "draw out --run {run} --width 200 --out b.gif [--replace]",
+    "draw out --run {run} --width 200 --out b.gif --replace [--initial]",
+    "draw out --run {run} --width 200 --out b.gif --replace [--width 300]",
     "verify out [--again 1]",
     "verify out [--run {run}]",
     "new a-search [--out b.py]",
@@ -435,6 +435,8 @@ REFUSED = (
     "verify out [--method-file mine.py]",
     "verify out --again 1 [--method-file mine.py]",
     "draw ascending --out g [--replace]",
+    "draw ascending --out h.svg [--initial]",
+    "draw ascending --out i.svg [--width 300]",
 )
 
 
