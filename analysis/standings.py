@@ -29,17 +29,13 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs, also failed ones, of every method except searches for the optimum, by label
-    of the row in :attr:`.Study.methods`; a row that joins conditions of the learner has their runs
-    again (:func:`by_row`). Runs on tasks without a best known reward are left out, and so are
-    methods without other runs."""
-    return by_row(study, study.runs[study.runs.best_known.notna()])
+    of the row in :attr:`.Study.methods`, in the order of these rows.
 
-
-def by_row(study: Study, runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Return runs of a study by the label of the row in :attr:`.Study.methods`, in the order of
-    these rows, without searches for the optimum and rows without runs. A row that joins two
-    conditions of the learner has runs that are in the rows of these conditions, too."""
-    runs = runs.copy(deep=False)
+    A row that joins two conditions of the learner has runs that are in the rows of these
+    conditions, too. Runs on tasks without a best known reward are left out, and so are methods
+    without other runs.
+    """
+    runs = study.runs[study.runs.best_known.notna()]
     runs.attrs = {}  # which pandas copies with every selection
     by_label = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
     rows = study.methods.index[~study.methods.is_search]

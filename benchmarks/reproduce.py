@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -18,58 +16,31 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.motion.solution import hint_of
-from coartic.runs.method_info import same_run
 from coartic.runs.plan import Job
 from coartic.runs.record import LATE, PARTS, Run, too_long
-from coartic.runs.store import RUNS_FILE, open_store
+from coartic.runs.store import open_store
 from coartic.trajectories import Trajectory, trajectory
 
 
 def find_run(prefix: str, folder: Path) -> Run:
-    """Find the run whose id begins with ``prefix`` in a results folder or any folder below it.
+    """Find the run of a results folder whose id begins with ``prefix``.
 
-    Raises CoarticError if there is no such run, or more than one, or one with different results in
-    two folders; without such a run also for a folder that cannot be read.
+    Raises CoarticError if there is no such run, or more than one, and for a folder that cannot be
+    read.
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
         raise CoarticError(
             f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c: "
             "column run_ids of a report's tables names the runs of each row."
         )
-    try:
-        os.scandir(folder).close()
-    except OSError as error:
-        raise CoarticError(
-            f"cannot read {folder}: {error.strerror}. Name a folder with --in."
-        ) from None
-    places_of = defaultdict[tuple[str, str], list[tuple[Path, str]]](list)
-    unread = list[CoarticError]()
-    for path in sorted(folder.rglob(RUNS_FILE)):
-        try:
-            with open_store(path.parent) as store:
-                for run_id in store.ids(prefix):
-                    places_of[same_run(run_id)].append((path.parent, run_id))
-        except CoarticError as error:
-            unread.append(error)
-    if unread and not places_of:
-        raise unread[0]
-    if not places_of:
-        raise CoarticError(
-            f"there is no run {prefix!r} in {folder}. Name another folder with --in."
-        )
-    if len(places_of) > 1:
-        ids = sorted(places[0][1] for places in places_of.values())
-        some = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
-        raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs: {some}")
-    (places,) = places_of.values()
-    runs = list[Run]()
-    for place, run_id in places:
-        with open_store(place) as store:
-            runs.append(store.run(run_id))
-        if changes := compare_runs(runs[0], runs[-1]):
-            where = f"{places[0][0]} and {place}: {changes[0]}"
-            raise CoarticError(f"run {run_id} differs in {where}. Name one folder with --in.")
-    return runs[0]
+    with open_store(folder) as store:
+        ids = sorted(store.ids(prefix))
+        if not ids:
+            raise CoarticError(f"there is no run {prefix!r} in {folder}")
+        if len(ids) > 1:
+            some = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
+            raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs: {some}")
+        return store.run(ids[0])
 
 
 def trajectory_of(run: Run) -> Trajectory:
@@ -121,11 +92,8 @@ def perform_runs_again(
             yield of_job[id(job)], again
 
 
-def perform_some_again(
-    folder: Path, count: int, registered: Registry
-) -> Iterator[tuple[str, list[str]]]:
-    """Perform at most ``count`` runs of a folder again, spread over its cells, and yield the id of
-    each run with its differences to the stored run (:func:`compare_runs`). Runs count whose methods
+def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
+    """Return at most ``count`` runs of a folder, spread over its cells. Runs count whose methods
     still have the version or code of the run. Raises CoarticError if there is no such run."""
     with open_store(folder) as store:
         plan = store.plan()
@@ -140,9 +108,7 @@ def perform_some_again(
                 f"{folder} has no run of a method that has the same version or code here"
             )
         step = max(1, len(ids) // count)
-        chosen = [store.run(run_id) for run_id in ids[::step][:count]]
-    for run, again in perform_runs_again(chosen, registered):
-        yield run.id, compare_runs(run, again)
+        return [store.run(run_id) for run_id in ids[::step][:count]]
 
 
 def doubts_of(run: Run) -> Iterator[str]:

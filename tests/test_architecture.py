@@ -282,7 +282,7 @@ assert not modules & set(coartic.__all__), "a module would hide what has its nam
 
 @pytest.mark.process
 def test_the_package_imports_what_is_asked_for():
-    assert "reproduce" in python("-c", FRESH).stdout
+    assert "verify" in python("-c", FRESH).stdout
 
 
 @pytest.mark.process

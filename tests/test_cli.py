@@ -20,7 +20,6 @@ from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
-from coartic.runs.store import RUNS_FILE
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
@@ -109,16 +108,16 @@ def test_a_broken_law_makes_the_exit_code_of_check(coartic, tmp_path):
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_reproduce(coartic, tmp_path):
+def test_verify_performs_runs_again(coartic, tmp_path):
     out = tmp_path / "out"
     assert coartic(*SMALL, "--out", out)[0] == 0
     first, second = load(out).runs.run_id
-    (tmp_path / "earlier").mkdir()  # a folder that cannot be read is next to it
-    (tmp_path / "earlier" / RUNS_FILE).write_text("no database")
-    code, text, _ = coartic("reproduce", first, "--in", tmp_path)
+    code, text, _ = coartic("verify", out, "--run", first)
     assert code == 0
-    assert text.splitlines()[-1] == "Performed again: identical."
-    assert "earlier" in coartic("reproduce", "0123456789", "--in", tmp_path)[2]
+    assert text.splitlines()[-1] == "1 run performed again: none with another result."
+    assert re.search(rf"Run +{first}: Ascending, .*, run 0\nSeed +[0-9]+\nParam.*\nResult", text)
+    assert "checked" not in text
+    assert "there is no run '0123456789'" in coartic("verify", out, "--run", "0123456789")[2]
     part = tmp_path / "part"  # of an array, and of all methods those for one arm
     own = ("--methods", "dual-process/*", "--runs", "2..3")
     assert coartic(*SMALL, *own, "--out", part)[0] == 0
@@ -128,11 +127,11 @@ def test_reproduce(coartic, tmp_path):
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
     first_movement = """WHERE "order" = 0 AND part = 'replay'"""
     edit(out, f"UPDATE movements SET path = {moved('$[6]', 1e-12)} {first_movement}")
-    code, text, _ = coartic("reproduce", second, "--in", out)
+    code, text, _ = coartic("verify", out, "--run", second)
     assert code == 1
-    assert "- movement_ticks: " in text
-    assert "- replay: " in text
-    code, _, error = coartic("reproduce", "", "--in", out)
+    assert f"Run {second}, performed again: movement_ticks: " in text
+    assert f"Run {second}, performed again: replay: " in text
+    code, _, error = coartic("verify", out, "--run", "")
     assert code == 2
     assert "is not a run id" in error
     edit_plan(out, "UPDATE cells SET code = 'other'")
@@ -410,13 +409,13 @@ TAKEN = (
     "list [--method-file mine.py]",
     "report out [--for-paper]",
     "report out [--out mine.py]",
-    "animate {run} --width 200 [--in out]",
-    "animate {run} --width 200 --in out [--out b.gif]",
-    "animate {run} --width 200 --in out --out b.gif [--replace]",
-    "animate {run} --width 200 --in out --out b.gif --replace [--initial]",
-    "animate {run} --width 200 --in out --out b.gif --replace [--width 300]",
-    "reproduce {run} [--in out]",
+    "draw out --out a.gif --width 200 [--run {run}]",
+    "draw out --run {run} --width 200 [--out b.gif]",
+    "draw out --run {run} --width 200 --out b.gif [--replace]",
+    "draw out --run {run} --width 200 --out b.gif --replace [--initial]",
+    "draw out --run {run} --width 200 --out b.gif --replace [--width 300]",
     "verify out [--again 1]",
+    "verify out [--run {run}]",
     "new a-search [--out b.py]",
     "new a-search [--replace]",
     "draw ascending [--out f.svg]",
@@ -431,10 +430,13 @@ REFUSED = (
     "list paper [--method-file mine.py]",
     "check task.toml [--verbose]",
     "check corrective-alone/given [--method-file mine.py]",
-    "reproduce {run} --in out [--method-file mine.py]",
+    "verify out --run {run} [--method-file mine.py]",
+    "verify out --run {run} [--again 1]",
     "verify out [--method-file mine.py]",
     "verify out --again 1 [--method-file mine.py]",
     "draw ascending --out g [--replace]",
+    "draw ascending --out h.svg [--initial]",
+    "draw ascending --out i.svg [--width 300]",
 )
 
 

@@ -30,8 +30,8 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     assert runs.status.to_dict() == {"two-armed-1": "ok", "shelf": "ok"}
     assert set(runs.information) == {"corrective process, forward kinematics, goals"}
     assert (runs.forward_kinematics > runs.jacobians).all()
-    again = ("reproduce", runs.run_id["shelf"], "--in", tmp_path)
-    assert coartic(*again, *own)[1].endswith("identical.\n")
+    again = ("verify", tmp_path, "--run", runs.run_id["shelf"])
+    assert coartic(*again, *own)[1].endswith("again: none with another result.\n")
     code, _, error = coartic(*again)
     assert code == 2
     assert "unknown method 'nearest-hand': pass --method-file" in error

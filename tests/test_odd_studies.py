@@ -1,7 +1,6 @@
 """Results that users can have: methods that fail, settings without their method, odd names."""
 
 import numpy as np
-import pandas as pd
 
 from coartic import load_task
 from coartic.analysis.control import with_control
@@ -32,12 +31,6 @@ def planted(*cells, **more):
     rows = [row for cell in cells for row in cell]
     best = {task: BestKnown(BEST[task], BEST[task]) for task in {row["task"] for row in rows}}
     return study_of(rows, optima=best, **more)
-
-
-def without_signatures(study):
-    """The study with signatures of 0, so that no movements are needed."""
-    object.__setattr__(study, "signature", lambda name, **_: pd.Series(0.0, study.runs.index))
-    return study
 
 
 def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
@@ -107,7 +100,7 @@ def test_names_of_tasks_may_end_as_columns_of_intervals_do():
     assert texts_of(table, frame, "on reach") == ["1.1", "3.2"]
 
 
-def test_a_learner_over_all_tasks_has_the_gain_of_its_own_conditions():
+def test_a_learner_over_all_tasks_has_the_gap_of_its_own_conditions():
     """EC1 ran on a task with two arms as well, on which EC4 stands for the learner."""
     study = planted(
         behind([ONE], "dual-process/EC1", 8, 8),
@@ -116,29 +109,8 @@ def test_a_learner_over_all_tasks_has_the_gain_of_its_own_conditions():
         behind([ONE], "hill-climbing", 8, 8),
         behind([TWO], "hill-climbing", 5, 5),
     )
-    study = without_signatures(study)
-    gain = FIGURES["coarticulation"](study).data.set_index("method").gain
-    assert gain["dual-process (EC1, EC4)"] == gain["hill-climbing"]
-
-
-def test_numbers_of_trials_are_joined_with_the_default_number():
-    settings = "", "trials=100", "trials=1000", "sigma=0.1, trials=100"
-    study = planted(*(behind([TWO], "hill-climbing", 5, 6, setting=each) for each in settings))
-    data = FIGURES["coarticulation"](without_signatures(study)).data
-    assert data.base.tolist() == ["hill-climbing"] * 3 + ["hill-climbing sigma=0.1"]
-
-
-def test_without_a_best_known_reward_nothing_is_drawn_against_gain():
-    rows = behind([TWO], "mine", None, None) + behind([TWO], "hill-climbing", None, None)
-    assert FIGURES["coarticulation"](without_signatures(study_of(rows))) is None
-
-
-def test_without_a_reward_of_the_corrective_process_there_is_no_gain(monkeypatch):
-    rows = (behind([TWO], method, 5, 15, 25) for method in ("hill-climbing", "random-search"))
-    study = planted(*rows, corrective_best={TWO: np.nan})
-    where = "coartic.analysis.sections.coarticulation.with_control"
-    monkeypatch.setattr(where, lambda *_: {"": (np.ones(3), np.ones(3))})
-    assert TABLES["signatures"](study).gain.isna().all()
+    gap = TABLES["ranking"](study).gap
+    assert gap["dual-process (EC1, EC4)"] == gap["hill-climbing"]
 
 
 def test_hands_of_many_runs_are_shares_of_those_that_are_executed():

@@ -21,9 +21,9 @@ COMMANDS = {
     "report to": "report good --out {}",
     "verify": "verify {}",
     "cite": "cite {}",
-    "animate": f"animate {RUN} --in {{}} --out film.gif",
-    "animate to": "animate {run} --in good --out {}/film.gif",
-    "reproduce": f"reproduce {RUN} --in {{}}",
+    "film": f"draw {{}} --run {RUN} --out film.gif",
+    "film to": "draw good --run {run} --out {}/film.gif",
+    "verify run": f"verify {{}} --run {RUN}",
     "draw to": "draw ascending --out {}",
     "draw into": "draw ascending --out {}/tasks.svg",
     "play": "play {}/task.toml --no-open --out page.html",
@@ -39,8 +39,8 @@ COMMANDS = {
     "method": "list --method-file {}/mine.py",
 }
 READ_FILES = ("play", "list file", "check file", "suite", "task", "family", "method")
-READ = ("run", "include", "report", "verify", "cite", "animate", "reproduce")
-WRITE = ("report to", "draw to", "draw into", "animate to", "play to", "new", "run")
+READ = ("run", "include", "report", "verify", "cite", "film", "verify run")
+WRITE = ("report to", "draw to", "draw into", "film to", "play to", "new", "run")
 BOTH = (*READ, *WRITE, *READ_FILES, "list", "check")
 PLACES = {
     "file": BOTH,

@@ -132,7 +132,7 @@ def test_a_cell_of_the_ranking_opens_its_film_and_says_its_command(opened, trace
     assert part(page, "stored").input_value() == "hill-climbing"
     assert part(page, "preset").locator("option:checked").text_content() == "Two-armed 1 †"
     run = typical_run(solved(traced.cells["two-armed-1", "hill-climbing"]))
-    command = rf"coartic animate {run[:8]} --in \S+"
+    command = rf"coartic draw \S+ --run {run[:8]} --out film.gif"
     assert re.fullmatch(command, part(page, "film").locator("code").inner_text())
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")

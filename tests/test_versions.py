@@ -93,7 +93,16 @@ def test_a_run_is_found_in_both_forms(old, tmp_path):
     runs = load(tmp_path / "new").runs
     (run_id,) = runs.run_id[(runs.method == "dual-process/EC1") & (runs.run == 1)]
     assert run_id.endswith("-1.1")
-    assert find_run(run_id[:16], tmp_path).number == 1
+    for folder in (old, tmp_path / "new"):
+        assert find_run(run_id[:16], folder).number == 1
+
+
+def test_a_run_of_another_version_is_performed_again_and_named(old, coartic, in_this_process):
+    with open_store(old) as store:
+        (run_id, *_) = (r for r in store.ids() if store.run(r).cell.method.name == CHANGED[0])
+    text = coartic("verify", old, "--run", run_id)[1]
+    assert "Another version of the method made the run (1.1; here is 1.2)." in text
+    assert "1 run performed again: " in text
 
 
 def test_the_terminal_says_that_a_folder_is_of_4_0_0(old, coartic, in_this_process):

@@ -96,7 +96,7 @@ Gap to the {{ reference }}, {{ use }}: \
         "coarticulation",
         "Coarticulation",
         (coarticulation.list_contexts, coarticulation.list_signatures),
-        (coarticulation.draw_postures, coarticulation.draw_coarticulation),
+        (coarticulation.draw_postures,),
         sentence="""\
 {% for row in rows.head(1).to_dict("records") %}
 {{ row.title }}, {{ row.place }}: {{ row.verdict }}. Posture difference \

@@ -16,13 +16,12 @@ from matplotlib.patheffects import withStroke
 
 from coartic.analysis.control import contexts_of_control, selects, with_control
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.standings import by_row, common_tasks
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
@@ -100,8 +99,7 @@ def list_contexts(study: Study) -> Rows:
 
 @table(
     "Signatures of coarticulation, means over runs, next to random search",
-    "task; method; hands; runs; gain[]: gain (ticks) .1; "
-    "share[]: share of the possible gain (%) .0; control_runs: runs of random search; "
+    "task; method; hands; runs; control_runs: runs of random search; "
     + "; ".join(
         f"{column}[]: {words} .{digits}; {column}_control: random search .{digits}; "
         f"{column}_difference[]: -; {column}_p: p .p; {column}_control_runs: -"
@@ -119,16 +117,13 @@ def list_signatures(study: Study) -> Rows:
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
     the choice of hands (``hands`` empty). Means over runs; p is one-tailed and uncorrected.
-    ``gain``: ticks by which a run is faster than the corrective process alone with its best hands.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
         cell = study.cells.get((name, label))
-        if cell is None or not len(good := solved(cell)):
+        if cell is None or not len(solved(cell)):
             continue
         rows, of_cell = dict[str, Row](), row_of_cell(study, cell)
-        best = study.optima.get(name)
-        possible = best.reward - study.corrective_best[name] if best else math.nan
         for signature in SIGNATURES:
             column = signature.replace(" ", "_")
             for hands, (values, control) in with_control(study, signature, name, label).items():
@@ -140,79 +135,9 @@ def list_signatures(study: Study) -> Rows:
                         **difference_of_means(values, control).columns(f"{column}_difference"),
                         f"{column}_p": bootstrap_test(values, control).p,
                     }
-        gains = good.reward.to_numpy(float) - study.corrective_best[name]
         for hands, row in rows.items():
-            gained = gains[good.hands == hands] if hands else gains
-            row |= {"hands": hands}
-            if math.isfinite(study.corrective_best[name]):
-                row |= mean(gained).columns("gain")
-            row |= mean(gained / possible).columns("share") if possible > 0 else {}
             key = " ".join(filter(None, (name, label, hands)))
-            yield key, of_cell | row
-
-
-AGAINST_GAIN = {
-    "arm": "next goal nearer (ticks)",
-    "other arm": "idle hand nearer (share)",
-    "first": "first movement slower (ticks)",
-}
-"""Signatures of the figure against gain, with the labels of their axes."""
-
-
-def _against_gain(study: Study) -> pd.DataFrame:
-    """Return gains and signatures, means over tasks of means over solved runs, a row for each
-    method that has a solution on each of :func:`.common_tasks`.
-
-    Columns ``method``, ``base`` (the method with its setting, without its number of trials),
-    ``trials``, ``tasks``, ``gain`` (ticks) and a column for each signature of
-    :data:`AGAINST_GAIN`.
-    """
-    gain = study.runs.reward.astype(float) - study.runs.task.map(study.corrective_best)
-    signatures = {name: study.signature(name) for name in AGAINST_GAIN}
-    runs = solved(study.runs.assign(gain=gain, **signatures))
-    columns, tasks, rows = ["gain", *AGAINST_GAIN], common_tasks(study), []
-    for method, of_method in by_row(study, runs).items():
-        of_tasks = of_method.groupby("task")[columns].mean().reindex([*tasks])
-        if tasks and of_tasks.gain.notna().all():
-            name, _, setting = method.partition(" ")
-            others = [part for part in setting.split(", ") if not part.startswith("trials=")]
-            row: Row = {"method": method, "base": f"{name} {', '.join(others)}".strip()}
-            row |= {"trials": of_method.trials.max(), "tasks": len(tasks)}
-            rows.append(row | of_tasks.mean().to_dict())
-    return pd.DataFrame(rows, columns=["method", "base", "trials", "tasks", *columns])
-
-
-@figure(
-    "Coarticulation against gain",
-    "Signatures of coarticulation of each method against its gain over the corrective process "
-    "alone with its best hands: means over tasks (the idle hand: with two arms) of means over "
-    "runs. Where a method ran with several numbers of trials, a line joins them.",
-)
-def draw_coarticulation(study: Study) -> Parts | None:
-    """Draw signatures against gain, a point for each method; None for fewer than two methods."""
-    data = _against_gain(study)
-    shown = [name for name in AGAINST_GAIN if data[name].notna().any()]
-    if len(data) < 2 or not shown:
-        return None
-    drawing, panels = style.panels((1, len(shown)), (style.TWO, 2.8))
-    lasts = data.sort_values("trials").drop_duplicates("base", keep="last").sort_index()
-    looks: Any = looks_in(study, lasts.method)
-    for look, mark in zip(looks.values(), itertools.cycle("osD^v<>pPX*"), strict=False):
-        look["marker"] = mark
-    for axes, name in zip(panels, shown, strict=True):
-        for _, rows in data.dropna(subset=name).sort_values("trials").groupby("base"):
-            last: Any = rows.iloc[-1]
-            axes.plot(rows.gain, rows[name], **looks[last.method])
-            title = study.methods.title[last.method]
-            style.tip(axes.lines[-1], f"{title}: gain {last.gain:.1f}, {last[name]:.2f}")
-        axes.axhline(0, color=style.GREY, linewidth=0.5)
-        axes.set_xlabel("gain (ticks)")
-        axes.set_title(AGAINST_GAIN[name])
-    style.letters(panels)
-    handles = [style.legend_line(study.methods.title[each], **looks[each]) for each in looks]
-    style.legend(drawing, handles, 3)
-    words = spoken(study, lasts, "{title}: gain {gain:.0f}")
-    return drawing, data, f"Signatures against gain. {words}.", study.tasks.values()
+            yield key, of_cell | row | {"hands": hands}
 
 
 def verdict_of(

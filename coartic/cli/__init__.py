@@ -70,12 +70,10 @@ COMMANDS = (
     (run.list_, "comparison"),
     (run.run, "comparison --methods EC1,CMA-ES --tasks ascending --runs 5 --out results/mine"),
     (read.report, "results/quick --for-paper"),
-    (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
-    (run.reproduce, "1a2b3c --in results/quick"),
-    (read.verify, "results/quick --again 3"),
+    (read.verify, "results/quick --run 1a2b3c"),
     (run.new, "my-search"),
     (run.check, "my-search --method-file my_search.py"),
-    (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
+    (draw.draw, "results/quick --run 1a2b3c --initial --out race.gif"),
     (read.cite, "results/comparison --analysis"),
 )
 """The commands in the order of the help, each with the arguments of its example."""

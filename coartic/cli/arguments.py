@@ -35,8 +35,6 @@ def option(metavar: str, what: str, *names: str) -> Any:
 ResultsFolder = Annotated[
     Path, typer.Argument(parser=folder_named, metavar="FOLDER", help="Results folder.")
 ]
-RunId = Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")]
-In = Annotated[Path, file_or_folder("FOLDER", "Where to look for the run.", "--in")]
 Out = Annotated[Path | None, file_or_folder("FILE", "File to write.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 MethodFiles = Annotated[

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,7 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
+from coartic.internal.files import folder_named
 from coartic.internal.text import counted
 
 _PICTURED = 12
@@ -20,20 +22,43 @@ _PICTURED = 12
 def draw(
     tasks: Annotated[
         list[str] | None,
-        typer.Argument(metavar="TASK", help="Tasks, task files, or long/v1/i000..i003."),
+        typer.Argument(
+            metavar="TASK",
+            help="Tasks, task files, or long/v1/i000..i003; with --run a results folder.",
+        ),
+    ] = None,
+    run: Annotated[
+        list[str] | None, given.option("ID", "A run to film; two are side by side.", "--run")
+    ] = None,
+    initial: Annotated[
+        bool, typer.Option("--initial", help="Film the corrective process alone next to the run.")
+    ] = False,
+    width: Annotated[
+        int | None, given.within("--width", "Width of the film in pixels; 800.", 200, 3840)
     ] = None,
     out: Annotated[
-        Path, given.file_or_folder("FILE", "Picture (.png, .svg, .pdf), or a folder.")
-    ] = Path("tasks.svg"),
+        Path | None,
+        given.file_or_folder(
+            "FILE", "Picture (.png, .svg, .pdf), or a folder; of runs a film (.gif, .mp4)."
+        ),
+    ] = None,
     replace: given.Replace = False,
 ) -> None:
-    """Draw tasks, or write them into a folder as files."""
+    """Draw tasks, or write them into a folder as files; or film runs."""
+    if run:
+        if len(tasks := tasks or []) != 1:
+            raise CoarticError("--run needs one results folder: coartic draw FOLDER --run ID")
+        film = out or Path("film.gif")
+        return _film(folder_named(tasks[0]), run, film, initial, width or 800, replace)
+    if initial or width is not None:
+        raise CoarticError("--initial or --width has no effect without --run, which names a run")
     from coartic import builtin_tasks, load_task
     from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.runs.plan import tasks_by_name
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
+    out = out or Path("tasks.svg")
     if replace and not out.suffix:
         raise CoarticError("--replace has no effect on a folder, whose pictures are written again")
     meant = given.tasks_meant(tasks or builtin_tasks())
@@ -53,37 +78,23 @@ def draw(
         files |= {"tasks.svg": picture(drawing, ".svg")}
         publish(out, files)
     drawn = f", of which {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
-    say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
+    return say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
 
 
-def animate(
-    run: given.RunId,
-    out: Annotated[Path, given.file_or_folder("FILE", "Film to write: .gif or .mp4.")] = Path(
-        "film.gif"
-    ),
-    other: Annotated[
-        str | None, typer.Argument(metavar="OTHER", help="Another run to show next to it.")
-    ] = None,
-    folder: given.In = Path("results"),
-    initial: Annotated[
-        bool, typer.Option("--initial", help="Show the corrective process alone next to it.")
-    ] = False,
-    width: Annotated[int, given.within("--width", "Width in pixels.", 200, 3840)] = 800,
-    replace: given.Replace = False,
+def _film(
+    folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
 ) -> None:
-    """Make a film of a run, alone or next to another run."""
+    """Write a film of one or two runs of a folder, or of a run next to the initial solution."""
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
     from coartic.film import check_film, write_film
 
     check_film(out, replace=replace)
-    if initial and other is not None:
-        raise CoarticError(
-            "--initial shows one run next to the corrective process alone: give one run."
-        )
+    if len(run_ids) + initial > 2:
+        raise CoarticError("a film shows at most two runs, or one run with --initial")
     movements = []
-    for run_id in (run,) if other is None else (run, other):
+    for run_id in run_ids:
         stored = find_run(run_id, folder)
         movement = trajectory_of(stored)
         title = f"{movement.task.label}\n{title_of(stored.cell.method.name)}, run {stored.number}"

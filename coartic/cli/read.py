@@ -20,6 +20,7 @@ from coartic.internal.text import counted, one_line
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
+    from coartic.runs.record import Run
 
 
 def report(
@@ -102,40 +103,91 @@ def say_ranking(study: Study, *more: tuple[str, str]) -> None:
 def verify(
     folder: given.ResultsFolder,
     again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
+    run: Annotated[
+        str | None,
+        given.option("ID", "Only perform this run again; the beginning of its id.", "--run"),
+    ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Execute every stored solution again and compare."""
+    """Execute every stored solution again, or perform runs again, and compare."""
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 
-    if method_file and not again:
-        raise CoarticError("--method-file has no effect without --again, which performs runs again")
-    with open_store(folder), explain_errors(folder):  # these explain an error
-        report = check_runs(folder)
-    say(
-        f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",
-        *(report.wrong or ["Nothing differs."]),
-        *report.unfinished,
-        "Not checked:",
-        *(f"- {words}" for words in report.unchecked if not (again and "--again" in words)),
-    )
-    count = unlike = 0
-    if again:
-        from coartic.benchmarks.registry import registry
-        from coartic.benchmarks.reproduce import perform_some_again
+    alone = run is not None
+    if again and alone:
+        raise CoarticError("--again has no effect with --run, which performs one run again")
+    if method_file and not (again or alone):
+        raise CoarticError("--method-file has no effect without --again or --run")
+    is_right = True
+    if not alone:
+        with open_store(folder), explain_errors(folder):  # these explain an error
+            report = check_runs(folder)
+        is_right = not (report.wrong or report.unfinished)
+        say(
+            f"{counted(report.runs, 'run')} checked, "
+            f"{counted(report.movements, 'movement')} executed.",
+            *(report.wrong or ["Nothing differs."]),
+            *report.unfinished,
+            "Not checked:",
+            *(f"- {words}" for words in report.unchecked if not (again and "--again" in words)),
+        )
+    unlike = _perform_again(folder, again, run, method_file) if again or alone else 0
+    if unlike or not is_right:
+        sys.exit(1)
 
-        registered = registry(method_file or [])
+
+def _perform_again(
+    folder: Path, count: int, run_id: str | None, method_file: list[Path] | None
+) -> int:
+    """Perform a run of a folder again, or without ``run_id`` so many of its runs; print what
+    differs and return the number of runs that do."""
+    from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
+    from coartic.runs.store import open_store
+
+    registered = registry(method_file or [])
+    if run_id is None:
+        runs = some_runs(folder, count, registered)
         with open_store(folder) as store:
             methods = [job.cell.method.name for job in store.plan()]
-        given.check_used(method_file, registered, methods)
-        for run_id, changes in perform_some_again(folder, again, registered):
-            count += 1
-            unlike += bool(changes)
-            for difference in changes:
-                say(f"Run {run_id}, performed again: {difference}")
-        say(f"{counted(count, 'run')} performed again: {unlike or 'none'} with another result.")
-    if report.wrong or report.unfinished or unlike:
-        sys.exit(1)
+    else:
+        runs = [find_run(run_id, folder)]
+        methods = [runs[0].cell.method.name]
+        if methods[0] not in registered:
+            raise CoarticError(f"unknown method {methods[0]!r}: pass --method-file FILE")
+    given.check_used(method_file, registered, methods)
+    if run_id is not None:
+        _describe_run(runs[0], registered[methods[0]].code)
+    unlike = 0
+    for stored, again in perform_runs_again(runs, registered):
+        changes = compare_runs(stored, again)
+        unlike += bool(changes)
+        for difference in changes:
+            say(f"Run {stored.id}, performed again: {difference}")
+    say(f"{counted(len(runs), 'run')} performed again: {unlike or 'none'} with another result.")
+    return unlike
+
+
+def _describe_run(run: Run, code: str) -> None:
+    """Print id, seed, parameters and result of a run, and that its method is known by another
+    ``code`` here, if it is."""
+    from coartic.analysis.methods import title_of
+    from coartic.analysis.words import number
+    from coartic.runs.plan import in_words
+
+    cell, result = run.cell, f"{run.outcome.status}: {run.outcome.reason}"
+    if run.solution.reward is not None:
+        result = f"reward {number(run.solution.reward)}, hands {run.solution.hands}"
+    say_pairs(
+        [
+            ("Run", f"{run.id}: {cell.task.label}, {title_of(cell.method.name)}, run {run.number}"),
+            ("Seed", str(run.seed)),
+            ("Parameters", in_words(cell.parameters)),
+            ("Result", result),
+        ]
+    )
+    if code != cell.method.version:
+        say(f"Another version of the method made the run ({cell.method.version}; here is {code}).")
 
 
 def cite(

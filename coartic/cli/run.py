@@ -1,4 +1,4 @@
-"""Commands that run suites and single runs, list them, and begin your own method."""
+"""Commands that run suites, list what there is, and begin your own method."""
 
 from __future__ import annotations
 
@@ -228,46 +228,6 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     yield "Tasks", ", ".join(applies) or "none of the four"
     yield "Runs", "differ by seed" if info.stochastic else "are all the same"
     yield "Cites", info.citation or "nothing"
-
-
-def reproduce(
-    run_id: given.RunId,
-    folder: given.In = Path("results"),
-    method_file: given.MethodFiles = None,
-) -> None:
-    """Perform a run again and compare the results."""
-    from coartic.analysis.methods import title_of
-    from coartic.analysis.words import number
-    from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again
-    from coartic.runs.plan import in_words
-
-    run = find_run(run_id, folder)
-    cell, registered = run.cell, registry(method_file or [])
-    name, outcome, solution = cell.method.name, run.outcome, run.solution
-    if name not in registered:
-        raise CoarticError(f"unknown method {name!r}: pass --method-file FILE")
-    given.check_used(method_file, registered, [name])
-    result = f"{outcome.status}: {outcome.reason}"
-    if solution.reward is not None:
-        result = f"reward {number(solution.reward)}, hands {solution.hands}"
-    say_pairs(
-        [
-            ("Run", f"{run.id}: {cell.task.label}, {title_of(name)}, run {run.number}"),
-            ("Seed", str(run.seed)),
-            ("Parameters", in_words(cell.parameters)),
-            ("Result", result),
-        ]
-    )
-    ((_, again),) = perform_runs_again([run], registered)
-    code = registered[name].code
-    if code != cell.method.version:
-        say(f"Another version of the method made the run ({cell.method.version}; here is {code}).")
-    changes = compare_runs(run, again)
-    if changes:
-        say("Performed again, it is different:", *(f"- {difference}" for difference in changes))
-        sys.exit(1)
-    say("Performed again: identical.")
 
 
 def check(

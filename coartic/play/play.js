@@ -602,7 +602,7 @@ class Play {
     });
     const stored = this.stored(state.who);
     this.find("film").hidden = !stored;
-    if (stored) this.find("film").lastChild.textContent = `coartic animate ${stored.films.map(({ run }) => run).join(" ")} --in ${this.data.folder}`;
+    if (stored) this.find("film").lastChild.textContent = `coartic draw ${this.data.folder} ${stored.films.map(({ run }) => `--run ${run}`).join(" ")} --out film.gif`;
     if (state.who === "you") [this.find("hand").value] = this.own[state.edited - 1];
     this.find("practice").hidden = !learns;
     const trials = this.find("trials");
