@@ -2,6 +2,7 @@
 
 import re
 import sys
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -118,7 +119,7 @@ def test_degenerate_trials_are_left_out_with_the_reason(people):
     degenerate = {
         "two trials": first,
         "postures are equal": pd.concat(first.assign(trial=n) for n in range(1, 31)),
-        "take 400 ticks, as by a met": people.assign(ticks=100),
+        "take 2000 ticks, as by a met": people.assign(ticks=500),
     }
     every = pd.concat([of.assign(subject=why) for why, of in degenerate.items()])
     with pytest.warns(UserWarning, match="is left out: ") as warned:
@@ -153,7 +154,37 @@ def test_how_to_shows_what_the_command_prints(
     assert capsys.readouterr().out.splitlines() == shown
 
 
-@pytest.mark.parametrize("option", [("--noise", "-1"), ("--out", "no/such/folder.csv")])
+def test_a_hit_of_zeros_is_no_posture_of_the_fit(people):
+    gap = people.copy()
+    gap.loc[20, [*TASK.robot.joint_names]] = 0.0
+    with pytest.raises(CoarticError, match="row 20: all angles of the"):
+        FIT.fit(gap, TASK)
+    with pytest.raises(CoarticError, match="seeds are .*one is there twice"):
+        PROTOCOLS.simulate(TASK, "best", 0.04, 0.3, seeds=[3, 4, 3], trials=1)
+
+
+def test_a_person_in_two_files_is_refused_and_several_files_are_fitted(
+    people, tmp_path, monkeypatch, capsys
+):
+    still = people[people.trial == 1]
+    paths = [tmp_path / name for name in ("a.csv", "b.csv", "c.csv")]
+    for path, name in zip(paths, "xyx", strict=True):
+        still.assign(subject=name).to_csv(path, index=False)
+    for files, words in ((paths[:2], "subject y is left out"), (paths, r"x is in .*a.csv and in")):
+        monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", *map(str, files)])
+        with warnings.catch_warnings(), pytest.raises(SystemExit, match="2"):
+            warnings.simplefilter("always")
+            FIT.main()
+        assert re.search(words, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        *(("--noise", noise) for noise in ("-1", "nan", "inf", "9999")),
+        ("--out", "no/such/file.csv"),
+    ],
+)
 def test_an_option_that_cannot_be_is_refused(option, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", "no file", *option])
     with pytest.raises(SystemExit, match="2"):
