@@ -479,4 +479,5 @@ def solutions_of(
             runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
     if not runs:
         raise CoarticError(f"in no trial are all {counted(len(task.goals), 'goal')} hit")
-    return Solutions(task, "recorded", tuple(runs.values()), tuple(runs))
+    unfinished = hits.attrs.get("unfinished", 0)
+    return Solutions(task, "recorded", tuple(runs.values()), tuple(runs), unfinished)

@@ -159,12 +159,12 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
         raise CoarticError(
             f"{path}, line {wrong[0][0]}: it has {counted(wrong[0][1], 'value')}, "
             f"the headings are {len(headings)}: {', '.join(headings)}; is there a decimal comma?"
-            f"{_also([f'line {line}' for line, _ in wrong])}"
+            f"{also([f'line {line}' for line, _ in wrong])}"
         )
     if twice := [name for n, name in enumerate(headings) if name in headings[:n]]:
         raise CoarticError(f"{path} has two columns {twice[0]!r}")
     if hidden:
-        _warn(f"{path}, {hidden[0]}: it begins with # and is left out{_also(hidden)}")
+        warn(f"{path}, {hidden[0]}: it begins with # and is left out{also(hidden)}")
     return pd.DataFrame(rows, columns=headings, dtype=object), lines
 
 
@@ -177,14 +177,14 @@ def _refuse_separator(path: str | Path, separator: str, found: str = "") -> None
         )
 
 
-def _also(names: Sequence[str]) -> str:
+def also(names: Sequence[str]) -> str:
     """Return the names after the first, up to the fifth, and the number of others, in brackets;
     empty for a single name."""
     named = [*names[1:_NAMED], *[f"{len(names) - _NAMED} more"] * (len(names) > _NAMED)]
     return f" (also {', '.join(named)})" if named else ""
 
 
-def _warn(text: str) -> None:
+def warn(text: str) -> None:
     """Warn as from the caller of a public function."""
     warnings.warn(text, stacklevel=5)
 
@@ -196,7 +196,12 @@ def _written(text: str) -> str:
     return " ".join(unicodedata.normalize("NFC", shown).split())
 
 
-def _named(values: pd.Series) -> pd.Series:
+def row_names(frame: pd.DataFrame) -> list[str]:
+    """Return a name for each row of a frame, such as ``row 2``, by its index."""
+    return [f"row {brief_value(row)}" for row in frame.index.tolist()]
+
+
+def as_names(values: pd.Series) -> pd.Series:
     """Return names as texts, as :func:`_written` has them; whole numbers without ``.0``, and an
     empty text for a missing name."""
 
@@ -208,7 +213,7 @@ def _named(values: pd.Series) -> pd.Series:
     return values.map(known).astype(object).where(values.notna(), "")
 
 
-def _numbers(values: pd.Series) -> NDArray[np.float64]:
+def as_numbers(values: pd.Series) -> NDArray[np.float64]:
     """Return numbers, also of texts with typographic minus signs; NaN for what is no number."""
     if values.dtype == object:
         values = values.where(~values.map(lambda value: isinstance(value, bool)))
@@ -217,12 +222,12 @@ def _numbers(values: pd.Series) -> NDArray[np.float64]:
     numbers = pd.to_numeric(values, errors="coerce")
     array = np.array(numbers.to_numpy(np.float64, na_value=np.nan))
     for row in np.flatnonzero(np.isnan(array)):
-        if isinstance(text := values.iloc[row], str):
+        if isinstance(text := values.iloc[row], str) and text:
             array[row] = pd.to_numeric(_written(text), errors="coerce")
     return array
 
 
-def _why_no_number(value: object) -> str:
+def why_no_number(value: object) -> str:
     """Return what is needed in place of a value that is no number: the character that spoils it,
     or advice on a missing value."""
     text = _written(str(value))
@@ -251,7 +256,7 @@ def checked_hits(
     """
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")
-    called = names or [f"row {brief_value(row)}" for row in frame.index.tolist()]
+    called = names or row_names(frame)
     joints = [*task.robot.joint_names]
     used = {"base_x", "base_y"}
     used |= {name for hand in task.hands for name in joints[task.robot.joints(hand)]}
@@ -266,7 +271,7 @@ def checked_hits(
                 unused.append(name)
     if unused:
         which = f"column {unused[0]} is left out, task {task.name!r} does not use it"
-        _warn(f"{source}: {which}{_also(unused)}")
+        warn(f"{source}: {which}{also(unused)}")
     if {"ticks", "duration"} <= {*frame.columns}:
         raise CoarticError(f"{source} has columns ticks and duration: leave one of them out")
     there = ", ".join(map(str, frame.columns)) or "none"
@@ -291,22 +296,22 @@ def checked_hits(
             needs = wanted if isinstance(wanted, str) else wanted(value)
             shown = "empty" if value == "" else brief_value(value)
             key = "duration" if column == "ticks" and is_file and timed else column
-            also = _also([called[row] for row in rows])
-            raise CoarticError(f"{source}, {called[rows[0]]}: {key} is {shown}; {needs}{also}")
+            others = also([called[row] for row in rows])
+            raise CoarticError(f"{source}, {called[rows[0]]}: {key} is {shown}; {needs}{others}")
 
     for name in ["trial", "goal", "ticks", *joints]:
-        numbers = _numbers(frame[name])
-        refuse(~np.isfinite(numbers), name, _why_no_number)
+        numbers = as_numbers(frame[name])
+        refuse(~np.isfinite(numbers), name, why_no_number)
         frame[name] = numbers
-    spellings, frame["hand"] = frame.subject, _named(frame.hand)
-    frame["subject"] = _named(spellings)
+    spellings, frame["hand"] = frame.subject, as_names(frame.hand)
+    frame["subject"] = as_names(spellings)
     for one, several in spellings.groupby(frame.subject).unique().items():
         if len(several) > 1:
-            _warn(f"{source}: subject {one!r} is spelt in {len(several)} ways, which are taken "
+            warn(f"{source}: subject {one!r} is spelt in {len(several)} ways, which are taken "
                   f"for one: {', '.join(map(ascii, several))}")  # fmt: skip
     people = frame.subject.unique().tolist()
     if len({name.casefold() for name in people}) < len(people):
-        _warn(f"{source}: subjects differ in capitals alone: {', '.join(sorted(people)[:20])}")
+        warn(f"{source}: subjects differ in capitals alone: {', '.join(sorted(people)[:20])}")
     refuse(frame.subject == "", "subject", "needed is a name")
     refuse(~frame.hand.isin(task.hands), "hand", f"needed is {' or '.join(task.hands)}")
     is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, _LARGEST_TRIAL)
@@ -339,14 +344,14 @@ def checked_hits(
     while wrong := np.flatnonzero(why != "").tolist():  # without them others may stand out
         reasons += [f"{called[row]}: {why[row]}" for row in wrong]
         if implausible == "refuse" or len(reasons) == count:
-            raise CoarticError(f'{source}, {reasons[0]}{_also(reasons)}. Mend the recording, or '
+            raise CoarticError(f'{source}, {reasons[0]}{also(reasons)}. Mend the recording, or '
                                'leave such hits out with implausible="drop"')  # fmt: skip
         frame = frame[why == ""].reset_index(drop=True)
         called = [name for name, words in zip(called, why, strict=True) if not words]
         why, is_far = _implausible(frame, task, source, unit)
     if reasons:
-        _warn(f"{source}: {len(reasons)} of {counted(count, 'hit')} are left out as implausible, "
-              f"{reasons[0]}{_also(reasons)}")  # fmt: skip
+        warn(f"{source}: {len(reasons)} of {counted(count, 'hit')} are left out as implausible, "
+              f"{reasons[0]}{also(reasons)}")  # fmt: skip
     _warn_of_copies(frame, source)
     if not is_far:
         _unwrap(frame, task, source, called)
@@ -383,7 +388,7 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
             "numpy.unwrap before hits are taken from it"
         )
     for row, joint in np.argwhere(turns != 0)[:1]:
-        _warn(
+        warn(
             f"{source}: {np.count_nonzero(turns)} times an angle jumps by a turn (2π) between "
             f"hits, first {joints[joint]} in {names[row]}; angles are unwrapped from hit to hit"
         )
@@ -415,7 +420,7 @@ def _implausible(
         places = task.robot.forward_kinematics(q[rows], hand)
         off[rows] = np.linalg.norm(places - task.goal_array[goal[rows] - 1], axis=1)
     if is_far := bool(np.median(off) > 2 * radius):
-        _warn(
+        warn(
             f"{source}: in the median hit the hand is {np.median(off):.2g} length units from its "
             "goal. Are the angles in rad, each measured from the link before, the base in the "
             f"length unit of the task, and is the task {task.name!r}?"
@@ -463,12 +468,12 @@ def _implausible(
         )
         if usual > _SLOWEST * slowest or ratio <= 0.1:
             raise CoarticError(words)
-        _warn(words)
+        warn(words)
     elif not is_far:
         early = np.where(known, straight - ticks, -1.0) * PAPER.step
         if np.quantile(early, 0.75) > 0.1:
             step = f"whose step is {PAPER.step:g} a tick. Are there more ticks in a unit?"
-            _warn(f"{source}: a quarter of the hits or more is faster than the task's arm, {step}")
+            warn(f"{source}: a quarter of the hits or more is faster than the task's arm, {step}")
         allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
         words = "it takes {:g} ticks, a straight movement {:.0f}"
         mark(early > allowed, words, ticks, straight)
@@ -476,7 +481,7 @@ def _implausible(
         mark(ticks > _SLOWEST * slowest, words, ticks)
     table = frame.pivot_table("ticks", ["subject", "trial"], "goal").dropna()
     if len(table) >= 10 and (table.diff(axis=1).iloc[:, 1:] > 0).to_numpy().all():
-        _warn(
+        warn(
             f"{source}: in every trial ticks rise from goal to goal. Are they from the hit before, "
             "and not from the start of the trial?"
         )
@@ -491,5 +496,5 @@ def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
     if copies.nunique() >= 3:
         first = [f"trial {trial:g} of {subject}" for subject, trial in
                  copies.index[copies == copies.iloc[-1]][:2]]  # fmt: skip
-        _warn(f"{source}: {len(copies)} trials are equal to others in all numbers, such as "
+        warn(f"{source}: {len(copies)} trials are equal to others in all numbers, such as "
               f"{' and '.join(first)}. Is a recording there twice?")  # fmt: skip

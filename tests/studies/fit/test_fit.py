@@ -2,7 +2,6 @@
 
 import re
 import sys
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -163,6 +162,7 @@ def test_a_hit_of_zeros_is_no_posture_of_the_fit(people):
         PROTOCOLS.simulate(TASK, "best", 0.04, 0.3, seeds=[3, 4, 3], trials=1)
 
 
+@pytest.mark.filterwarnings("always")
 def test_a_person_in_two_files_is_refused_and_several_files_are_fitted(
     people, tmp_path, monkeypatch, capsys
 ):
@@ -172,8 +172,7 @@ def test_a_person_in_two_files_is_refused_and_several_files_are_fitted(
         still.assign(subject=name).to_csv(path, index=False)
     for files, words in ((paths[:2], "subject y is left out"), (paths, r"x is in .*a.csv and in")):
         monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", *map(str, files)])
-        with warnings.catch_warnings(), pytest.raises(SystemExit, match="2"):
-            warnings.simplefilter("always")
+        with pytest.raises(SystemExit, match="2"):
             FIT.main()
         assert re.search(words, capsys.readouterr().err)
 
