@@ -103,9 +103,10 @@ def hits_from_markers(
 
     def refuse(wrong: NDArray[np.bool_], words: str) -> None:
         if rows := np.flatnonzero(wrong).tolist():
-            raise CoarticError(
-                f"{source}, {names[rows[0]]}: {words}{also([names[row] for row in rows])}"
-            )
+            others = also([names[row] for row in rows])
+            raise CoarticError(f"{source}, {names[rows[0]]}: {culprit[rows[0]]}{words}{others}")
+
+    culprit = np.full(len(frame), "", dtype=object)  # the marker to be named at a sample
 
     people = as_names(frame.subject)
     others = people != people.iloc[0]
@@ -135,28 +136,35 @@ def hits_from_markers(
                 if (why := why_no_number(frame[name][row])) and "leave out" not in why:
                     refuse(np.arange(len(frame)) == row, f"{name} is {frame[name][row]!r}; {why}")
         at = places[hand] = values.reshape(len(frame), -1, 2)
-        zero = (at == 0).all(axis=2)
-        at[(zero & (zero.mean(axis=0) < 0.5)) | ~np.isfinite(at).all(axis=2)] = np.nan
-        for marker in range(at.shape[1]):
-            missing_for = np.maximum(missing_for, _bridge(at[:, marker], time, begin, step))
+        at[~np.isfinite(at).all(axis=2)] = np.nan
+        middle = pd.DataFrame(at.reshape(len(frame), -1)).median().to_numpy().reshape(-1, 2)
+        far = np.linalg.norm(middle, axis=1) > 0.1 * task.robot.reach(hand)[1]
+        at[(at == 0).all(axis=2) & far] = np.nan  # near the origin a marker may be there
+        for marker, name in enumerate(markers[hand]):
+            durations = _bridge(at[:, marker], time, begin, step)
+            culprit[durations > missing_for] = f"{hand}_{name}: "
+            missing_for = np.maximum(missing_for, durations)
     leap = ~begins & (steps > 1.5 * step)
     missing_for[leap] = np.maximum(missing_for[leap], steps[leap] - step)
     lengths = {hand: np.linalg.norm(np.diff(places[hand], axis=1), axis=2) for hand in hands}
     swaps = np.zeros(len(frame), dtype=bool)
     for hand in hands:
         links = task.robot.arm(hand).links
-        middle = np.nanmedian(lengths[hand], axis=0)
-        worst = np.nanmax(np.abs(middle / links - 1), initial=0.0)
-        words = (f"{source}: the links of the {hand} arm are {_listed(middle)} long in the median "
+        usual = pd.DataFrame(lengths[hand]).median().to_numpy()
+        off = np.abs(usual / links - 1)
+        words = (f"{source}: the links of the {hand} arm are {_listed(usual)} long in the median "
                  f"sample, those of task {task.name!r} {_listed(links)}")  # fmt: skip
-        if worst > _TOLERANCE:
+        if (off > _TOLERANCE).any():
             raise CoarticError(f"{words}. Is this another arm, or another unit?")
-        if worst > _TOLERANCE / 5:
+        if (off > _TOLERANCE / 5).any():
             warn(f"{words}: a task with the lengths of this person fits better")
         each = pd.DataFrame(lengths[hand]).groupby(np.cumsum(begins)).transform("median")
         jumps = np.diff(lengths[hand], axis=0, prepend=lengths[hand][:1])
-        jumps[begins] = each[begins] - middle
-        swaps |= (np.abs(jumps) > _TOLERANCE * links).any(axis=1)
+        jumps[begins] = each[begins] - usual
+        jumped = np.abs(jumps) > _TOLERANCE * links
+        swaps |= jumped.any(axis=1)
+        for link in range(len(links)):
+            culprit[jumped[:, link] & (missing_for == 0)] = f"{hand}_{link + 1}: "
     shoulders = {hand: np.array(task.robot.arm(hand)[2:]) for hand in hands}
     bases = [places[hand][:, 0] - shoulders[hand] for hand in hands]
     apart = np.linalg.norm(np.ptp(bases, axis=0), axis=1)
@@ -191,11 +199,9 @@ def hits_from_markers(
     refuse(used & torn, "the places of the two shoulders do not belong to one base: they differ "
            f"from the task's by more than {100 * _TOLERANCE:.0f} %")  # fmt: skip
     if bridged := np.flatnonzero(used & (missing_for > 0)).tolist():
-        longest = f"the longest takes {1000 * missing_for[bridged].max():.0f} ms"
-        others = also([names[row] for row in bridged])
-        warn(
-            f"{source}, {names[bridged[0]]}: a gap is bridged by a straight line; {longest}{others}"
-        )
+        row, longest = bridged[0], 1000 * missing_for[bridged].max()
+        words = f"a gap is bridged by a straight line; the longest takes {longest:.0f} ms"
+        warn(f"{source}, {names[row]}: {culprit[row]}{words}{also([names[n] for n in bridged])}")
     if not rows:
         raise CoarticError(
             f"{source}: in no trial are all goals reached; missed are {', '.join(unfinished[:5])}. "
@@ -206,8 +212,8 @@ def hits_from_markers(
              f"have no hits: the tip does not reach {unfinished[0]}{also(unfinished)}")  # fmt: skip
     if absent := [hand for hand in task.hands if hand not in hands]:
         warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
-    if (off := float(np.median(starts))) > _FAR_START:
-        warn(f"{source}: the median trial begins {off:.2g} (length unit, rad) from the start of "
+    if (away := float(np.median(starts))) > _FAR_START:
+        warn(f"{source}: the median trial begins {away:.2g} (length unit, rad) from the start of "
              f"task {task.name!r}")  # fmt: skip
     table = pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks",
                                         *task.robot.joint_names])  # fmt: skip

@@ -24,7 +24,7 @@ from scipy import optimize, stats
 from sentences import CLEAR, LEARNERS, MODELS, sentence
 
 from coartic import CONDITIONS, CoarticError, load_task
-from coartic.analysis import read_hits
+from coartic.analysis import hits_from_markers, read_hits
 from coartic.analysis.hits import checked_hits
 from coartic.estimates import Estimate
 
@@ -202,7 +202,9 @@ def main():
     """Read a file, fit, and print a sentence for each subject."""
     parser = argparse.ArgumentParser(description="Fit the learner to the trials of people.")
     parser.add_argument("task", help="name or file of the task")
-    parser.add_argument("csv", nargs="+", help="files with a row for each hit")
+    parser.add_argument("csv", nargs="+", help="files with a row for each hit, or of markers")
+    parser.add_argument("--markers", choices=("left", "right", "both"),
+                        help="arm with markers: the files have their places over time")  # fmt: skip
     parser.add_argument("--condition", choices=CONDITIONS, help="hands and explored joints")
     parser.add_argument("--noise", type=float, default=0.0, help="SD of motor noise in postures")
     parser.add_argument("--ticks-per-unit", type=float, help="ticks in a duration of 1")
@@ -218,9 +220,14 @@ def main():
             raise CoarticError(f"--out {out}: name a file, in a folder that may be written")
         task = load_task(given.task)
         condition, files, people = CONDITIONS.get(given.condition), {}, []
+        options = {"implausible": given.implausible}
+        if given.ticks_per_unit is not None:
+            options["ticks_per_unit"] = given.ticks_per_unit
         for path in given.csv:
-            people.append(read_hits(path, task, ticks_per_unit=given.ticks_per_unit,
-                                    implausible=given.implausible))  # fmt: skip
+            if given.markers:
+                people.append(hits_from_markers(path, task, given.markers, **options))
+            else:
+                people.append(read_hits(path, task, **options))
             for name in people[-1].subject.unique():
                 if files.setdefault(name, path) != path:
                     raise CoarticError(f"subject {name} is in {files[name]} and in {path}; needed "

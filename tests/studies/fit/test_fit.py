@@ -1,5 +1,6 @@
 """Study fit: the reader, the simulator, and fits of people whom other code simulates."""
 
+import math
 import re
 import sys
 from dataclasses import replace
@@ -16,7 +17,9 @@ from tests.support.processes import ROOT, programs
 from tests.support.strategies import metres_task
 
 FOLDER = ROOT / "studies" / "fit"
-PROTOCOLS, FIT, STUDY, PLAIN = programs("fit", "protocols", "fit", "study", "plain_person")
+PROTOCOLS, FIT, STUDY, PLAIN, MARKERS, NEEDED = programs(
+    "fit", "protocols", "fit", "study", "plain_person", "plain_markers", "needed"
+)
 TASK = load_task("two-armed-1")
 
 
@@ -150,7 +153,12 @@ def test_how_to_shows_what_the_command_prints(
     FIT.main()
     page = (ROOT / "docs" / "howto" / "people.md").read_text("utf-8").splitlines()
     shown = [line for line in page if re.match(rf"{subjects}\d*, trials", line)]
-    assert capsys.readouterr().out.splitlines() == shown
+    printed = capsys.readouterr().out.splitlines()
+    if subjects == "s":  # of three, the page shows one
+        assert "informed (other models: BIC higher by 212 or more). σ = 0.041" in printed[0]
+        assert printed.pop(0).endswith("intervals can be too narrow, and the model wrong.")
+        assert "a walk (keep the last) (other models: BIC higher by 909" in printed.pop()
+    assert printed == shown
 
 
 def test_a_hit_of_zeros_is_no_posture_of_the_fit(people):
@@ -197,6 +205,35 @@ def test_the_recording_in_metres_is_of_a_simulator_without_the_package(capsys):
     stored = (FOLDER / "metres.csv").read_text("utf-8").splitlines()
     first = [line for line in stored[1:] if int(line.split(",")[1]) <= 20]
     assert capsys.readouterr().out.splitlines() == [stored[0], *first]
+
+
+@pytest.mark.filterwarnings("always")
+def test_the_recording_of_markers_is_of_that_simulator_and_is_fitted(
+    tmp_path, monkeypatch, capsys, fewer_simulated
+):
+    MARKERS.main(tmp_path)
+    for name in ("m1.csv", "m2.csv"):
+        assert (tmp_path / name).read_text() == (FOLDER / "markers" / name).read_text()
+    fewer_simulated(9)
+    options = ["--markers", "right", "--noise", "0.007"]
+    task, file = str(FOLDER / "metres.toml"), str(FOLDER / "markers" / "m1.csv")
+    monkeypatch.setattr("sys.argv", ["fit.py", task, file, *options])
+    FIT.main()
+    printed = capsys.readouterr()
+    begin = "m1, trials 1 to 12 (lost: 1; hits missing in others: 0; unfinished: 1): keep the best"
+    assert printed.out.startswith(begin)
+    assert re.search("right_2: a gap is bridged.*\n.*1 of 12 trials are unfinished", printed.err)
+
+
+def test_people_needed_are_those_of_the_table(capsys):
+    assert NEEDED.people_needed(140, 140) == 1
+    share = 0.025**0.1  # lower end for 10 of 10
+    majority = {n: sum(math.comb(n, k) * share**k * (1 - share) ** (n - k)
+                       for k in range(n // 2 + 1, n + 1)) for n in (15, 17)}  # fmt: skip
+    assert majority[15] < 0.95 < majority[17]
+    assert NEEDED.people_needed(10, 10) == 17
+    NEEDED.main()
+    assert capsys.readouterr().out in (ROOT / "docs" / "howto" / "people.md").read_text("utf-8")
 
 
 def planted(true, fitted, kappa=(0.0, 0.0), off=1.0, misfit="", replaced=0.5):
