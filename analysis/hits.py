@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from pandas.api.types import infer_dtype
 
 from coartic import CoarticError, Task
 from coartic.analysis.solutions import initial_solution
@@ -123,6 +124,7 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     if "\0" in text:
         wide = content[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in content[:200]
         kind = "in UTF-16, as Excel and Notepad write 'Unicode'" if wide else "not in UTF-8"
+        kind = f"damaged from byte {content.find(0)} on" if len(text) > 1 and not wide else kind
         raise CoarticError(f"{path} is {kind}: save it as CSV in UTF-8")
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
@@ -158,7 +160,8 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     if wrong:
         raise CoarticError(
             f"{path}, line {wrong[0][0]}: it has {counted(wrong[0][1], 'value')}, "
-            f"the headings are {len(headings)}: {', '.join(headings)}; is there a decimal comma?"
+            f"the headings are {len(headings)}: {', '.join(headings)}"
+            f"{'; is there a decimal comma?' * (wrong[0][1] > len(headings))}"
             f"{also([f'line {line}' for line, _ in wrong])}"
         )
     if twice := [name for n, name in enumerate(headings) if name in headings[:n]]:
@@ -215,8 +218,8 @@ def as_names(values: pd.Series) -> pd.Series:
 
 def as_numbers(values: pd.Series) -> NDArray[np.float64]:
     """Return numbers, also of texts with typographic minus signs; NaN for what is no number."""
-    if values.dtype == object:
-        values = values.where(~values.map(lambda value: isinstance(value, bool)))
+    if infer_dtype(values, skipna=True) in ("boolean", "mixed", "mixed-integer"):
+        values = values.astype(object).where(~values.map(lambda value: isinstance(value, bool)))
     elif values.dtype.kind not in "iufO":  # durations of pandas would be nanoseconds
         values = values.astype(str)
     numbers = pd.to_numeric(values, errors="coerce")
@@ -235,7 +238,7 @@ def why_no_number(value: object) -> str:
     spoils = text[begin.end() :][:1] if begin else ""
     if not (spoils and re.search(r"\d", text)):
         return "needed is a number; leave out the row of a hit that is missing"
-    point = ": write a decimal point" * (spoils == ",")
+    point = ": write a decimal point, and nothing between thousands" * (spoils == ",")
     kind = unicodedata.name(spoils, "without a name").lower()
     return f"{spoils!r} ({kind}) makes it no number{point}"
 

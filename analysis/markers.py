@@ -30,6 +30,8 @@ _LONGEST_GAP = 0.05
 """Longest gap in the place of a marker that is bridged, s."""
 _TOLERANCE = 0.1
 """Largest difference, as a share, of the length of a link, and of places of the base."""
+_RARE = 0.05
+"""Share of samples in which a marker is still below which long rests are in doubt."""
 _FAR_START = 0.3
 """Distance of the posture in which trials begin from the task's start, with a warning."""
 
@@ -128,6 +130,7 @@ def hits_from_markers(
             "second. Is time in s, and not in ms or frames?"
         )
     begin = np.flatnonzero(begins)
+    held = np.zeros(len(frame), dtype=bool)
     places, missing_for = {}, np.zeros(len(frame))  # s, at the first sample of a gap
     for hand in hands:
         values = np.stack([as_numbers(frame[name]) for name in columns[hand]], axis=1)
@@ -141,6 +144,10 @@ def hits_from_markers(
         far = np.linalg.norm(middle, axis=1) > 0.1 * task.robot.reach(hand)[1]
         at[(at == 0).all(axis=2) & far] = np.nan  # near the origin a marker may be there
         for marker, name in enumerate(markers[hand]):
+            still = ~begins & (np.diff(at[:, marker], axis=0, prepend=np.nan) == 0).all(axis=1)
+            if still.mean() < _RARE:
+                kept = np.where(still[:, None], np.nan, at[:, marker])
+                held |= _bridge(kept, time, begin, step) > _LONGEST_GAP
             durations = _bridge(at[:, marker], time, begin, step)
             culprit[durations > missing_for] = f"{hand}_{name}: "
             missing_for = np.maximum(missing_for, durations)
@@ -198,6 +205,9 @@ def hits_from_markers(
            f"{100 * _TOLERANCE:.0f} %: markers swap, or a flag stands for a gap")  # fmt: skip
     refuse(used & torn, "the places of the two shoulders do not belong to one base: they differ "
            f"from the task's by more than {100 * _TOLERANCE:.0f} %")  # fmt: skip
+    if frozen := [names[row] for row in np.flatnonzero(used & held & (missing_for == 0))]:
+        warn(f"{source}, {frozen[0]}: a marker keeps its place to the last digit for more than "
+             f"50 ms, unlike elsewhere. Does its last place fill a gap?{also(frozen)}")  # fmt: skip
     if bridged := np.flatnonzero(used & (missing_for > 0)).tolist():
         row, longest = bridged[0], 1000 * missing_for[bridged].max()
         words = f"a gap is bridged by a straight line; the longest takes {longest:.0f} ms"

@@ -1,5 +1,7 @@
 """Hits from the places of markers: the way there and back, sampling, and what goes wrong."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -208,6 +210,20 @@ def test_unfinished_trials_are_named_and_counted():
     assert hits.attrs["unfinished"] == 1
     assert hits.trial.unique().tolist() == [1, 2, 4]
     assert solutions_of(RIGHT, hits).unfinished == 1
+
+
+def test_a_marker_that_is_held_in_its_place_is_said():
+    markers, names = recorded(RIGHT), ["right_1_x", "right_1_y"]
+    markers.iloc[:, 3:] += 1e-4 * np.random.default_rng(0).standard_normal((len(markers), 8))
+    hits_from_markers(markers, RIGHT)
+    for samples in (5, 8):
+        held = markers.copy()
+        held.loc[41 : 40 + samples, names] = held.loc[40, names].to_numpy()
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            hits_from_markers(held, RIGHT)
+        words = "row 41: a marker keeps its place"
+        assert [words in str(each.message) for each in said] == [True] * (samples > 5)
 
 
 def test_what_the_hits_do_not_need_is_not_checked():
