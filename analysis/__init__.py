@@ -17,6 +17,7 @@ _MODULES = {
     "ecdf": "coartic.analysis.frames",
     "fill_page": "coartic.analysis.pages",
     "gaps": "coartic.analysis.frames",
+    "hits_from_markers": "coartic.analysis.markers",
     "interval": "coartic.analysis.words",
     "judge": "coartic.analysis.judging",
     "load": "coartic.analysis.study",

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
 from coartic import Execution, Movement, Task
-from coartic.analysis.hits import checked_hits
+from coartic.analysis.hits import Implausible, checked_hits
 from coartic.analysis.method_frame import with_joined_learners
 from coartic.analysis.optima import gap_share
 from coartic.analysis.solutions import Solutions
@@ -440,7 +440,9 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
 
 
 @checked_arguments
-def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
+def solutions_of(
+    task: Task, hits: pd.DataFrame, *, implausible: Implausible = "refuse"
+) -> Solutions:
     """Return recorded trials, of people for instance, as solutions for signatures.
 
     Nothing is executed again: postures at hits and ticks, rounded to whole ones, are as recorded.
@@ -452,7 +454,9 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     hits : DataFrame
         A row for each hit, as :func:`coartic.analysis.read_hits` returns it: ``subject``,
         ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the posture, a column for each of
-        ``task.robot.joint_names``, length unit and rad. Angles are unwrapped in the same way.
+        ``task.robot.joint_names``, length unit and rad. It is checked in the same way.
+    implausible : {"refuse", "drop"}
+        What becomes of hits that the person cannot have made (:func:`.read_hits`).
 
     Returns
     -------
@@ -464,9 +468,8 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     CoarticError
         The frame has no trial with all goals, or is wrong as a file of ``read_hits`` can be.
     """
-    names = [f"row {brief_value(row)}" for row in hits.index.tolist()]
     joints, runs = [*task.robot.joint_names], {}
-    columns = checked_hits(hits, task, "the frame", names)
+    columns = checked_hits(hits, task, implausible=implausible)
     for (subject, trial), rows in columns.groupby(["subject", "trial"], sort=False):
         if len(rows) == len(task.goals):
             postures, ticks = rows[joints].to_numpy(), rows.ticks.round().astype(int).tolist()
@@ -476,4 +479,5 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
             runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
     if not runs:
         raise CoarticError(f"in no trial are all {counted(len(task.goals), 'goal')} hit")
-    return Solutions(task, "recorded", tuple(runs.values()), tuple(runs))
+    unfinished = hits.attrs.get("unfinished", 0)
+    return Solutions(task, "recorded", tuple(runs.values()), tuple(runs), unfinished)

@@ -3,49 +3,82 @@
 from __future__ import annotations
 
 import csv
+import io
+import re
+import unicodedata
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from pandas.api.types import infer_dtype
 
 from coartic import CoarticError, Task
+from coartic.analysis.solutions import initial_solution
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, foreign_file
+from coartic.model import PAPER
 from coartic.motion.movement import LARGEST_ENTRY
+from coartic.robot import Array
 
+Implausible = Literal["refuse", "drop"]
+"""What becomes of hits that the person cannot have made."""
 _LARGEST_ANGLE = 20.0
-"""Largest angle, rad; a larger one is taken for degrees and refused."""
+"""Largest angle, rad; if most are larger they are taken for degrees."""
 _AMBIGUOUS = 2.5
 """Turn of a joint between hits, rad, from which its direction is in doubt if angles are wrapped."""
 _LARGEST_TRIAL = 100_000
 """Largest number of a trial."""
+_SLOWEST = 20
+"""Longest plausible time of a hit, in longest subtasks of the corrective process alone."""
+_UNITS = {"s": 100.0, "ms": 0.1, "min": 6000.0, "control steps": 1.0}
+"""Ticks in units of a duration, for a person who takes a second for each rad."""
+_NAMED = 5  # of a kind
+_HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
 
 @checked_arguments
-def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> pd.DataFrame:
+def read_hits(
+    path: str | Path,
+    task: Task,
+    *,
+    ticks_per_unit: float | None = None,
+    implausible: Implausible = "refuse",
+) -> pd.DataFrame:
     """Read recorded trials: a CSV file with a row for each hit.
 
     Blank lines, lines that begin with ``#``, commas at the end of a line, and other columns do not
-    count. Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
+    count; columns of an arm or a joint that the task does not use are left out with a warning.
+    Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
     start of the task on, with a warning. They stay, also with a warning, if the hand is more than
-    two radii from its goal in the median hit. Warns, too, if ticks rise from goal to goal.
+    two radii from its goal in the median hit. Warns, too, if ticks rise from goal to goal, if an
+    arm of the task would be much faster or slower, if trials are there twice, and if a name is
+    spelt in two ways.
+
+    Else each hit is checked. Implausible is a hit whose hand is more than two radii from its goal
+    (more if motor noise puts a quarter of all hits outside of their goals), whose base moves where
+    it is locked, whose arm has one number in place of all its angles, or whose time is over
+    20 times the longest subtask of the corrective process, or too short for a straight movement.
 
     Parameters
     ----------
     path : str or pathlib.Path
-        The file, with columns ``subject``, ``trial`` and ``goal`` (both from 1), ``hand`` (left or
-        right), ``ticks`` or ``duration``, and one for each entry of ``task.robot.joint_names``
-        (length unit and rad). ``ticks`` and ``duration`` count from the hit before. Rows of trials
-        and goals may be missing, and so may columns of an arm that is not among ``task.hands`` and
-        of a locked base: their values are then those at the start.
+        The file (UTF-8), with columns ``subject``, ``trial`` and ``goal`` (both from 1), ``hand``
+        (left or right), ``ticks`` or ``duration``, and one for each entry of
+        ``task.robot.joint_names`` (length unit and rad). ``ticks`` and ``duration`` count from the
+        hit before. Rows of trials and goals may be missing, and so may columns of an arm that is
+        not among ``task.hands`` and of a locked base: their values are then those at the start.
     task : Task
         The task that was practised.
-    ticks_per_unit : float
-        Ticks in a unit of ``duration``, such as 100 for seconds.
+    ticks_per_unit : float, optional
+        Ticks in a unit of ``duration``, such as 100 for seconds; by default 1. Refused if the file
+        has ``ticks``.
+    implausible : {"refuse", "drop"}
+        "drop" leaves implausible hits out, with a warning that counts them.
 
     Returns
     -------
@@ -56,22 +89,31 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     Raises
     ------
     CoarticError
-        The file is no such table, an angle exceeds 20 rad, or a wrapped joint turns by more than
+        The file is no such table, hits are implausible, or a wrapped joint turns by more than
         2.5 rad between hits. A sentence says where and what is needed.
     """
-    if words := foreign_file(str(path), "recorded hits are a CSV file, see docs/howto/people.md"):
+    if ticks_per_unit is not None and not 0 < ticks_per_unit < np.inf:
+        raise CoarticError(
+            f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0, such as 100 for s"
+        )
+    frame, names = read_table(path, "recorded hits are")
+    if "ticks" in frame and ticks_per_unit is not None:
+        raise CoarticError(
+            f"ticks_per_unit is {ticks_per_unit:g}, but {path} has a column ticks, on which it has "
+            "no effect: leave it out, or name the column duration if it is in another unit"
+        )
+    return checked_hits(frame, task, str(path), names, implausible, ticks_per_unit or 1.0)
+
+
+def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
+    """Return a CSV file as a frame of texts, and a name for each row, such as ``line 2``.
+
+    Blank lines and lines that begin with ``#`` are left out. ``kind``: what files of this kind
+    have, for the message on one of another program. Raises CoarticError for a file that cannot be
+    read or is no table of text separated by commas.
+    """
+    if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
-    headings, rows, lines = _read_lines(path)
-    frame = pd.DataFrame(rows, columns=headings, dtype=object)
-    if "ticks" not in frame and "duration" in frame:
-        frame["ticks"] = (pd.to_numeric(frame.duration, errors="coerce") * ticks_per_unit).round(6)
-    return checked_hits(frame, task, str(path), [f"line {line}" for line in lines])
-
-
-def _read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]]:
-    """Return headings, rows of as many texts, and the number of the last line of each row, from 1;
-    blank lines and lines that begin with ``#`` are left out. Raises CoarticError for a file that
-    cannot be read or is no table of text separated by commas."""
     try:
         content = Path(path).read_bytes()
         text = content.decode("utf-8-sig")
@@ -82,97 +124,240 @@ def _read_lines(path: str | Path) -> tuple[list[str], list[list[str]], list[int]
     if "\0" in text:
         wide = content[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in content[:200]
         kind = "in UTF-16, as Excel and Notepad write 'Unicode'" if wide else "not in UTF-8"
+        kind = f"damaged from byte {content.find(0)} on" if len(text) > 1 and not wide else kind
         raise CoarticError(f"{path} is {kind}: save it as CSV in UTF-8")
-    reader = csv.reader(text.splitlines(keepends=True), skipinitialspace=True)
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
-    rows, lines = [], []
+    rows, lines, wrong, hidden = [], [], [], []
     try:
         for fields in reader:
-            fields = [field.strip() for field in fields]
-            while fields and not fields[-1] and (not headings or len(fields) > len(headings)):
+            while fields and (not headings or len(fields) > len(headings)):
+                if fields[-1].strip():
+                    break
                 fields.pop()
-            if not any(fields) or fields[0].startswith("#"):
+            first = fields[0].strip() if fields else ""
+            if first.startswith("#"):
+                hidden += [f"line {reader.line_num}"] * (len(fields) == len(headings))
                 continue
-            if not headings:
-                headings = fields
+            if not any(map(str.strip, fields)):
+                continue
+            if not headings and first.startswith("sep=") and not any(fields[1:]):
+                if separator := first[4:]:
+                    _refuse_separator(path, separator)
+            elif not headings:
+                headings = [*map(_written, fields)]
+                for separator in ";\t|" if len(fields) == 1 else "":
+                    if separator in fields[0]:
+                        _refuse_separator(path, separator, f": found are {headings[0]}")
             elif len(fields) != len(headings):
-                raise CoarticError(
-                    f"{path}, line {reader.line_num}: it has {counted(len(fields), 'value')}, "
-                    f"the headings are {len(headings)}: {', '.join(headings)}"
-                )
+                wrong.append((reader.line_num, len(fields)))
             else:
                 rows.append(fields)
-                lines.append(reader.line_num)
+                lines.append(f"line {reader.line_num}")
     except csv.Error as error:
-        raise CoarticError(f"{path}, line {reader.line_num}: {error}") from None
+        quote = "; is a quotation mark open?" * ("unexpected end" in str(error))
+        raise CoarticError(f"{path}, line {reader.line_num}: {error}{quote}") from None
+    if wrong:
+        raise CoarticError(
+            f"{path}, line {wrong[0][0]}: it has {counted(wrong[0][1], 'value')}, "
+            f"the headings are {len(headings)}: {', '.join(headings)}"
+            f"{'; is there a decimal comma?' * (wrong[0][1] > len(headings))}"
+            f"{also([f'line {line}' for line, _ in wrong])}"
+        )
     if twice := [name for n, name in enumerate(headings) if name in headings[:n]]:
         raise CoarticError(f"{path} has two columns {twice[0]!r}")
-    return headings, rows, lines
+    if hidden:
+        warn(f"{path}, {hidden[0]}: it begins with # and is left out{also(hidden)}")
+    return pd.DataFrame(rows, columns=headings, dtype=object), lines
+
+
+def _refuse_separator(path: str | Path, separator: str, found: str = "") -> None:
+    """Raise CoarticError for a file whose values are separated by anything else than commas."""
+    if separator != ",":
+        raise CoarticError(
+            f"{path}: the separator is {separator!r}; needed are values separated by commas, and "
+            f"numbers with a decimal point{found}"
+        )
+
+
+def also(names: Sequence[str]) -> str:
+    """Return the names after the first, up to the fifth, and the number of others, in brackets;
+    empty for a single name."""
+    named = [*names[1:_NAMED], *[f"{len(names) - _NAMED} more"] * (len(names) > _NAMED)]
+    return f" (also {', '.join(named)})" if named else ""
+
+
+def warn(text: str) -> None:
+    """Warn as from the caller of a public function."""
+    warnings.warn(text, stacklevel=5)
+
+
+def _written(text: str) -> str:
+    """Return text in Unicode's composed form (NFC), with single spaces for blanks of any kind, a
+    hyphen for dashes and minus signs, and without characters that do not show."""
+    shown = "".join(c for c in text.translate(_HYPHENS) if unicodedata.category(c) != "Cf")
+    return " ".join(unicodedata.normalize("NFC", shown).split())
+
+
+def row_names(frame: pd.DataFrame) -> list[str]:
+    """Return a name for each row of a frame, such as ``row 2``, by its index."""
+    return [f"row {brief_value(row)}" for row in frame.index.tolist()]
+
+
+def as_names(values: pd.Series) -> pd.Series:
+    """Return names as texts, as :func:`_written` has them; whole numbers without ``.0``, and an
+    empty text for a missing name."""
+
+    def name(value: object) -> str:
+        whole = isinstance(value, float) and value.is_integer()
+        return _written(f"{value:.0f}" if whole else str(value))
+
+    known = {value: name(value) for value in values.dropna().unique()}
+    return values.map(known).astype(object).where(values.notna(), "")
+
+
+def as_numbers(values: pd.Series) -> NDArray[np.float64]:
+    """Return numbers, also of texts with typographic minus signs; NaN for what is no number."""
+    if infer_dtype(values, skipna=True) in ("boolean", "mixed", "mixed-integer"):
+        values = values.astype(object).where(~values.map(lambda value: isinstance(value, bool)))
+    elif values.dtype.kind not in "iufO":  # durations of pandas would be nanoseconds
+        values = values.astype(str)
+    numbers = pd.to_numeric(values, errors="coerce")
+    array = np.array(numbers.to_numpy(np.float64, na_value=np.nan))
+    for row in np.flatnonzero(np.isnan(array)):
+        if isinstance(text := values.iloc[row], str) and text:
+            array[row] = pd.to_numeric(_written(text), errors="coerce")
+    return array
+
+
+def why_no_number(value: object) -> str:
+    """Return what is needed in place of a value that is no number: the character that spoils it,
+    or advice on a missing value."""
+    text = _written(str(value))
+    begin = re.match(r"[+-]?\d*\.?\d*(e[+-]?\d+)?", text, re.IGNORECASE | re.ASCII)
+    spoils = text[begin.end() :][:1] if begin else ""
+    if not (spoils and re.search(r"\d", text)):
+        return "needed is a number; leave out the row of a hit that is missing"
+    point = ": write a decimal point, and nothing between thousands" * (spoils == ",")
+    kind = unicodedata.name(spoils, "without a name").lower()
+    return f"{spoils!r} ({kind}) makes it no number{point}"
 
 
 def checked_hits(
-    frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]
+    frame: pd.DataFrame,
+    task: Task,
+    source: str = "the frame",
+    names: Sequence[str] | None = None,
+    implausible: Implausible = "refuse",
+    ticks_per_unit: float | None = None,
 ) -> pd.DataFrame:
     """Return a new frame of recorded hits as :func:`read_hits` returns it, checked and unwrapped.
 
     ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
-    Raises CoarticError as :func:`read_hits` does.
+    ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole. Raises CoarticError
+    as :func:`read_hits` does.
     """
+    if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
+        raise CoarticError(f"{source} has two columns {twice[0]!r}")
+    called = names or row_names(frame)
     joints = [*task.robot.joint_names]
-    free = {f"base_{axis}" for axis in "xy" if axis not in task.locked_base}
-    free |= {name for hand in task.hands for name in joints[task.robot.joints(hand)]}
+    used = {"base_x", "base_y"}
+    used |= {name for hand in task.hands for name in joints[task.robot.joints(hand)]}
+    missing = {f"base_{axis}" for axis in task.locked_base}.difference(frame.columns)
+    starts = {name: value for name, value in zip(joints, task.q0.tolist(), strict=True)
+              if name not in used or name in missing}  # fmt: skip
+    unused = []
+    for name in map(str, frame.columns):
+        if name not in used and re.match("(base|left|right)_", name):
+            values = pd.to_numeric(frame[name], errors="coerce")
+            if not np.allclose(values, starts.get(name, np.nan), atol=1e-3):
+                unused.append(name)
+    if unused:
+        which = f"column {unused[0]} is left out, task {task.name!r} does not use it"
+        warn(f"{source}: {which}{also(unused)}")
+    if {"ticks", "duration"} <= {*frame.columns}:
+        raise CoarticError(f"{source} has columns ticks and duration: leave one of them out")
+    there = ", ".join(map(str, frame.columns)) or "none"
+    is_file, timed = ticks_per_unit is not None, "duration" in frame
+    if is_file and timed:
+        frame = frame.rename(columns={"duration": "ticks"})
+    frame = frame.assign(**starts)
     needed = ["subject", "trial", "goal", "hand", "ticks", *joints]
-    still = [name for name in joints if name not in free | {*frame.columns}]
-    frame = frame.assign(**{name: task.q0[joints.index(name)] for name in still})
-    if missing := [name for name in needed if name not in frame]:
-        there = ", ".join(map(str, frame.columns.drop(still))) or "none"
+    if absent := [name for name in needed if name not in frame]:
         raise CoarticError(
-            f"{source} has no column {', '.join(missing)}; needed are "
-            f"{', '.join(name for name in needed if name not in still)} (or duration in place of "
+            f"{source} has no column {', '.join(absent)}; needed are "
+            f"{', '.join(name for name in needed if name not in starts)} (or duration in place of "
             f"ticks), separated by commas; found are {there}"
         )
     if not len(frame):
         raise CoarticError(f"{source} has no hit: needed is a row for each")
-    timed, frame = "duration" in frame, frame[needed].copy()
+    frame = frame[needed].copy()
 
-    def refuse(wrong: ArrayLike, column: str, wanted: str) -> None:
-        if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
-            value = brief_value(frame[column].tolist()[rows[0]])
-            value = "empty" if value == "''" else value
-            raise CoarticError(f"{source}, {names[rows[0]]}: {column} is {value}; {wanted}")
+    def refuse(wrong: ArrayLike, column: str, wanted: str | Callable[[object], str]) -> None:
+        if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
+            value = frame[column].tolist()[rows[0]]
+            needs = wanted if isinstance(wanted, str) else wanted(value)
+            shown = "empty" if value == "" else brief_value(value)
+            key = "duration" if column == "ticks" and is_file and timed else column
+            others = also([called[row] for row in rows])
+            raise CoarticError(f"{source}, {called[rows[0]]}: {key} is {shown}; {needs}{others}")
 
     for name in ["trial", "goal", "ticks", *joints]:
-        numbers = pd.to_numeric(frame[name], errors="coerce").to_numpy(np.float64, na_value=np.nan)
-        refuse(~np.isfinite(numbers), name,
-               "needed is a number; leave out the row of a hit that is missing")  # fmt: skip
+        numbers = as_numbers(frame[name])
+        refuse(~np.isfinite(numbers), name, why_no_number)
         frame[name] = numbers
-    is_blank = frame.subject.isna() | (frame.subject.astype(str).str.strip() == "")
-    refuse(is_blank, "subject", "needed is a name")
+    spellings, frame["hand"] = frame.subject, as_names(frame.hand)
+    frame["subject"] = as_names(spellings)
+    for one, several in spellings.groupby(frame.subject).unique().items():
+        if len(several) > 1:
+            warn(f"{source}: subject {one!r} is spelt in {len(several)} ways, which are taken "
+                  f"for one: {', '.join(map(ascii, several))}")  # fmt: skip
+    people = frame.subject.unique().tolist()
+    if len({name.casefold() for name in people}) < len(people):
+        warn(f"{source}: subjects differ in capitals alone: {', '.join(sorted(people)[:20])}")
+    refuse(frame.subject == "", "subject", "needed is a name")
     refuse(~frame.hand.isin(task.hands), "hand", f"needed is {' or '.join(task.hands)}")
     is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, _LARGEST_TRIAL)
     refuse(~is_whole, "trial", f"needed is a whole number from 1 to {_LARGEST_TRIAL}")
     last = len(task.goals)
     refuse(~frame.goal.isin(range(1, last + 1)), "goal", f"needed is a number from 1 to {last}")
-    if not timed:
+    if is_file and not timed:
         seconds = "needed is a whole number; seconds belong into a column duration"
         refuse(frame.ticks % 1 != 0, "ticks", seconds)
     refuse(frame.ticks <= 0, "ticks", "needed is more than 0, from the hit before to this one")
-    refuse(frame.ticks < 1, "ticks",
-           "a duration is less than a tick: give ticks_per_unit, 100 for s")  # fmt: skip
-    twice = frame.duplicated(["subject", "trial", "goal"])
-    refuse(twice, "goal", "this subject, trial and goal have a line above already; number trials "
+    unit = ticks_per_unit or 1.0
+    less = f"it is less than a tick with {unit:g} ticks per unit: give ticks_per_unit, 100 for s"
+    refuse(frame.ticks * unit < 1, "ticks", less)
+    frame["ticks"] = (frame.ticks * unit).round(6)
+    again = frame.duplicated(["subject", "trial", "goal"])
+    refuse(again, "goal", "this subject, trial and goal have a line above already; number trials "
            "through from session to session")  # fmt: skip
     for name in joints[:2]:
         far = "needed is a place in the length unit of the task"
         refuse(frame[name].abs() > LARGEST_ENTRY, name, far)
     for name in joints[2:]:
-        wanted = "angles are in rad: convert degrees with numpy.radians"
-        refuse(frame[name].abs() > _LARGEST_ANGLE, name, wanted)
+        if (frame[name].abs() > _LARGEST_ANGLE).mean() > 0.5:
+            wanted = "angles are in rad: convert degrees with numpy.radians"
+            refuse(frame[name].abs() > _LARGEST_ANGLE, name, wanted)
     keys = frame.trial * (last + 1) + frame.goal
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
-    frame, names = frame.iloc[order].reset_index(drop=True), [names[n] for n in order]
-    if not _hint(frame, task, source):
-        _unwrap(frame, task, source, names)
+    frame, called = frame.iloc[order].reset_index(drop=True), [called[n] for n in order]
+    why, is_far = _implausible(frame, task, source, unit)
+    reasons, count = [], len(frame)
+    while wrong := np.flatnonzero(why != "").tolist():  # without them others may stand out
+        reasons += [f"{called[row]}: {why[row]}" for row in wrong]
+        if implausible == "refuse" or len(reasons) == count:
+            raise CoarticError(f'{source}, {reasons[0]}{also(reasons)}. Mend the recording, or '
+                               'leave such hits out with implausible="drop"')  # fmt: skip
+        frame = frame[why == ""].reset_index(drop=True)
+        called = [name for name, words in zip(called, why, strict=True) if not words]
+        why, is_far = _implausible(frame, task, source, unit)
+    if reasons:
+        warn(f"{source}: {len(reasons)} of {counted(count, 'hit')} are left out as implausible, "
+              f"{reasons[0]}{also(reasons)}")  # fmt: skip
+    _warn_of_copies(frame, source)
+    if not is_far:
+        _unwrap(frame, task, source, called)
     return frame
 
 
@@ -206,35 +391,113 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
             "numpy.unwrap before hits are taken from it"
         )
     for row, joint in np.argwhere(turns != 0)[:1]:
-        warnings.warn(
+        warn(
             f"{source}: {np.count_nonzero(turns)} times an angle jumps by a turn (2π) between "
-            f"hits, first {joints[joint]} in {names[row]}; angles are unwrapped from hit to hit",
-            stacklevel=4,
+            f"hits, first {joints[joint]} in {names[row]}; angles are unwrapped from hit to hit"
         )
         frame[joints] = plain.to_numpy()
 
 
-def _hint(frame: pd.DataFrame, task: Task, source: str) -> bool:
-    """Warn if ticks rise from goal to goal in every trial, and if the hand is more than two radii
-    from its goal in the median hit. Return True for the second: such angles are not unwrapped."""
+def _implausible(
+    frame: pd.DataFrame, task: Task, source: str, unit: float
+) -> tuple[NDArray[np.object_], bool]:
+    """Return why sorted hits are implausible, an empty text for plausible ones, and whether the
+    hand is more than two radii from its goal in the median hit: then places are not checked.
+
+    Warns of such a median hit, of ticks that rise from goal to goal in every trial, and of an arm
+    that is faster or slower than people's. Raises CoarticError if the median hit contradicts the
+    base that the task locks, or takes a number of ticks that no arm of the task could take;
+    ``unit``: ticks in a unit of time.
+    """
+    q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
+    goal, ticks = frame.goal.to_numpy(np.int64), frame.ticks.to_numpy(np.float64)
+    why = np.full(len(frame), "", dtype=object)
+
+    def mark(wrong: NDArray[np.bool_], words: str, *values: Array) -> None:
+        for row in np.flatnonzero(wrong & (why == "")).tolist():
+            why[row] = words.format(*(each[row] for each in values))
+
     off = np.zeros(len(frame))
     for hand in task.hands:
         rows = (frame.hand == hand).to_numpy()
-        postures = frame.loc[rows, [*task.robot.joint_names]].to_numpy()
-        goals = task.goal_array[frame.goal[rows].to_numpy(np.int64) - 1]
-        off[rows] = np.linalg.norm(task.robot.forward_kinematics(postures, hand) - goals, axis=1)
-    if far := bool(np.median(off) > 2 * task.radius):
-        warnings.warn(
+        places = task.robot.forward_kinematics(q[rows], hand)
+        off[rows] = np.linalg.norm(places - task.goal_array[goal[rows] - 1], axis=1)
+    if is_far := bool(np.median(off) > 2 * radius):
+        warn(
             f"{source}: in the median hit the hand is {np.median(off):.2g} length units from its "
             "goal. Are the angles in rad, each measured from the link before, the base in the "
-            f"length unit of the task, and is the task {task.name!r}?",
-            stacklevel=4,
+            f"length unit of the task, and is the task {task.name!r}?"
         )
-    ticks = frame.pivot_table("ticks", ["subject", "trial"], "goal").dropna()
-    if len(ticks) >= 10 and (ticks.diff(axis=1).iloc[:, 1:] > 0).to_numpy().all():
-        warnings.warn(
+    for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
+        mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
+    # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
+    most, outer = 2 * radius, float(np.quantile(off, 0.75))
+    if outer <= most:
+        most = max(most, 5 * outer - 3 * radius)
+    for k in (k for k, axis in enumerate("xy") if axis in task.locked_base):
+        moved = np.abs(q[:, k] - task.q0[k])
+        words = f"base_{'xy'[k]} is {{:g}}, but task {task.name!r} locks it at {task.q0[k]:g}"
+        if np.median(moved) > most:
+            middle = words.format(np.median(q[:, k]))
+            raise CoarticError(f"{source}: in the median hit {middle}")
+        mark(moved > most, words, q[:, k])
+    trial = frame.groupby(["subject", "trial"], sort=False).ngroup().to_numpy()
+    for hand in task.hands:
+        arm, start = q[:, task.robot.joints(hand)], task.q0[task.robot.joints(hand)]
+        left = pd.Series((arm != start).any(axis=1)).groupby(trial).cummax().to_numpy()
+        one = (arm == arm[:, :1]).all(axis=1) & left & (len(start) > 1)
+        mark(one, f"all angles of the {hand} arm are {{:g}}", arm[:, 0])
+    if not is_far:
+        mark(off > most, "the hand is {:.3g} radii from its goal", off / radius)
+    begins, follows = goal == 1, np.zeros(len(frame), dtype=bool)
+    follows[1:] = (trial[1:] == trial[:-1]) & (goal[1:] == goal[:-1] + 1)
+    whole = why == ""
+    follows[1:] &= whole[:-1]
+    way = np.where(begins[:, None], q - task.q0, q - np.roll(q, 1, axis=0))
+    way[:, 2:] -= 2 * np.pi * np.rint(way[:, 2:] / (2 * np.pi))
+    straight = np.linalg.norm(way, axis=1) / PAPER.step
+    known = (begins | follows) & whole
+    initial = initial_solution(task)
+    slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * len(task.q0)])
+    usual, path = (float(np.median(each[known])) if known.any() else 1.0
+                   for each in (ticks, straight))  # fmt: skip
+    ratio = usual / max(path, 1.0)
+    if known.any() and not is_far and (usual > _SLOWEST * slowest or not 0.1 < ratio < 8):
+        likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * ratio)))
+        words = (
+            f"{source}: the median hit takes {usual:g} ticks with {unit:g} ticks per unit; a "
+            f"straight movement takes {path:.0f}, the corrective process at most {slowest:.0f}. "
+            f"Are times in {likely} (ticks_per_unit={_UNITS[likely]:g})?"
+        )
+        if usual > _SLOWEST * slowest or ratio <= 0.1:
+            raise CoarticError(words)
+        warn(words)
+    elif not is_far:
+        early = np.where(known, straight - ticks, -1.0) * PAPER.step
+        if np.quantile(early, 0.75) > 0.1:
+            step = f"whose step is {PAPER.step:g} a tick. Are there more ticks in a unit?"
+            warn(f"{source}: a quarter of the hits or more is faster than the task's arm, {step}")
+        allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
+        words = "it takes {:g} ticks, a straight movement {:.0f}"
+        mark(early > allowed, words, ticks, straight)
+        words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
+        mark(ticks > _SLOWEST * slowest, words, ticks)
+    table = frame.pivot_table("ticks", ["subject", "trial"], "goal").dropna()
+    if len(table) >= 10 and (table.diff(axis=1).iloc[:, 1:] > 0).to_numpy().all():
+        warn(
             f"{source}: in every trial ticks rise from goal to goal. Are they from the hit before, "
-            "and not from the start of the trial?",
-            stacklevel=4,
+            "and not from the start of the trial?"
         )
-    return far
+    return why, is_far
+
+
+def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
+    """Warn if three trials or more are equal to others, of the same subject or another one."""
+    hits = pd.util.hash_pandas_object(frame.drop(columns=["subject", "trial"]), index=False)
+    trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
+    copies = trials[trials.duplicated(keep=False)]
+    if copies.nunique() >= 3:
+        first = [f"trial {trial:g} of {subject}" for subject, trial in
+                 copies.index[copies == copies.iloc[-1]][:2]]  # fmt: skip
+        warn(f"{source}: {len(copies)} trials are equal to others in all numbers, such as "
+              f"{' and '.join(first)}. Is a recording there twice?")  # fmt: skip

@@ -24,6 +24,8 @@ class Solutions:
     runs: tuple[Execution, ...]
     run_ids: tuple[str, ...] = ()
     """Ids of the runs, in the order of ``runs``."""
+    unfinished: int = 0
+    """Number of recorded trials in which a goal was never reached; they are not among ``runs``."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:

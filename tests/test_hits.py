@@ -8,6 +8,7 @@ import pytest
 
 from coartic import CONDITIONS, CoarticError, correct, load_task, move
 from coartic.analysis import read_hits, solutions_of
+from coartic.analysis.hits import checked_hits
 from coartic.motion.batch import robot_parameters
 from coartic.motion.trial import ALL_STOP, Requests, reach, reach_goals
 from tests.support import reference
@@ -91,6 +92,168 @@ def test_other_forms_of_the_same_table_are_read(people, read, form):
     assert given.subject.nunique() == 2
 
 
+def zeros_of(hand, chosen):
+    """A change of a hit made with a hand, or by the other: all angles of its arm are zero."""
+
+    def change(t):
+        row = t.index[((t.hand == hand) == chosen) & (t.goal > 1)][5]
+        joints = [name for name in t if name.startswith(hand)]
+        return t.assign(**{name: t[name].where(t.index != row, 0.0) for name in joints})
+
+    return change
+
+
+IMPLAUSIBLE = {
+    "all angles of the right arm are 0": zeros_of("right", chosen=True),
+    "the hand is .* radii from its goal": put("right_2", 30, 0.9),
+    "all angles of the left arm are 0": zeros_of("left", chosen=False),
+    "left_2 is 9999, no angle in rad": put("left_2", 30, 9999.0),
+    "base_y is 0.4, but task 'two-armed-1' locks it at 0": put("base_y", 30, 0.4),
+    "ticks, a straight movement": put("ticks", 30, 2),
+    "it takes 78000 ticks, the corrective process at most": put("ticks", 30, 78_000),
+}
+
+
+@pytest.mark.parametrize("reason", IMPLAUSIBLE)
+def test_a_hit_that_nobody_can_have_made_is_named_or_left_out(people, read, reason):
+    frame = IMPLAUSIBLE[reason](people)
+    bad = (frame != people).any(axis=1)
+    line, row = bad.idxmax() + 2, bad.idxmax()
+    with pytest.raises(CoarticError, match=rf"people.csv, line {line}: .*{reason}.*Mend"):
+        read(frame)
+    with pytest.raises(CoarticError, match=rf"the frame, row {row}: .*{reason}.*Mend"):
+        solutions_of(TASK, frame)
+    with pytest.warns(UserWarning, match=f"1 of {len(people)} hits are left out as implausible"):
+        left = read(frame, implausible="drop")
+    assert len(left) == len(people) - 1
+    pd.testing.assert_frame_equal(left, read(people[~bad]))
+    with pytest.warns(UserWarning, match=rf"left out as implausible, row {row}"):
+        trials = solutions_of(TASK, frame, implausible="drop")
+    assert len(trials.runs) == len(solutions_of(TASK, people).runs) - 1
+
+
+def test_hands_farther_than_two_radii_are_plausible_with_motor_noise_alone(people, read):
+    noisy, joints = people.copy(), [*TASK.robot.joint_names]
+    noisy[joints] += 0.02 * np.random.default_rng(0).standard_normal(noisy[joints].shape)
+    assert len(read(noisy)) == len(people)  # of which one in eight is farther than two radii
+    with pytest.raises(CoarticError, match="radii from its goal"):
+        read(put("right_2", 30, 0.5)(noisy))
+    with pytest.raises(CoarticError, match="all angles of the right arm are 0"):
+        read(zeros_of("right", chosen=True)(noisy))
+
+
+OF_UNITS = {
+    "ticks_per_unit is 0": ({}, 0.0),
+    "ticks_per_unit is -1": ({}, -1.0),
+    "ticks_per_unit is nan": ({}, np.nan),
+    "ticks_per_unit is inf": ({}, np.inf),
+    "ticks_per_unit is 100, but .* has a column ticks": ({}, 100.0),
+    "has columns ticks and duration": ({"duration": 1.5}, None),
+    "Are times in ms .ticks_per_unit=0.1": ("duration", 1e3, 100.0),
+    "Are times in s .ticks_per_unit=100": ("duration", 2.0, None),
+    "Are times in min .ticks_per_unit=6000": ("duration", 1 / 60, 100.0),
+    "line 2: duration is 0.6; it is less than a tick with 1 ticks per unit": (
+        "duration",
+        1,
+        None,
+    ),
+}
+
+
+@pytest.mark.parametrize("sentence", OF_UNITS)
+def test_a_wrong_unit_or_option_is_named_as_such(people, read, sentence):
+    *change, unit = OF_UNITS[sentence]
+    if change[0] == "duration":
+        seconds = people.ticks.clip(lower=60) / 100 * change[1]
+        frame = people.assign(duration=seconds).drop(columns="ticks")
+    else:
+        frame = people.assign(**change[0])
+    with pytest.raises(CoarticError, match=sentence):
+        read(frame, ticks_per_unit=unit)
+
+
+TEXTS = {
+    "typographic minus": lambda text: text.replace("-", "\u2212"),
+    "non-breaking hyphen": lambda text: text.replace("-", "\u2011"),
+    "no-break and zero-width spaces": lambda text: text.replace(",right,", ",\u00a0right\u200b,"),
+    "odd blanks in headings": lambda text: text.replace("hand", "\u200bhand\u00a0", 1),
+    "separator of Excel": lambda text: "sep=,\r\n" + text,
+    "old lines of a Mac": lambda text: text.replace("\n", "\r"),
+    "a note of two lines": lambda text: text.replace("\n", ',"one\ntwo"\n').replace(
+        ',"one\ntwo"', ",note", 1
+    ),
+    **{f"{odd!r} in a note": lambda text, odd=odd: text.replace("\n", f",so{odd}so\n").replace(
+        f"so{odd}so", "note", 1) for odd in "\x0b\x0c\x85\u2028"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", TEXTS)
+def test_text_is_read_as_unicode(people, read, form):
+    pd.testing.assert_frame_equal(read(TEXTS[form](people.to_csv(index=False))), read(people))
+
+
+SPOILT = {
+    "line 4: left_1 is '0,5'; ',' .comma. makes it no number: write": "0,5",
+    "line 4: left_1 is '45°'; '°' .degree sign. makes it no number": "45°",
+    "line 4: left_1 is '1.2.3'; '.' .full stop. makes it no number": "1.2.3",
+    "line 4: left_1 is '1_0'; '_' .low line. makes it no number": "1_0",
+    "line 4: left_1 is 'lost'; needed is a number; leave out the row": "lost",
+    "line 4: left_1 is empty; needed is a number; leave out the row": "",
+}
+
+
+@pytest.mark.parametrize("sentence", SPOILT)
+def test_the_character_that_spoils_a_number_is_named(people, read, sentence):
+    with pytest.raises(CoarticError, match=sentence):
+        read(put("left_1", 2, SPOILT[sentence])(people))
+
+
+def test_two_spellings_of_a_name_are_one_and_said(people, read):
+    names = people.subject.map({"a": "Jos\u00e9 K", "b": "p\u22121"})
+    one = people.assign(subject=names)
+    odd = one.assign(subject=names.where(people.trial < 5, names.map(
+        {"Jos\u00e9 K": "Jose\u0301\u00a0 K", "p\u22121": "p\u22121"})))  # fmt: skip
+    for get in (read, lambda frame: solutions_of(TASK, frame)):
+        with pytest.warns(UserWarning, match="'José K' is spelt in 2 ways.*Jose.u0301"):
+            get(odd)
+    with pytest.warns(UserWarning, match="differ in capitals alone: A, a"):
+        read(people.assign(subject=people.subject.map({"a": "a", "b": "A"})))
+    assert read(one).subject.unique().tolist() == ["Jos\u00e9 K", "p-1"]
+
+
+def test_the_first_five_of_a_kind_are_named_and_the_others_counted(people, read):
+    with pytest.raises(CoarticError, match=r"line 2: hand is 'R'.*also line 3, .*line 6, 2 more\)"):
+        read(people.assign(hand=people.hand.where(people.index > 6, "R")))
+    short = people.to_csv(index=False).replace(",right", "")
+    with pytest.raises(CoarticError, match=r"it has 14 values.*\d+ more\)$"):
+        read(short)
+
+
+def test_unused_columns_are_left_out_with_one_warning_and_not_checked(read):
+    task = load_task("ascending")
+    people = reference.hits_of(task, CONDITIONS["EC1"], trials=3, seed=1, subject="a")
+    odd = people.assign(left_1=np.nan, left_2="?", left_9=90.0, left_toe=7, note="x")
+    for get in (lambda frame: read(frame, task), lambda frame: checked_hits(frame, task)):
+        with pytest.warns(
+            UserWarning, match="left_1 is left out.*also left_2, left_9, left_t"
+        ) as said:
+            given = get(odd)
+        assert len(said) == 1
+        pd.testing.assert_frame_equal(given, get(people))
+
+
+def test_recordings_that_are_there_twice_are_said(people, read):
+    again = people[(people.subject == "a") & (people.trial > 1)].assign(subject="c")
+    twice = pd.concat([people, again])
+    with pytest.warns(
+        UserWarning, match="20 trials are equal to others.*trial 10 of a and trial 10 of c"
+    ):
+        read(twice)
+    later = people[people.trial > 4].assign(trial=lambda t: t.trial + 50)
+    with pytest.warns(UserWarning, match="26 trials are equal .* trial 10 of b and trial 60 of b"):
+        solutions_of(TASK, pd.concat([people, later]))
+
+
 NO_TABLE = {
     "line 3: it has 16 values, the headings are 15: subject,": lambda text: "".join(
         line[:-1] + ",7" * (n == 2) + "\n" for n, line in enumerate(text.splitlines(True))
@@ -98,8 +261,12 @@ NO_TABLE = {
     "line 2: it has 14 values": lambda text: text.replace("\na,", "\n", 1),
     "is in UTF-16, as Excel": lambda text: text.encode("utf-16"),
     "in UTF-16": lambda text: text.encode("utf-16-le"),
+    "is damaged from byte": lambda text: text.encode()[:-300] + b"\0" * 300,
     "is not in UTF-8: save": lambda text: text.replace("\na,", "\nJos\xe9,").encode("latin-1"),
-    "separated by commas; found are subject;trial": lambda text: text.replace(",", ";"),
+    "the separator is ';'.*found are subject;trial": lambda text: text.replace(",", ";"),
+    "the separator is ';'": lambda text: "sep=;\n" + text.replace(",", ";"),
+    r"the separator is '\\t'": lambda text: text.replace(",", "\t"),
+    "is a quotation mark open": lambda text: text.replace("\na,", '\n"a,', 1),
     "two columns 'ticks'": lambda text: text.replace("goal", "ticks", 1),
     "no column subject": lambda text: "",
 }
@@ -138,15 +305,18 @@ def test_wrapped_angles_are_unwrapped_with_a_warning(people, read, turn):
 
 def test_angles_whose_direction_is_in_doubt_are_named_by_subject_and_line(people, read):
     doubtful = people.copy()
-    doubtful.loc[50, "left_1"] = TASK.q0[2] + 3.4  # or 2.9 the other way
-    with pytest.raises(CoarticError, match=r"line 52: left_1 of subject b turns by -?\d"):
+    idle = (people.subject == "b") & (people.goal == 4) & (people.hand == "right")
+    row = people.index[idle][0]
+    doubtful.loc[row, ["left_1", "ticks"]] = TASK.q0[2] + 3.4, 900  # or 2.9 the other way
+    with pytest.raises(CoarticError, match=rf"line {row + 2}: left_1 of subject b turns by -?\d"):
         read(doubtful)
-    with pytest.raises(CoarticError, match="row 50: left_1 of subject b turns"):
+    with pytest.raises(CoarticError, match=f"row {row}: left_1 of subject b turns"):
         solutions_of(TASK, doubtful)
-    straddling = people.copy()  # from trial to trial, not from hit to hit
-    straddling["left_1"] = np.where(straddling.trial % 2, 3.1, -3.1) + TASK.q0[2]
+    left = TASK.start.left
+    away = TASK.start.model_copy(update={"left": (left[0] - 3.14, *left[1:])})
+    straddling = TASK.model_copy(update={"start": away})  # from trial to trial, not hit to hit
     with pytest.raises(CoarticError, match="of subject a turns by"):
-        solutions_of(TASK, straddling)
+        solutions_of(straddling, people.assign(ticks=500))
 
 
 def test_one_armed_people_need_no_columns_of_the_other_arm(read):

@@ -2,8 +2,8 @@
 
     python studies/fit/fit.py two-armed-1 studies/fit/example.csv [--condition EC4] [--noise 0.01]
 
-prints for each subject which model explains the trials, and the parameters of the learner with 95 %
-profile intervals.
+reads the files, one for each person, one by one, and prints for each subject which model explains
+the trials, and the parameters of the learner with 95 % profile intervals.
 """
 
 import argparse
@@ -24,7 +24,8 @@ from scipy import optimize, stats
 from sentences import CLEAR, LEARNERS, MODELS, sentence
 
 from coartic import CONDITIONS, CoarticError, load_task
-from coartic.analysis import read_hits
+from coartic.analysis import hits_from_markers, read_hits
+from coartic.analysis.hits import checked_hits
 from coartic.estimates import Estimate
 
 SIMULATED = 8
@@ -154,16 +155,25 @@ def judge(row):
     return ordered[0], [model for model in ordered[1:] if bic[model] - bic[ordered[0]] < CLEAR]
 
 
-def fit(frame, task, *, condition=None, noise=0.0):
+def check_noise(noise, name="noise"):
+    """Raise CoarticError, which calls the value ``name``, for what is no SD of motor noise."""
+    if not 0 <= noise <= 1:
+        raise CoarticError(f"{name} is {noise:g}; needed is an SD from 0 to 1, in rad")
+
+
+def fit(frame, task, *, condition=None, noise=0.0, implausible="refuse"):
     """Fit all models to the trials of all subjects.
 
-    ``frame``: rows of :func:`coartic.analysis.read_hits`; ``noise``: SD of the motor noise in
-    recorded postures, length unit and rad. Returns a row for each subject that can be fitted, with
-    what :func:`fit_subject` finds, ``trials``, ``lost`` trials, ``missing`` hits of the others, and
-    ``improved``, the number of trials after the first that were better than all before.
+    ``frame``: rows of :func:`coartic.analysis.read_hits`, which are checked in the same way, with
+    ``implausible``; ``noise``: SD of the motor noise in recorded postures, length unit and rad.
+    Returns a row for each subject that can be fitted, with what :func:`fit_subject` finds,
+    ``trials``, ``lost`` trials, ``missing`` hits of the others, ``unfinished`` trials of the frame,
+    and ``improved``, the number of trials after the first that were better than all before.
     """
     condition, rows = condition or condition_for(task), []
+    check_noise(noise)
     refuse_without_null_space(task, condition)
+    frame = checked_hits(frame, task, implausible=implausible)
     if other := {*frame.hand} - {*condition.hands}:
         raise CoarticError(f"{condition.id} does not use the {other.pop()} hand, the data do")
     for subject, of_subject in frame.groupby("subject", sort=False):
@@ -173,6 +183,7 @@ def fit(frame, task, *, condition=None, noise=0.0):
         row = {
             "subject": subject, "noise": noise, "trials": len(hits), "lost": int((hits == 0).sum()),
             "missing": int((len(task.goals) - hits[hits > 0]).sum()),
+            "unfinished": frame.attrs.get("unfinished", 0),
             "improved": int((np.diff(np.maximum.accumulate(rewards)) > 0).sum()),
         }  # fmt: skip
         if why := why_not(task, condition, trials):
@@ -191,25 +202,39 @@ def main():
     """Read a file, fit, and print a sentence for each subject."""
     parser = argparse.ArgumentParser(description="Fit the learner to the trials of people.")
     parser.add_argument("task", help="name or file of the task")
-    parser.add_argument("csv", help="file with a row for each hit")
+    parser.add_argument("csv", nargs="+", help="files with a row for each hit, or of markers")
+    parser.add_argument("--markers", choices=("left", "right", "both"),
+                        help="arm with markers: the files have their places over time")  # fmt: skip
     parser.add_argument("--condition", choices=CONDITIONS, help="hands and explored joints")
     parser.add_argument("--noise", type=float, default=0.0, help="SD of motor noise in postures")
-    parser.add_argument(
-        "--ticks-per-unit", type=float, default=1.0, help="ticks in a duration of 1"
-    )
+    parser.add_argument("--ticks-per-unit", type=float, help="ticks in a duration of 1")
+    parser.add_argument("--implausible", choices=("refuse", "drop"), default="refuse",
+                        help="hits that nobody can have made")  # fmt: skip
     parser.add_argument("--out", help="CSV file for all numbers")
     given = parser.parse_args()
     warnings.showwarning = lambda text, *_: print(printable(f"warning: {text}"), file=sys.stderr)
     try:
-        if not given.noise >= 0:
-            raise CoarticError(f"--noise is {given.noise:g}; needed is 0 or more")
+        check_noise(given.noise, "--noise")
         out = Path(given.out or "")
         if given.out and (out.is_dir() or not os.access(out.parent, os.W_OK)):
             raise CoarticError(f"--out {out}: name a file, in a folder that may be written")
         task = load_task(given.task)
-        frame = read_hits(given.csv, task, ticks_per_unit=given.ticks_per_unit)
-        condition = CONDITIONS[given.condition] if given.condition else None
-        table = fit(frame, task, condition=condition, noise=given.noise)
+        condition, files, people = CONDITIONS.get(given.condition), {}, []
+        options = {"implausible": given.implausible}
+        if given.ticks_per_unit is not None:
+            options["ticks_per_unit"] = given.ticks_per_unit
+        for path in given.csv:
+            if given.markers:
+                people.append(hits_from_markers(path, task, given.markers, **options))
+            else:
+                people.append(read_hits(path, task, **options))
+            for name in people[-1].subject.unique():
+                if files.setdefault(name, path) != path:
+                    raise CoarticError(f"subject {name} is in {files[name]} and in {path}; needed "
+                                       "is one file, with trials numbered through")  # fmt: skip
+        table = pd.concat(
+            fit(each, task, condition=condition, noise=given.noise) for each in people
+        )
     except CoarticError as error:
         print(printable(f"error: {error}"), file=sys.stderr)
         raise SystemExit(2) from None

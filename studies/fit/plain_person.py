@@ -51,8 +51,9 @@ def correct(q, goal):
 
 
 def practise(averages, trials, rng):
-    """Yield trial, goal (both from 1), duration (s) and recorded posture (rad) of each hit; trial 1
-    is clumsy. With ``averages`` what is kept moves half the way to each better trial."""
+    """Yield trial, goal (both from 1), duration (s) and recorded posture (rad) of each hit, and its
+    movements, as pairs of control steps and the posture at the end; trial 1 is clumsy. With
+    ``averages`` what is kept moves half the way to each better trial."""
     kept, best = [None] * len(GOALS), math.inf
     for trial in range(1, trials + 1):
         q, hits, total = list(START), [], 0
@@ -61,26 +62,28 @@ def practise(averages, trials, rng):
             if stored:
                 target = [angle + rng.gauss(0, EXPLORATION) for angle in stored]
             q, ticks = move(q, target, goal, True)
+            moves = [(ticks, q)]
             if math.dist(places(q)[-1], goal) > RADIUS:
                 q, more = move(q, correct(q, goal), goal, False)
                 ticks += more
+                moves.append((more, q))
             total += ticks
-            hits.append((ticks, q))
+            hits.append((ticks, q, moves))
         if total < best:
             best = total
             kept = [
                 [(a + b) / 2 if averages else b for a, b in zip(old or new, new, strict=True)]
-                for old, (_, new) in zip(kept, hits, strict=True)
+                for old, (_, new, _) in zip(kept, hits, strict=True)
             ]
-        for goal, (ticks, q) in enumerate(hits, 1):
-            yield trial, goal, ticks / 100, [angle + rng.gauss(0, MOTOR) for angle in q]
+        for goal, (ticks, q, moves) in enumerate(hits, 1):
+            yield trial, goal, ticks / 100, [angle + rng.gauss(0, MOTOR) for angle in q], moves
 
 
 def main(trials=100):
     """Print the recording as CSV."""
     print("subject,trial,goal,hand,duration,right_1,right_2,right_3")
     for subject, averages in (("p1", False), ("p2", True)):
-        for trial, goal, duration, q in practise(averages, trials, random.Random(subject)):
+        for trial, goal, duration, q, _ in practise(averages, trials, random.Random(subject)):
             angles = ",".join(f"{angle:.3f}" for angle in q)
             print(f"{subject},{trial},{goal},right,{duration:.2f},{angles}")
 

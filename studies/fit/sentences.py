@@ -25,7 +25,7 @@ def sentence(row):
     alike = [row.model, *row.others.split()]
     text = (
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
-        f"{row.missing}): "
+        f"{row.missing}{f'; unfinished: {row.unfinished}' * bool(row.unfinished)}): "
     )
     if row.misfit:
         return (

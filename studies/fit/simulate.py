@@ -11,7 +11,7 @@ import pandas as pd
 from evidence import DRIFTS
 from models import HANDS, condition_for, explored_by, plan_for, projection
 
-from coartic import initial_hands
+from coartic import CoarticError, initial_hands
 from coartic.motion.trial import reach_goals
 
 FOREIGN = ("averages", "recent", "by goal", "decays")
@@ -35,6 +35,8 @@ def simulate(task, model, sigma, epsilon, kappa=0.0, *, seeds, trials, condition
         Hands and postures that all but planners aim at in trial 1; by default they have the task's
         initial hands and correct.
     """
+    if len(np.unique(seeds, axis=0)) < len(seeds):
+        raise CoarticError(f"seeds are {[*seeds]}: one is there twice, and would be one person")
     condition = condition or condition_for(task)
     people, goals, dof, robot = len(seeds), len(task.goals), task.robot.dof, task.robot
     sigma, epsilon, kappa = (np.broadcast_to(each, people) for each in (sigma, epsilon, kappa))

@@ -1,5 +1,6 @@
 """Study fit: the reader, the simulator, and fits of people whom other code simulates."""
 
+import math
 import re
 import sys
 from dataclasses import replace
@@ -16,7 +17,9 @@ from tests.support.processes import ROOT, programs
 from tests.support.strategies import metres_task
 
 FOLDER = ROOT / "studies" / "fit"
-PROTOCOLS, FIT, STUDY, PLAIN = programs("fit", "protocols", "fit", "study", "plain_person")
+PROTOCOLS, FIT, STUDY, PLAIN, MARKERS, NEEDED = programs(
+    "fit", "protocols", "fit", "study", "plain_person", "plain_markers", "needed"
+)
 TASK = load_task("two-armed-1")
 
 
@@ -118,7 +121,7 @@ def test_degenerate_trials_are_left_out_with_the_reason(people):
     degenerate = {
         "two trials": first,
         "postures are equal": pd.concat(first.assign(trial=n) for n in range(1, 31)),
-        "take 400 ticks, as by a met": people.assign(ticks=100),
+        "take 2000 ticks, as by a met": people.assign(ticks=500),
     }
     every = pd.concat([of.assign(subject=why) for why, of in degenerate.items()])
     with pytest.warns(UserWarning, match="is left out: ") as warned:
@@ -150,10 +153,45 @@ def test_how_to_shows_what_the_command_prints(
     FIT.main()
     page = (ROOT / "docs" / "howto" / "people.md").read_text("utf-8").splitlines()
     shown = [line for line in page if re.match(rf"{subjects}\d*, trials", line)]
-    assert capsys.readouterr().out.splitlines() == shown
+    printed = capsys.readouterr().out.splitlines()
+    if subjects == "s":  # of three, the page shows one
+        assert "informed (other models: BIC higher by 212 or more). σ = 0.041" in printed[0]
+        assert printed.pop(0).endswith("intervals can be too narrow, and the model wrong.")
+        assert "a walk (keep the last) (other models: BIC higher by 909" in printed.pop()
+    assert printed == shown
 
 
-@pytest.mark.parametrize("option", [("--noise", "-1"), ("--out", "no/such/folder.csv")])
+def test_a_hit_of_zeros_is_no_posture_of_the_fit(people):
+    gap = people.copy()
+    gap.loc[20, [*TASK.robot.joint_names]] = 0.0
+    with pytest.raises(CoarticError, match="row 20: all angles of the"):
+        FIT.fit(gap, TASK)
+    with pytest.raises(CoarticError, match="seeds are .*one is there twice"):
+        PROTOCOLS.simulate(TASK, "best", 0.04, 0.3, seeds=[3, 4, 3], trials=1)
+
+
+@pytest.mark.filterwarnings("always")
+def test_a_person_in_two_files_is_refused_and_several_files_are_fitted(
+    people, tmp_path, monkeypatch, capsys
+):
+    still = people[people.trial == 1]
+    paths = [tmp_path / name for name in ("a.csv", "b.csv", "c.csv")]
+    for path, name in zip(paths, "xyx", strict=True):
+        still.assign(subject=name).to_csv(path, index=False)
+    for files, words in ((paths[:2], "subject y is left out"), (paths, r"x is in .*a.csv and in")):
+        monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", *map(str, files)])
+        with pytest.raises(SystemExit, match="2"):
+            FIT.main()
+        assert re.search(words, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        *(("--noise", noise) for noise in ("-1", "nan", "inf", "9999")),
+        ("--out", "no/such/file.csv"),
+    ],
+)
 def test_an_option_that_cannot_be_is_refused(option, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", "no file", *option])
     with pytest.raises(SystemExit, match="2"):
@@ -167,6 +205,35 @@ def test_the_recording_in_metres_is_of_a_simulator_without_the_package(capsys):
     stored = (FOLDER / "metres.csv").read_text("utf-8").splitlines()
     first = [line for line in stored[1:] if int(line.split(",")[1]) <= 20]
     assert capsys.readouterr().out.splitlines() == [stored[0], *first]
+
+
+@pytest.mark.filterwarnings("always")
+def test_the_recording_of_markers_is_of_that_simulator_and_is_fitted(
+    tmp_path, monkeypatch, capsys, fewer_simulated
+):
+    MARKERS.main(tmp_path)
+    for name in ("m1.csv", "m2.csv"):
+        assert (tmp_path / name).read_text() == (FOLDER / "markers" / name).read_text()
+    fewer_simulated(9)
+    options = ["--markers", "right", "--noise", "0.007"]
+    task, file = str(FOLDER / "metres.toml"), str(FOLDER / "markers" / "m1.csv")
+    monkeypatch.setattr("sys.argv", ["fit.py", task, file, *options])
+    FIT.main()
+    printed = capsys.readouterr()
+    begin = "m1, trials 1 to 12 (lost: 1; hits missing in others: 0; unfinished: 1): keep the best"
+    assert printed.out.startswith(begin)
+    assert re.search("right_2: a gap is bridged.*\n.*1 of 12 trials are unfinished", printed.err)
+
+
+def test_people_needed_are_those_of_the_table(capsys):
+    assert NEEDED.people_needed(140, 140) == 1
+    share = 0.025**0.1  # lower end for 10 of 10
+    majority = {n: sum(math.comb(n, k) * share**k * (1 - share) ** (n - k)
+                       for k in range(n // 2 + 1, n + 1)) for n in (15, 17)}  # fmt: skip
+    assert majority[15] < 0.95 < majority[17]
+    assert NEEDED.people_needed(10, 10) == 17
+    NEEDED.main()
+    assert capsys.readouterr().out in (ROOT / "docs" / "howto" / "people.md").read_text("utf-8")
 
 
 def planted(true, fitted, kappa=(0.0, 0.0), off=1.0, misfit="", replaced=0.5):

@@ -1,0 +1,233 @@
+"""Hits from the places of markers: the way there and back, sampling, and what goes wrong."""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import CoarticError, correct, load_task
+from coartic.analysis import hits_from_markers, read_hits, solutions_of
+from coartic.robot import HANDS
+from tests.support.processes import ROOT
+
+BOTH, RIGHT = load_task("two-armed-1"), load_task(ROOT / "studies" / "fit" / "metres.toml")
+ONE_OF_TWO = BOTH.model_copy(update={"hands": ("right",)})
+
+
+def knots_of(task, trials, seed=0):
+    """Postures at the goals of trials, with times in s: each hand reaches the centre of its goal,
+    from where a noisy target puts it."""
+    rng, every = np.random.default_rng(seed), []
+    for _ in range(trials):
+        q, time, knots = task.q0, 0.0, [(0.0, task.q0)]
+        for goal in task.goals:
+            hand = task.hands[int(rng.integers(len(task.hands)))]
+            noise, arm = np.zeros(len(q)), task.robot.joints(hand)
+            noise[arm] = 0.05 * rng.standard_normal(arm.stop - arm.start)
+            to = correct(task.robot, q + noise, hand, goal, locked_base=task.locked_base).q
+            time += 0.013 * np.linalg.norm(to - q) / 0.01
+            q = to
+            knots.append((time, q))
+        every.append(knots)
+    return every
+
+
+def postures(knots, rate):
+    """Times and postures of a trial at a sampling rate: movements of minimum jerk."""
+    times, qs = (np.array(each) for each in zip(*knots, strict=True))
+    clock = np.arange(0, times[-1] + 0.2, 1 / rate)
+    leg = np.clip(np.searchsorted(times, clock, side="right") - 1, 0, len(times) - 2)
+    s = np.clip((clock - times[leg]) / np.diff(times)[leg], 0, 1)[:, None]
+    return clock, qs[leg] + (10 * s**3 - 15 * s**4 + 6 * s**5) * np.diff(qs, axis=0)[leg]
+
+
+def recorded(task, trials=4, rate=100, hands=None):
+    """Places of markers, a frame."""
+    frames = []
+    for trial, knots in enumerate(knots_of(task, trials), 1):
+        clock, q = postures(knots, rate)
+        frame = {"subject": "p", "trial": trial, "time": clock}
+        for hand in hands or task.hands:
+            for k, place in enumerate(np.moveaxis(task.robot.joint_positions(q, hand), 1, 0), 1):
+                name = "tip" if k > len(task.robot.arm(hand).links) else k
+                frame |= {f"{hand}_{name}_x": place[:, 0], f"{hand}_{name}_y": place[:, 1]}
+        frames.append(pd.DataFrame(frame))
+    return pd.concat(frames, ignore_index=True)
+
+
+def true_hits(task, trials=4):
+    """First entries into goals, found by looking at 20,000 postures a second."""
+    rows = []
+    for trial, knots in enumerate(knots_of(task, trials), 1):
+        clock, q = postures(knots, 20_000)
+        tips = {hand: task.robot.forward_kinematics(q, hand) for hand in task.hands}
+        k, before = 0, 0.0
+        for goal, centre in enumerate(task.goals, 1):
+            inside = {hand: np.linalg.norm(tips[hand] - centre, axis=1) <= task.radius
+                      for hand in tips}  # fmt: skip
+            k += int(np.argmax(np.any([inside[hand][k:] for hand in inside], axis=0)))
+            hand = next(hand for hand in HANDS if hand in inside and inside[hand][k])
+            rows.append([trial, goal, hand, 100 * (clock[k] - before), *q[k]])
+            before = clock[k]
+    return pd.DataFrame(rows, columns=["trial", "goal", "hand", "ticks", *task.robot.joint_names])
+
+
+@pytest.mark.parametrize("rate", [60, 100, 200])
+@pytest.mark.parametrize(("task", "side"), [(BOTH, "both"), (RIGHT, "right")])
+def test_angles_are_found_from_places_at_any_rate_of_sampling(task, side, rate):
+    hits, truth = hits_from_markers(recorded(task, rate=rate), task, side), true_hits(task)
+    assert hits.attrs == {"unfinished": 0}
+    assert hits.subject.unique() == ["p"]
+    assert (hits[["trial", "goal", "hand"]] == truth[["trial", "goal", "hand"]]).all(axis=None)
+    assert np.abs(hits.ticks - truth.ticks).max() < 100 / rate  # a sample
+    joints = [*task.robot.joint_names]
+    assert np.abs(hits[joints] - truth[joints]).max(axis=None) < 0.02
+    assert len(solutions_of(task, hits).runs) == 4
+
+
+def test_a_file_is_read_as_a_frame_and_ticks_are_of_the_unit(tmp_path):
+    markers = recorded(RIGHT)
+    text = markers.assign(note="so\u2028so").to_csv(index=False).replace("-", "\u2212")
+    (tmp_path / "p.csv").write_text("\ufeff" + text, "utf-8")
+    hits, same = hits_from_markers(tmp_path / "p.csv", RIGHT), hits_from_markers(markers, RIGHT)
+    pd.testing.assert_frame_equal(hits, same)
+    double = hits_from_markers(markers, RIGHT, ticks_per_unit=200)
+    np.testing.assert_allclose(double.ticks, 2 * same.ticks, atol=1e-5)
+    same.rename(columns={"ticks": "duration"}).to_csv(tmp_path / "hits.csv", index=False)
+    pd.testing.assert_frame_equal(read_hits(tmp_path / "hits.csv", RIGHT), same)
+
+
+def test_an_arm_without_markers_keeps_its_start():
+    with pytest.warns(UserWarning, match="the left arm has no markers and keeps its start"):
+        hits = hits_from_markers(recorded(ONE_OF_TWO), BOTH)
+    left = BOTH.robot.joints("left")
+    assert (hits[[*BOTH.robot.joint_names[left]]] == BOTH.q0[left]).all(axis=None)
+    assert {*hits.hand} == {"right"}
+
+
+def lose(samples, column="right_2", value=np.nan, first=40):
+    """A change: the place of a marker is lost for some samples."""
+    names = [f"{column}_x", f"{column}_y"]
+
+    def change(t):
+        u = t.copy()
+        u.loc[first : first + samples - 1, names] = value
+        return u
+
+    return change
+
+
+BRIDGED = {
+    "NaN": lose(3),
+    "50 ms": lose(5),
+    "zeros": lose(3, value=0.0),
+    "missing rows": lambda t: t.drop(index=[40, 41, 42]),
+    "begin": lose(3, first=0),
+}
+
+
+@pytest.mark.parametrize("gap", BRIDGED)
+def test_short_gaps_are_bridged_and_said(gap):
+    markers = recorded(RIGHT)
+    with pytest.warns(UserWarning, match=r"row \d+: .*a gap is bridged .*takes [35]0 ms"):
+        hits = hits_from_markers(BRIDGED[gap](markers), RIGHT)
+    whole, joints = hits_from_markers(markers, RIGHT), [*RIGHT.robot.joint_names]
+    assert np.abs(hits.ticks - whole.ticks).max() < 1
+    assert np.abs(hits[joints] - whole[joints]).max(axis=None) < 0.02
+
+
+def swap(first, last, one="right_2", other="right_3"):
+    """A change: two markers have the place of each other."""
+
+    def change(t):
+        u = t.copy()
+        for axis in "xy":
+            a, b = f"{one}_{axis}", f"{other}_{axis}"
+            u.loc[first:last, [a, b]] = t.loc[first:last, [b, a]].to_numpy()
+        return u
+
+    return change
+
+
+def scaled(factor):
+    """A change: all places are multiplied."""
+    return lambda t: t.assign(**{name: factor * t[name] for name in t.columns[3:]})
+
+
+WRONG = {
+    "row 40: right_2: a marker is missing for more than 50 ms": lose(6),
+    "row 0: right_2: a marker is missing": lose(8, first=0),
+    "row 46: a marker is missing": lambda t: t.drop(index=range(40, 46)),
+    "row 50: right_.: the length of a link jumps.*swap": swap(50, 60),
+    "row 0: .*the length of a link jumps": swap(0, 10**4 // 40),
+    "row 50: .*the length of a link .*flag": lose(1, first=50, value=9999.0),
+    r"are 330, 270, 90 long .*'metres' 0.33, 0.27, 0.09.*another unit": scaled(1000),
+    "another arm": scaled(0.85),
+    "row 7: another subject; needed is a file for each": lambda t: t.assign(
+        subject=np.where(t.index < 7, "p", "q")
+    ),
+    "row 0: subject is empty": lambda t: t.assign(subject=None),
+    "number trials through from session": lambda t: pd.concat([t, t], ignore_index=True),
+    "row 9: time does not increase": lambda t: t.assign(time=t.time.where(t.index != 9, 0.0)),
+    "Is time in s, and not in ms": lambda t: t.assign(time=1000 * t.time),
+    "row 3: right_2_x is '0,5'; ',' .comma. makes": lambda t: t.astype(object).where(
+        (t.index != 3)[:, None] | (t.columns != "right_2_x"), "0,5"
+    ),
+    "no column right_3_x .also right_3_y": lambda t: t.drop(columns=["right_3_x", "right_3_y"]),
+    "no sample": lambda t: t[:0],
+    "in no trial are all goals reached; missed are goal 1 in trial 1.*y upwards": lambda t: (
+        t.assign(**{name: -t[name] for name in t if name.endswith("_y")})
+    ),
+}
+
+
+@pytest.mark.parametrize("sentence", WRONG)
+def test_a_recording_that_is_wrong_is_refused(sentence):
+    with pytest.raises(CoarticError, match=sentence):
+        hits_from_markers(WRONG[sentence](recorded(RIGHT)), RIGHT)
+
+
+def test_arms_that_contradict_each_other_or_the_task_are_refused():
+    markers = recorded(BOTH)
+    torn = markers.assign(**{name: markers[name] + 0.15 for name in markers if "left" in name
+                             and name.endswith("x")})  # fmt: skip
+    with pytest.raises(CoarticError, match="row 0: the places of the two shoulders do not belong"):
+        hits_from_markers(torn, BOTH, "both")
+    near = markers.assign(**{name: markers[name] + 0.04 for name in markers if "left" in name
+                             and name.endswith("x")})  # fmt: skip
+    base = [hits_from_markers(each, BOTH, "both").base_x[0] for each in (markers, near)]
+    assert base[1] - base[0] == pytest.approx(0.02, abs=0.01)
+    with pytest.raises(CoarticError, match="side is 'left', but task 'metres' has the right hand"):
+        hits_from_markers(markers, RIGHT, "left")
+
+
+def test_unfinished_trials_are_named_and_counted():
+    markers = recorded(RIGHT)
+    short = markers[(markers.trial != 3) | (markers.time < 0.5)]
+    with pytest.warns(UserWarning, match="1 of 4 trials are unfinished.*goal . in trial 3"):
+        hits = hits_from_markers(short, RIGHT)
+    assert hits.attrs["unfinished"] == 1
+    assert hits.trial.unique().tolist() == [1, 2, 4]
+    assert solutions_of(RIGHT, hits).unfinished == 1
+
+
+def test_a_marker_that_is_held_in_its_place_is_said():
+    markers, names = recorded(RIGHT), ["right_1_x", "right_1_y"]
+    markers.iloc[:, 3:] += 1e-4 * np.random.default_rng(0).standard_normal((len(markers), 8))
+    hits_from_markers(markers, RIGHT)
+    for samples in (5, 8):
+        held = markers.copy()
+        held.loc[41 : 40 + samples, names] = held.loc[40, names].to_numpy()
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            hits_from_markers(held, RIGHT)
+        words = "row 41: a marker keeps its place"
+        assert [words in str(each.message) for each in said] == [True] * (samples > 5)
+
+
+def test_what_the_hits_do_not_need_is_not_checked():
+    markers = recorded(RIGHT)
+    after = markers.groupby("trial").time.transform("max") - markers.time < 0.15
+    lost = markers.assign(right_2_x=markers.right_2_x.where(~after), left_1_x="?", head_x=90.0)
+    pd.testing.assert_frame_equal(hits_from_markers(lost, RIGHT), hits_from_markers(markers, RIGHT))
