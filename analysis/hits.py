@@ -26,7 +26,7 @@ from coartic.motion.movement import LARGEST_ENTRY
 from coartic.robot import Array
 
 Implausible = Literal["refuse", "drop"]
-"""What becomes of hits that the person cannot have made."""
+"""Treatment of hits that the person cannot have made."""
 _LARGEST_ANGLE = 20.0
 """Largest angle, rad; if most are larger they are taken for degrees."""
 _AMBIGUOUS = 2.5
