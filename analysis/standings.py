@@ -110,6 +110,13 @@ def board(study: Study) -> pd.DataFrame:
     return rows[rows.gap.notna()].sort_values("gap", kind="stable").join(methods)
 
 
+def own_methods(study: Study) -> list[str]:
+    """Return the labels of the methods from files that solved every run on a task or more, the
+    smallest gap first."""
+    rows = board(study)
+    return [*rows.index[~rows.built_in.astype(bool)]]
+
+
 @cached
 def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
     """Return the names of the tasks on which a method of :func:`compared` solved every run."""

@@ -200,19 +200,29 @@ def test_what_a_method_did_not_run_on_leaves_it_its_gap_there():
     assert TABLES["runtimes"](seen).tasks[["mine", "cma-es/bandit"]].tolist() == [1, 2]
 
 
-def test_an_own_method_stands_next_to_others_on_the_tasks_that_it_solved():
-    seen = study(TEN | CMA | {("ascending", "mine"): [-309, -301]})
-    rows = TABLES["own"](seen)
+def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
+    """A positive difference is in its favour; the built-in method with the smallest gap is first,
+    and methods with failed runs there, or with another use of the reward, are left out."""
+    built_in = {("ascending", "hill-climbing"): [-300, None],
+                ("ascending", "corrective-alone/given"): [-319]}  # fmt: skip
+    seen = study(TEN | CMA | built_in | {("ascending", "mine"): [-309, -301]})
+    seen.runs.loc[seen.runs.method == "corrective-alone/given", "trials"] = 1
+    seen = MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))
+    assert seen.methods.information["corrective-alone/given"] == WITHOUT_REWARD
+    table, rows = TABLES["differences"], TABLES["differences"](seen)
     others = ["cma-es/bandit", "dual-process/EC1"]
-    assert rows.index.tolist() == [f"mine {name}" for name in ("mine", *others)]
-    gaps = [13 / 292, 1.5 / 292, 11 / 292]
-    assert rows.gap.tolist() == pytest.approx(gaps)
-    assert rows.difference.tolist()[1:] == pytest.approx([gap - gaps[0] for gap in gaps[1:]])
-    assert math.isnan(rows.difference_low.iloc[1])  # of two runs there is no interval
-    texts = render.texts_of(TABLES["own"], rows, "difference")
-    assert texts[1].startswith(number(100 * rows.difference.iloc[1], 1))  # per cent, as the gaps
-    same = TABLES["own"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))
-    assert same.difference_low.iloc[1] < 0  # runs with the same seeds are not matched
+    assert rows.index.tolist() == [f"mine {name}" for name in others]
+    differences = [1.5 / 292 - 13 / 292, 11 / 292 - 13 / 292]
+    assert rows.difference.tolist() == pytest.approx(differences)
+    assert math.isnan(rows.difference_low.iloc[0])  # of two runs there is no interval
+    assert (rows.tasks == 1).all()
+    texts = render.texts_of(table, rows, "difference")
+    assert texts[0] == number(100 * rows.difference.iloc[0], 1)  # per cent, as the gaps
+    assert "positive: the own method is better" in table.caption
+    better = TABLES["differences"](study(TEN | strangers(("mine", 2), runs=10)))
+    assert (better.difference_low > 0).all()
+    same = TABLES["differences"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))
+    assert same.difference_low.iloc[0] < 0  # runs with the same seeds are not matched
 
 
 def with_parameters():
@@ -288,12 +298,8 @@ SENTENCES = {
         "a method ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
         "a method from a file has parameters": with_parameters,
         "the learner is alone": lambda: study(TEN),
-    },
-    "own": {
-        "it ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
-        "two ran on all": lambda: beside(("mine", 2), ("yours", 3)),
-        "there is none": lambda: study(TEN),
-        "a run failed": lambda: study(
+        "two own methods ran on all tasks": lambda: beside(("mine", 2), ("yours", 3)),
+        "a run of an own method failed": lambda: study(
             LEARNER | {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
         ),
     },

@@ -71,14 +71,18 @@ def finding(study: Study, section: Section) -> list[str]:
     """Return the lines of a section's sentence, filled in; none without sentence or rows for it."""
     if not section.sentence or not len(frame := section.tables[0](study)):
         return []
-    rows = frame.assign(title=frame.method.map(study.methods.title))[~is_setting(frame)]
+    rows, *others = (
+        each.assign(title=each.method.map(study.methods.title))[~is_setting(each)]
+        for each in (table(study) for table in section.tables)
+    )
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "counts": lambda each: tally(Counter(each))}
     environment.globals |= {
         "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
-        "uses": GROUPS, "reference": reference(study, common_tasks(study)),
+        "uses": GROUPS, "titles": study.methods.title,
+        "reference": reference(study, common_tasks(study)),
     }  # fmt: skip
-    text = environment.from_string(section.sentence).render(rows=rows, every=frame)
+    text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
     return [shown(line.strip()) for line in text.split("\n") if line.strip()]
 
 

@@ -12,8 +12,7 @@ from typing import Any
 
 from coartic.analysis.control import contexts_of_control
 from coartic.analysis.sections.coarticulation import shared_goal
-from coartic.analysis.sections.own import own_methods
-from coartic.analysis.standings import cells_of, compared
+from coartic.analysis.standings import cells_of, compared, own_methods
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, solved, typical_run
 from coartic.analysis.table import SHORT_ID
 from coartic.play.page import player_figure, preset_of

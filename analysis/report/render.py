@@ -28,9 +28,9 @@ from coartic.analysis.words import (
 from coartic.internal.text import one_line
 
 IN_LATEX = {
-    "own": "own, method, gap, difference, share, trials_to_half, tasks",
     "contexts": "place, method, runs, distance, p_holm, control, p_random_search",
     "ranking": "method, gap, share, on *",
+    "differences": "own, method, difference, tasks",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "learning": "task, method, runs, after_*",
     "signatures": "task, method, hands, runs, first, first_control, first_p, arm, arm_p",

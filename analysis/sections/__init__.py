@@ -10,7 +10,6 @@ from coartic.analysis.sections import (
     costs,
     learning,
     methods,
-    own,
     random_tasks,
     ranking,
     tasks,
@@ -31,8 +30,9 @@ class Section:
     folds all figures but the first."""
     sentence: str = ""
     """Jinja template of the finding in words. It has ``every``, the first table, and ``rows``, this
-    table without settings and ablations, and with the ``title`` of each method (further names:
-    :func:`.finding`). Every number is a cell of the table. Empty: no finding."""
+    table without settings and ablations, and with the ``title`` of each method; ``others`` are the
+    other tables in this form (further names: :func:`.finding`). Every number is a cell of a table.
+    Empty: no finding."""
     note: str = ""
     """Explanation of figures and tables."""
     single: bool = True
@@ -43,31 +43,9 @@ class Section:
 
 SECTIONS = (
     Section(
-        "own",
-        "Own methods",
-        (own.list_own,),
-        sentence="""\
-{% for name, group in rows.groupby("own", sort=False) %}
-{% for row in group.to_dict("records") %}
-{% if loop.first %}
-{{ row.title }}: gap {{ interval(row, "gap", scale=100, unit=" %") }} (tasks: {{ row.tasks }})
-{%- else %}
-{{ ". On the same tasks: " if loop.index == 2 else "; " }}{{ row.title }} \
-{{ interval(row, "gap", scale=100, unit=" %") }}, difference \
-{{ interval(row, "difference", scale=100) }} percentage points
-{%- endif %}
-{% endfor %}
-.
-{% endfor %}""",
-        note="On the tasks on which the own method solved every run: the built-in method with the "
-        "nearest gap and the same use of the reward, the learner and CMA-ES. What an own method "
-        "uses is as its author declares. Own methods are bold in all figures.",
-        single=False,
-    ),
-    Section(
         "ranking",
         "Ranking",
-        (ranking.list_ranking,),
+        (ranking.list_ranking, ranking.list_differences),
         (ranking.draw_ranking,),
         sentence="""\
 {% set complete = rows[rows.missing == 0].dropna(subset=["gap"]) %}
@@ -77,6 +55,14 @@ SECTIONS = (
 Gap to the {{ reference }}, {{ use }}: \
 {% endif %}
 {{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
+{%- endfor %}
+
+{% endfor %}
+{% for own, group in others[0].groupby("own", sort=False) %}
+{{ titles[own] }} against built-in methods, percentage points by which its gap is smaller on the \
+tasks that it solved ({{ group.tasks.iloc[0] }}): \
+{% for row in leading(group) %}
+{{ row.title }} {{ interval(row, "difference", scale=100) }}{{ "." if loop.last else "; " }}
 {%- endfor %}
 
 {% endfor %}""",
@@ -89,7 +75,8 @@ Gap to the {{ reference }}, {{ use }}: \
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
         "against-learner). Empty: the runs are too few, or too alike, to tell. A method with "
-        "missing tasks or failed runs has no gap over all tasks.",
+        "missing tasks or failed runs has no gap over all tasks. What an own method uses is as its "
+        "author declares; own methods are bold.",
         single=False,
     ),
     Section(

@@ -19,7 +19,6 @@ from coartic.analysis.statistics import running_times
 from coartic.analysis.study import Study, cached, load, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.errors import CoarticError
-from coartic.estimates import Estimate
 from coartic.internal.limits import brief_value, real_array
 from coartic.robot import Array
 
@@ -139,13 +138,6 @@ def _times_on_tasks(
 ) -> list[Array]:
     """Return a list of :func:`times_of`, for each cell of runs of a method, in their order."""
     return [times_of(study, *cell, spend, shares) for cell in standings.cells_of(runs)]
-
-
-def half_of_targets(study: Study, runs: pd.DataFrame) -> Estimate:
-    """Return the number of trials, with its interval, within which some runs of a method reach half
-    of the targets of their tasks; infinite if they do not, NaN without targets."""
-    times = _times_on_tasks(study, runs[runs.task.isin(spans(study).keys())], "trials")
-    return running_times.budget_for(times, 0.5) if times else Estimate(math.nan)
 
 
 def runtimes(

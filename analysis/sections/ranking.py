@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,9 @@ from coartic.analysis.standings import (
     common_runs,
     common_tasks,
     compared,
+    own_methods,
     reference,
+    runs_on,
     shown_name,
     solved_tasks,
 )
@@ -29,11 +31,10 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.analysis.words import capital, interval, marked, number
-from coartic.estimates import LEVEL
+from coartic.estimates import FEWER_RESAMPLES, LEVEL, Estimate, mean_of_means
 from coartic.internal.text import counted
+from coartic.robot import Array
 
-SCORE_COLUMNS = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
-"""Columns of :func:`.ranking` that are in the table for all tasks and for parts of them."""
 _LONGEST_NAME = 44
 """Most letters of a name in the figure."""
 _EARLY = 1_000
@@ -101,7 +102,8 @@ def list_ranking(study: Study) -> Rows:
     a run costs.
     """
     tested, runs = list_against_learner(study), common_runs(study)
-    wide = board(study).reindex(columns=[*SCORE_COLUMNS, "tasks", "without_gain"])
+    scores = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
+    wide = board(study).reindex(columns=[*scores, "tasks", "without_gain"])
     if len(runs):
         wide["gap_early"] = ranking(_after(study, runs, _EARLY)).gap
     wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
@@ -144,6 +146,56 @@ def _ranked(study: Study) -> list[str]:
                 yield from with_settings(method)
 
     return [m for first in names if under[first] not in names for m in with_settings(first)]
+
+
+@table(
+    "Own methods against built-in methods with the same use of the reward: gap of the built-in "
+    "method less that of the own method, on the tasks that the own method solved (positive: the "
+    "own method is better)",
+    "method: built-in method; own: own method; difference[]: difference of gaps (%) .1; tasks; "
+    "runs",
+)
+def list_differences(study: Study) -> Rows:
+    """List for each method from a file the built-in methods with the same use of the reward, with
+    their gaps less its gap, on the tasks on which it solved every run; the smallest gap first.
+
+    Built-in methods are those that solved every run there, without settings and ablations.
+    Intervals are for other runs on the same tasks.
+    """
+    methods = study.methods
+    for own in own_methods(study):
+        tasks, found = solved_tasks(study, own), list[tuple[Estimate, str, pd.DataFrame]]()
+        alike = methods.built_in & (methods.information == methods.information[own])
+        for name in filter((alike & (methods.under == "")).get, compared(study)):
+            runs = runs_on(study, name, tasks)
+            if len(runs) and runs.reward.notna().all():
+                found.append((_difference_of_gaps(study, name, own, tasks), name, runs))
+        for difference, name, runs in sorted(found, key=lambda each: each[0].value):
+            row: Row = {"method": name, "own": own, "tasks": len(tasks), "runs": len(runs)}
+            row |= difference.columns("difference")
+            yield f"{own} {name}", row | run_ids(runs, runs_on(study, own, tasks))
+
+
+def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
+    """Return the mean gap of the ``first`` method less that of the ``second``, each a mean over
+    ``tasks``.
+
+    Tasks are not matched. Gaps of deterministic methods are taken as exact. The interval is for
+    other runs on these tasks; two exact gaps have no interval.
+    """
+    exact, weights, drawn = 0.0, list[float](), list[Array]()
+    for sign, method in ((1, first), (-1, second)):
+        for _, of_task in runs_on(study, method, tasks).groupby("task").gap:
+            weight, gaps = sign / len(tasks), of_task.to_numpy(np.float64)
+            if study.methods.stochastic[method]:
+                weights.append(weight)
+                drawn.append(gaps)
+            else:
+                exact += weight * gaps.mean()
+    if not drawn:
+        return Estimate(exact)
+    sampled = mean_of_means(drawn, weights, FEWER_RESAMPLES)
+    return Estimate(sampled.value + exact, sampled.low + exact, sampled.high + exact)
 
 
 @figure(
