@@ -61,15 +61,20 @@ class SmoothParameters(TrajectoryParameters):
     are 0."""
 
 
-class HandJerkParameters(SmoothParameters):
+class JerkParameters(SmoothParameters):
+    """Fewer starts: with noise on them the plans of the paper's tasks are the same."""
+
+    noisy_starts: Annotated[int, Field(ge=0)] = 0
+    """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
+
+
+class HandJerkParameters(JerkParameters):
     """Fewer starts, as a plan by jerk of the hand takes some ten times as long."""
 
     graphs: Count = 1
     """Independent graphs, one or two starts for a hand sequence from each."""
     chains: Count = 1
     """Chains of all hand sequences, from as many further graphs as that takes."""
-    noisy_starts: Annotated[int, Field(ge=0)] = 0
-    """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
 
 
 def cheapest_plan(
@@ -236,6 +241,7 @@ class Jerk(Acceleration):
     )
     secondary = ("minimum joint jerk",)
     cost: ClassVar[Cost] = "jerk"
+    Parameters = JerkParameters
 
 
 class HandJerk(Jerk):
