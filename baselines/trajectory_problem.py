@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method import Information
-from coartic.robot import HANDS, Array, Hand, Robot
+from coartic.robot import HANDS, Arm, Array, Hand, Robot
 from coartic.tasks.task import Task
 
 MODEL_BASED = frozenset(
@@ -70,6 +70,9 @@ _RATES: dict[Cost, int] = {
     "jerk": 2,
     "hand-jerk": 2,
 }  # derivatives that are variables
+# IPOPT's tolerance. A plan by jerk of the hand is then as near to the least cost, some 1e-6 of it,
+# as the better plan of two starts with 1e-9.
+_TOLERANCE: dict[Cost, float] = {"hand-jerk": 5e-10}
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -78,7 +81,6 @@ _OPTIONS: dict[str, Any] = {
     "ipopt": {
         "print_level": 0,
         "sb": "yes",
-        "tol": 1e-9,
         "constr_viol_tol": 1e-9,
         "bound_relax_factor": 0.0,
         "max_iter": 1000,
@@ -214,7 +216,7 @@ class TrajectoryProblem:
                 "f": objective,
                 "g": casadi.vertcat(*limits),
             },
-            _OPTIONS,
+            {**_OPTIONS, "ipopt": {**_OPTIONS["ipopt"], "tol": _TOLERANCE.get(cost, 1e-9)}},
         )
 
     def solve(
@@ -333,12 +335,6 @@ def _hand_jerks(
     ``(dof, G)``, are their changes, ``rates`` velocities and accelerations at start and goals,
     ``(dof, G + 1)`` each."""
     powers = np.arange(6)
-    q = [casadi.SX.sym(f"q{d}", robot.dof) for d in range(4)]  # and its derivatives
-    t = casadi.SX.sym("t")
-    third = robot.symbolic_hand(q[0] + q[1] * t + q[2] * t**2 / 2 + q[3] * t**3 / 6, hand)
-    for _ in range(3):
-        third = casadi.jacobian(third, t)
-    jerk = casadi.Function("jerk", q, [casadi.sumsqr(casadi.substitute(third, t, 0))])
     integrals, here = [], q0
     for g in range(steps.shape[1]):
         step, time = steps[:, g], durations[g]
@@ -357,10 +353,26 @@ def _hand_jerks(
                 falling = np.prod([powers - k for k in range(d)], axis=0) * np.ones(6)
                 scale = falling * node ** np.maximum(powers - d, 0)
                 derivatives.append(sum(c * w for c, w in zip(coefficients, scale, strict=True)))
-            total += weight * jerk(*derivatives)
+            total += weight * _squared_jerk(robot.arm(hand), derivatives)
         integrals.append(total / time**5)
         here = here + step
     return casadi.vertcat(*integrals)
+
+
+def _squared_jerk(arm: Arm, q: Sequence[Any]) -> Any:
+    """Return the squared jerk of an arm's hand, where a configuration and its first three time
+    derivatives are ``q``, each ``(dof,)``, as a CasADi expression: written out, since third
+    derivatives by CasADi make Hessians of twice as many operations."""
+    x, y = q[3][0], q[3][1]
+    angles = [casadi.SX(0)] * 4  # of a link, and its derivatives
+    for k, link in enumerate(arm.links.tolist()):
+        angles = [angle + each[arm.first + k] for angle, each in zip(angles, q, strict=True)]
+        angle, first, second, third = angles
+        along, across = -3 * first * second, third - first**3
+        cos, sin = casadi.cos(angle), casadi.sin(angle)
+        x += link * (along * cos - across * sin)
+        y += link * (along * sin + across * cos)
+    return x**2 + y**2
 
 
 def trajectory_problem(
