@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method import Information
-from coartic.robot import HANDS, Arm, Array, Hand, Robot
+from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
 MODEL_BASED = frozenset(
@@ -154,7 +154,7 @@ class TrajectoryProblem:
     number of ``goals``."""
 
     def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
-        self.robot, self.goals, self.cost = robot, goals, cost
+        self._dof, self._goals, self._cost = robot.dof, goals, cost
         self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
         steps = casadi.SX.sym("steps", dof, goals)  # configuration changes, goal by goal
@@ -238,7 +238,7 @@ class TrajectoryProblem:
         large as ``lengths`` allow. Only for costs with rates: ``stops`` holds all rates at the
         goals at 0.
         """
-        goals, at = self.goals, self._at
+        goals, at = self._goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
@@ -246,7 +246,7 @@ class TrajectoryProblem:
         # A start, a least and a most value of each variable.
         first, least, most = bounds = np.zeros((3, at["rates"].stop))
         bounds[:, at["steps"]] = steps.ravel(), -free, free
-        if self.cost == "path-length":
+        if self._cost == "path-length":
             first[at["lengths"]], most[at["lengths"]] = distances, np.inf
             if lengths is not None:
                 given = ~np.isnan(lengths)
@@ -256,7 +256,7 @@ class TrajectoryProblem:
             times = np.maximum(distances, 1e-3)
             times = np.maximum(times * (goals / times.sum()), 0.1)
             first[at["durations"]] = times * (goals / times.sum())
-            least[at["durations"]], most[at["durations"]] = _SHORTEST[self.cost], goals
+            least[at["durations"]], most[at["durations"]] = _SHORTEST[self._cost], goals
         # Rates are 0 at rest (start and end, with stops each goal) and for joints held on either
         # side.
         still = np.vstack([instance.held[:1] | True, instance.held])
@@ -292,7 +292,7 @@ class TrajectoryProblem:
             configurations=instance.q0 + np.cumsum(x[at["steps"]].reshape(start.shape), axis=0),
             cost=float(solution["f"]),
             durations=x[at["durations"]],
-            rates=x[at["rates"]].reshape(self._order, goals + 1, self.robot.dof),
+            rates=x[at["rates"]].reshape(self._order, goals + 1, self._dof),
             spent={
                 "forward_kinematics": self._evaluations * statistics.get("n_call_nlp_g", 0),
                 "jacobians": self._evaluations * statistics.get("n_call_nlp_jac_g", 0),
@@ -353,26 +353,10 @@ def _hand_jerks(
                 falling = np.prod([powers - k for k in range(d)], axis=0) * np.ones(6)
                 scale = falling * node ** np.maximum(powers - d, 0)
                 derivatives.append(sum(c * w for c, w in zip(coefficients, scale, strict=True)))
-            total += weight * _squared_jerk(robot.arm(hand), derivatives)
+            total += weight * casadi.sumsqr(robot.symbolic_hand_jerk(derivatives, hand))
         integrals.append(total / time**5)
         here = here + step
     return casadi.vertcat(*integrals)
-
-
-def _squared_jerk(arm: Arm, q: Sequence[Any]) -> Any:
-    """Return the squared jerk of an arm's hand, where a configuration and its first three time
-    derivatives are ``q``, each ``(dof,)``, as a CasADi expression: written out, since third
-    derivatives by CasADi make Hessians of twice as many operations."""
-    x, y = q[3][0], q[3][1]
-    angles = [casadi.SX(0)] * 4  # of a link, and its derivatives
-    for k, link in enumerate(arm.links.tolist()):
-        angles = [angle + each[arm.first + k] for angle, each in zip(angles, q, strict=True)]
-        angle, first, second, third = angles
-        along, across = -3 * first * second, third - first**3
-        cos, sin = casadi.cos(angle), casadi.sin(angle)
-        x += link * (along * cos - across * sin)
-        y += link * (along * sin + across * cos)
-    return x**2 + y**2
 
 
 def trajectory_problem(

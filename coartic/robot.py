@@ -14,6 +14,7 @@ of its world. No other module takes a cosine of a joint angle.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -299,6 +300,26 @@ class Robot:
         plain = arm._replace(links=arm.links.tolist())
         xs, ys = _points_of(q, plain, casadi.cos, casadi.sin)
         return casadi.vertcat(xs[-1], ys[-1])
+
+    def symbolic_hand_jerk(self, q: Sequence[Any], hand: Hand) -> Any:
+        """Return the third time derivative of a hand's position as a CasADi expression, 2 x 1, for
+        a configuration and its first three time derivatives, CasADi expressions of ``dof`` entries.
+
+        Written out, as third derivatives by CasADi make Hessians of twice as many operations.
+        Raises ValueError for an unknown hand.
+        """
+        import casadi
+
+        arm, (x, y) = self.arm(hand), (q[3][0], q[3][1])
+        angles = [casadi.SX(0)] * 4  # of a link, and its derivatives
+        for k, link in enumerate(arm.links.tolist()):
+            angles = [angle + each[arm.first + k] for angle, each in zip(angles, q, strict=True)]
+            angle, first, second, third = angles
+            along, across = -3 * first * second, third - first**3
+            cos, sin = casadi.cos(angle), casadi.sin(angle)
+            x += link * (along * cos - across * sin)
+            y += link * (along * sin + across * cos)
+        return casadi.vertcat(x, y)
 
     def _configuration(self, q: ArrayLike) -> Array:
         array = real_array("configuration", q)

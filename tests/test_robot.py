@@ -37,6 +37,20 @@ def test_hands_and_jacobians_against_complex_exponentials_and_automatic_derivati
         np.testing.assert_allclose(automatic, jacobians[row], atol=1e-12, rtol=0)
 
 
+@pytest.mark.parametrize("hand", HANDS)
+def test_the_jerk_of_a_hand_is_its_third_derivative(hand):
+    """By CasADi's differentiation, along a cubic in time."""
+    derivatives = np.random.default_rng(3).normal(size=(4, UNEVEN.dof))
+    t = casadi.SX.sym("t")
+    q = [casadi.DM(each) for each in derivatives]
+    place = UNEVEN.symbolic_hand(q[0] + q[1] * t + q[2] * t**2 / 2 + q[3] * t**3 / 6, hand)
+    for _ in range(3):
+        place = casadi.jacobian(place, t)
+    due = casadi.Function("f", [t], [place])(0)
+    jerk = UNEVEN.symbolic_hand_jerk(q, hand)
+    np.testing.assert_allclose(np.array(casadi.evalf(jerk)), np.array(due), rtol=1e-10)
+
+
 def test_base_outline():
     outline = PAPER_ROBOT.base_outline(np.array([1.0, 2.0, *np.zeros(8)]))
     np.testing.assert_allclose(outline, [[0.5, 1.9], [1.5, 1.9], [1.5, 2.1], [0.5, 2.1]])
