@@ -29,7 +29,7 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.hypotheses import exchange_test
 from coartic.benchmarks.planning import plan_suite
 from coartic.robot import HANDS
 from tests.support.made_up import runs_of, study_of_solutions
@@ -359,7 +359,7 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_p
     }
     assert mean_excess(study, "first", task.name, EC4) == 5 - 135
     table = TABLES["signatures"](study).loc[f"{task.name} {EC4} RRRR"]
-    test = bootstrap_test([5.0] * 18, [2.0, 3.0, 400.0])
+    test = exchange_test([5.0] * 18, [2.0, 3.0, 400.0])
     assert (table["first"], table.first_control, table.first_p) == (5, 135, test.p)
     assert (table.runs, table.control_runs) == (18, 3)
     (tmp_path / "control.toml").write_text(control_suite(study), "utf-8")

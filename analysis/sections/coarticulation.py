@@ -28,7 +28,7 @@ from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.statistics.hypotheses import exchange_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
 from coartic.analysis.words import number
@@ -141,7 +141,7 @@ def list_signatures(study: Study) -> Rows:
                     row |= {
                         f"{column}_control": control.mean(),
                         **difference_of_means(values, control).columns(f"{column}_difference"),
-                        f"{column}_p": bootstrap_test(values, control).p,
+                        f"{column}_p": exchange_test(values, control).p,
                     }
         for hands, row in rows.items():
             key = " ".join(filter(None, (name, label, hands)))

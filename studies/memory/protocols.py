@@ -13,11 +13,9 @@ import sys
 from pathlib import Path
 
 from coartic.analysis import load
-from coartic.benchmarks.planning import plan, request_for
+from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
-from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
-from coartic.benchmarks.suites import load_suite
 
 PAPER = {"EC1": ["ascending", "descending"], "EC4": ["two-armed-1", "two-armed-2"]}
 FAMILIES = {"EC1": ["one-armed"], "EC4": ["two-armed", "aligned", "redundancy", "long"]}
@@ -88,8 +86,7 @@ def main(folder, instances=INSTANCES):
         nonlocal text
         text += blocks
         file.write_text(text, encoding="utf-8")
-        suite = plan(load_suite(str(file)), request_for(), registry())
-        print(perform(suite, folder, executor=Local(-1)), flush=True)
+        print(perform(plan_suite(file), folder, executor=Local(-1)), flush=True)
 
     run(on_all(instances, "dual-process/{}"))
     for stages in ([1], FIRST, REST):
