@@ -7,6 +7,8 @@ compared with like:
 
 - runs with the same hand sequence. The choice of hands itself, signature ``hand``, is compared with
   random search that tries every hand sequence, whatever the hands;
+- the idle arm has noise in random search if it has noise under the learner's condition
+  (``modify_other``: not under EC3), or where there is no such random search;
 - as many trials;
 - all runs of both: a run that does not improve counts with what it shows, often 0.
 
@@ -20,6 +22,7 @@ from statistics import mode
 from typing import Annotated
 
 import numpy as np
+import pandas as pd
 
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.methods import RANDOM_SEARCH
@@ -27,6 +30,7 @@ from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import MOST_EXECUTED, Study, cached, solved
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUNS
+from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import Array
 
 LEAST_SHARE = 0.1
@@ -53,9 +57,9 @@ def with_control(
     dict
         For each hand sequence with which at least a tenth of the method's runs end, the commonest
         first: the values of the runs of the method with these hands and of the runs of random
-        search with these hands and as many trials, shape ``(n,)`` each, without runs that lack the
-        signature; the second empty if there is no such random search. For signature ``hand`` one
-        entry, ``""``, with all runs.
+        search (:func:`control_of`) with these hands and as many trials, shape ``(n,)`` each,
+        without runs that lack the signature; the second empty if there is no such random search.
+        For signature ``hand`` one entry, ``""``, with all runs.
 
     Examples
     --------
@@ -67,30 +71,58 @@ def with_control(
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
         if len(values) >= LEAST_SHARE * total:
-            control = _control_of(study, task, label, hands)
+            control = control_of(study, task, label, hands)
             of_control = study.signature_by_hands(signature, task, control) if control else {}
             pairs[hands] = values, of_control.get(hands, np.empty(0))
     return pairs
 
 
-def _control_of(study: Study, task: str, label: str, hands: str) -> str:
-    """Return the label of random search with these hands and as many trials as a method on a task;
-    ``hands`` empty: with every hand sequence. Empty without such runs."""
-    return _controls(study, task).get((hands, _most_trials(study, task, label)), "")
+def control_of(study: Study, task: str, label: str, hands: str, *, own: bool = False) -> str:
+    """Return the label of the control of a method on a task: random search with these hands and as
+    many trials; ``hands`` empty: with every hand sequence. Empty without such runs.
+
+    Random search that explores the idle arm as the method does comes before random search that
+    explores both arms, and is the only control for ``own``.
+    """
+    controls, trials = _controls(study, task), _most_trials(study, task, label)
+    explored = explores_idle_arm(study, task, label)
+    other = "" if own else controls.get((hands, trials, True), "")
+    return controls.get((hands, trials, explored), other)
+
+
+def explores_idle_arm(study: Study, task: str, label: str) -> bool:
+    """Return whether a method, if it is the learner by its condition, gives noise to an arm that is
+    not to hit; True for other methods, and on tasks for one arm, where there is none."""
+    run = study.cells[task, label].iloc[0]
+    if len(study.tasks[task].hands) == 1:
+        return True
+    if not run.method.startswith(METHOD_PREFIX):
+        return bool(run.get("idle_arm", True))
+    name = study.methods.condition[label] or run.base  # of the learner with an own condition
+    changed = run.get("modify_other")
+    return EVERY_CONDITION[name].modify_other if pd.isna(changed) else bool(changed)
 
 
 @cached
-def _controls(study: Study, task: str) -> dict[tuple[str, float], str]:
-    """Return the labels of random search on a task by the hand sequence of all its runs (empty for
-    random search with every hand sequence) and the number of its trials."""
-    labels = dict[tuple[str, float], str]()
+def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
+    """Return the labels of random search without memory on a task by the hand sequence of all its
+    runs (empty for random search with every hand sequence), the number of its trials, and whether
+    it explores the idle arm."""
+    labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
         cell = study.cells.get((task, label))
-        hands = {*solved(cell).hands} if cell is not None else set()
+        if cell is None or cell.iloc[0].get("stages", 1) > 1:
+            continue
+        hands = {*solved(cell).hands}
         every = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
         if len(every) == 1:
-            labels.setdefault((every.pop(), _most_trials(study, task, label)), label)
+            key = (
+                every.pop(),
+                _most_trials(study, task, label),
+                explores_idle_arm(study, task, label),
+            )
+            labels.setdefault(key, label)
     return labels
 
 
@@ -129,7 +161,7 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     both = contexts.first, contexts.second
     commonest = (mode(run.hands for run in runs.runs) for runs in both)
     labels = [
-        _control_of(study, runs.task.name, contexts.method, hands)
+        control_of(study, runs.task.name, contexts.method, hands)
         for runs, hands in zip(both, commonest, strict=True)
     ]
     if not all(labels):
@@ -146,8 +178,9 @@ def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> s
     """Return a suite of random search, the control of signatures, where the study lacks it.
 
     For each method that may select its solution by rewards (:func:`selects`), the suite has random
-    search with as many trials as the method and with each hand sequence that a tenth or more of the
-    method's solved runs have, unless the study has this random search. Write the suite to a file
+    search with as many trials as the method, with noise on the idle arm if the method has it, and
+    with each hand sequence that a tenth or more of the method's solved runs have, unless the study
+    has this random search. Write the suite to a file
     and run it with the results of the study: ``coartic run control.toml --include FOLDER``.
 
     Parameters
@@ -162,14 +195,17 @@ def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> s
     str
         The suite as TOML; empty if nothing is missing.
     """
-    blocks = dict[tuple[str, str, int], None]()
+    blocks = dict[tuple[str, str, int, bool], None]()
     for (task, label), of_method in study.cells.items():
         if not selects(study, label):
             continue
-        trials = int(_most_trials(study, task, label))
+        trials, explored = (
+            int(_most_trials(study, task, label)),
+            explores_idle_arm(study, task, label),
+        )
         for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
-            if share >= LEAST_SHARE and not _control_of(study, task, label, str(hands)):
-                blocks[task, str(hands), trials] = None
+            if share >= LEAST_SHARE and not control_of(study, task, label, str(hands), own=True):
+                blocks[task, str(hands), trials, explored] = None
     lines = [
         'title = "Random search with the hands of learners"',
         'description = "The control of signatures where results lack it."',
@@ -177,7 +213,8 @@ def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> s
     ]
     lines += [
         f'\n[[blocks]]\ntasks = ["{task}"]\nmethods = ["random-search"]\n'
-        f'parameters = {{ hands = "{hands}", trials = {trials} }}'
-        for task, hands, trials in blocks
+        f'parameters = {{ hands = "{hands}", trials = {trials}'
+        f"{'' if explored else ', idle_arm = false'} }}"
+        for task, hands, trials, explored in blocks
     ]
     return "\n".join(lines) + "\n" if blocks else ""

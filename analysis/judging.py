@@ -40,24 +40,16 @@ class Finding:
     evidence: str
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
-    against: tuple[Estimate, ...] | None = None
-    """Tests of the claim's opposite, one of which refutes it; None: other tails of ``tests``."""
+    against: tuple[Estimate, ...] = ()
+    """Tests of the claim's opposite, one of which refutes it."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
     @property
     def opposite_p(self) -> float:
-        """Smallest p-value of the tests that can refute the claim, times the number of these tests
-        (Bonferroni), 1 at most; NaN without a test.
-
-        The tests in ``against`` or, if it is None, the other tails of ``tests``, which is right for
-        tests by resampling alone: exact tests need ``against``.
-        """
-        if self.against is not None:
-            every = [test.p for test in self.against]
-        else:
-            every = [min(1.0, 1 - test.p + 1 / (test.resamples + 1)) for test in self.tests]
-        tested = [p for p in every if not math.isnan(p)]
+        """Smallest p-value of the tests in ``against``, times their number (Bonferroni), 1 at most;
+        NaN without a test."""
+        tested = [test.p for test in self.against if not math.isnan(test.p)]
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
 
     def verdict(self, p: float, opposite_p: float) -> Verdict:
@@ -67,14 +59,14 @@ class Finding:
         A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
         that does not hold is not supported if ``opposite_p`` is below 5 %, or without tests. Other
         claims, and claims with too few runs, are undecided."""
-        untested = any(math.isnan(test.p) and min(test.n) < 2 for test in self.tests)
+        untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
         if self.holds:
             # NaN: counted exactly, or no spread in any sample.
             return "undecided" if p >= LEVEL else "supported"
         certain = not self.tests or any(
-            test.value <= 0 and math.isnan(test.p) and min(test.n) > 1 for test in self.tests
+            test.value <= 0 and math.isnan(test.p) and min(test.n) >= FEWEST for test in self.tests
         )
         return "not supported" if certain or opposite_p < LEVEL else "undecided"
 
@@ -153,8 +145,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Holds if all findings hold. It has the tests of all, and the tests in ``against`` of all, or
-        None if a finding has None. If findings have too few runs, the first of these is returned.
+        Holds if all findings hold. It has the tests of all, and the tests in ``against`` of all. If
+        findings have too few runs, the first of these is returned.
 
     Raises
     ------
@@ -172,12 +164,11 @@ def all_of(*findings: Finding) -> Finding:
     for finding in findings:
         if finding.holds is None:
             return finding
-    opposites = [finding.against for finding in findings if finding.against is not None]
     return Finding(
         all(finding.holds for finding in findings),
         "; ".join(finding.evidence for finding in findings),
         tuple(test for finding in findings for test in finding.tests),
-        sum(opposites, ()) if len(opposites) == len(findings) else None,
+        tuple(test for finding in findings for test in finding.against),
         tuple(test for finding in findings for test in finding.without),
     )
 

@@ -265,13 +265,14 @@ class Study:
         parameters = {text: json.loads(text) for text in runs.parameters.unique()}
         rows = [
             {
+                **self.declared[method].defaults,
                 **parameters[text],
                 "family": tasks[name].family,
                 "split": tasks[name].split,
                 "goals": len(tasks[name].goals),
                 "arms": len(tasks[name].hands),
             }
-            for name, text in zip(runs.task, runs.parameters, strict=True)
+            for name, method, text in zip(runs.task, runs.method, runs.parameters, strict=True)
         ]
         more = pd.DataFrame(rows, runs.index)
         runs = runs.join(more[[name for name in more if name not in runs]])

@@ -109,7 +109,7 @@ class CMAES(Method):
     def solve(self, session: Session) -> Result:
         """Make generations of trials until the trials are used up; return the movements of the best
         trial. Raises MethodError if no trial hit every goal."""
-        attempts = Attempts(session, self.parameters)
+        attempts = Attempts(session, self.parameters.trials)
         with session.solving():
             strategies = []
             for hands in sequences_of(session)[: attempts.left]:
@@ -151,7 +151,7 @@ class GoalByGoal(Method):
         """Make trials until they are used up, or until all hand sequences were tried and none
         succeeds; return the movements of the best trial. Raises MethodError if no trial hit every
         goal."""
-        attempts = Attempts(session, self.parameters)
+        attempts = Attempts(session, self.parameters.trials)
         letters = sorted(hand[0].upper() for hand in session.hands)
         values: dict[tuple[int, str], float] = defaultdict(lambda: -math.inf)
         strategies: dict[str, Strategy] = {}

@@ -38,7 +38,7 @@ class HillClimbing(Method):
         the best trial. For each trial hands are drawn around the best sequence known, targets
         around the centre of the drawn sequence. Raises MethodError if no trial hit every goal."""
         first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
-        attempts = Attempts(session, self.parameters)
+        attempts = Attempts(session, self.parameters.trials)
         most, ahead = len(letters) ** session.goals_count, 1
         explored, dim = attempts.explored, attempts.explored.sum()
         centres: dict[str, Array] = {}  # their values, (G, dof); NaN for the other joints

@@ -7,6 +7,10 @@ of selecting one of many noisy trials by the reward of the whole task. It is the
 signatures of coarticulation (:mod:`coartic.analysis.control`), and differs from the learner in one
 thing: it forgets.
 
+Memory comes in doses: with ``stages`` above 1 the trials are equal parts, and after each part the
+centre of the noise moves to the best trial so far, to the postures that this trial reached or to
+the targets that it aimed at (``keep``).
+
 ``random-search`` has the hands with which the corrective process alone does best, or those that are
 given. In ``random-search/hands`` every hand sequence gets as many of the trials; the best of all is
 the solution.
@@ -15,14 +19,19 @@ the solution.
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
+from coartic.baselines.uninformed import Attempts
+from coartic.internal.validation import sentence_error
 from coartic.learner.conditions import MOST_NOISE
 from coartic.learner.learning import TRIALS, runs_at_once
-from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
-from coartic.optimisers import OPTIMISER_INFORMATION, Objective, sequences_of
+from coartic.method import Method, MethodError, Parameters, Result, Session
+from coartic.optimisers import OPTIMISER_INFORMATION, sequences_of
+from coartic.robot import HANDS
 
 _POINTS_AT_ONCE = 500
 
@@ -35,6 +44,23 @@ class RandomSearchHandsParameters(Parameters):
     sigma: Annotated[float, Field(gt=0, le=MOST_NOISE)] = 0.05
     """SD of the noise on each explored joint, length unit (base) and rad (joints): the
     learner's."""
+    stages: Annotated[int, Field(ge=1)] = 1
+    """Number r of equal parts of the T trials with a hand sequence: part k ends after ⌊kT/r⌋
+    trials, and then noise is drawn around the best trial so far. 1: nothing is kept."""
+    keep: Literal["postures", "targets"] = "postures"
+    """Centre of the noise after a part: the postures in which the best trial hit its goals, or the
+    targets that it aimed at. No effect with one stage."""
+    idle_arm: bool = True
+    """True if an arm gets noise also at goals that the other hand is to hit. If False, it keeps
+    still there, as under the learner's condition EC3."""
+
+    @model_validator(mode="after")
+    def _check_stages(self) -> Self:
+        if self.stages > self.trials:
+            raise sentence_error(
+                f"stages is {self.stages}; it may be at most the number of trials, {self.trials}"
+            )
+        return self
 
 
 class RandomSearchParameters(RandomSearchHandsParameters):
@@ -45,18 +71,50 @@ class RandomSearchParameters(RandomSearchHandsParameters):
     the task's own where there are too many to try."""
 
 
-def draw_trials(session: Session, hands: str | None, sigma: float, trials: int) -> Objective:
-    """Make trials with noise around the postures of the corrective process until none is left;
-    return the objective, which keeps the best trial. ``hands``: a hand sequence, or None for the
-    one with which the corrective process alone does best. ``sigma``: SD of the noise, length unit
-    and rad. ``trials``: most trials, those of the corrective process alone among them. Raises
-    BudgetError for no trial at all, MethodError if the process completes no hand sequence."""
-    problem = Objective(session, hands, trials=trials)
-    with suppress(BudgetError):
-        while True:
-            noise = session.rng.normal(0.0, sigma, (_POINTS_AT_ONCE, problem.dim))
-            problem.many(problem.x0 + noise)
-    return problem
+def draw_trials(
+    session: Session, hands: str | None, parameters: RandomSearchHandsParameters
+) -> tuple[Attempts, int]:
+    """Make trials with noise until none is left; return the trials, which keep the best, and how
+    many had noise.
+
+    ``hands``: a hand sequence, or None for the sequence with which the corrective process alone
+    does best. ``parameters.trials``: most trials, those of the corrective process alone among them.
+    Raises MethodError for no trial at all, and if the process completes no hand sequence.
+    """
+    attempts = Attempts(session, parameters.trials)
+    trials = attempts.left
+    if trials <= 0:
+        raise MethodError("infeasible", "the budget leaves no trial to make")
+    attempts.by_correction(*(sequences_of(session) if hands is None else [hands])[:trials])
+    if not (chosen := attempts.hands):
+        raise MethodError("infeasible", "the corrective process completes no hand sequence")
+    explored = attempts.explored & (parameters.idle_arm | _follows(session, chosen))
+    centre, alone = attempts.reached[explored], attempts.trials_made
+    targets = np.full((_POINTS_AT_ONCE, *explored.shape), np.nan)
+    stage, more = 0, True
+    while more:
+        more = attempts.left >= _POINTS_AT_ONCE
+        noise = session.rng.normal(0.0, parameters.sigma, (_POINTS_AT_ONCE, len(centre)))
+        while len(noise) and attempts.left > 0:
+            while (ends := trials * (stage + 1) // parameters.stages) <= attempts.trials_made:
+                stage += 1
+                if attempts.best_trial >= alone:
+                    kept = attempts.reached if parameters.keep == "postures" else attempts.targets
+                    centre = kept[explored]
+            part, noise = np.split(noise, [ends - attempts.trials_made])
+            targets[: len(part), explored] = centre + part
+            attempts.by_targets(chosen, targets[: min(len(part), attempts.left)])
+    return attempts, attempts.trials_made - alone
+
+
+def _follows(session: Session, hands: str) -> NDArray[np.bool_]:
+    """Return True for the joints of the base and of the arm that is to hit, goal by goal, shape
+    ``(G, dof)``."""
+    joints = np.ones((len(hands), session.dof), dtype=np.bool_)
+    for goal, letter in enumerate(hands):
+        for hand in HANDS:
+            joints[goal, session.joints(hand)] = hand[0].upper() == letter
+    return joints
 
 
 class RandomSearchHands(Method):
@@ -70,6 +128,7 @@ class RandomSearchHands(Method):
         "control of a many parameter system. Automation and Remote Control."
     )
     information = OPTIMISER_INFORMATION
+    later = frozenset({"stages", "keep", "idle_arm"})
     Parameters = RandomSearchHandsParameters
 
     def most_together(self) -> int:
@@ -83,16 +142,17 @@ class RandomSearchHands(Method):
         sequences, left = sequences_of(session), session.trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
         shares = [trials * n // len(sequences) for n in range(len(sequences) + 1)]
-        problems: list[Objective] = []
+        completed: list[Attempts] = []
         with session.solving():
             for n, hands in enumerate(sequences):
-                with suppress(BudgetError, MethodError):
-                    share = shares[n + 1] - shares[n]
-                    problems.append(draw_trials(session, hands, parameters.sigma, share))
-        if not problems:
+                share = {"trials": shares[n + 1] - shares[n]}
+                with suppress(MethodError):
+                    of_share = parameters.model_copy(update=share)
+                    completed.append(draw_trials(session, hands, of_share)[0])
+        if not completed:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
-        best = min(problems, key=lambda problem: problem.best_cost)
-        return Result(best.solution, {"sequences": len(problems)})
+        best = max(completed, key=lambda attempts: attempts.reward)
+        return Result(best.solution, {"sequences": len(completed)})
 
 
 class RandomSearch(RandomSearchHands):
@@ -112,11 +172,8 @@ class RandomSearch(RandomSearchHands):
         misses a goal."""
         parameters: RandomSearchParameters = self.parameters
         with session.solving():
-            try:
-                best = draw_trials(session, parameters.hands, parameters.sigma, parameters.trials)
-            except BudgetError:
-                raise MethodError("infeasible", "the budget leaves no trial to make") from None
-        return Result(best.solution, {"evaluations": best.evaluations})
+            best, evaluations = draw_trials(session, parameters.hands, parameters)
+        return Result(best.solution, {"evaluations": evaluations})
 
 
 METHODS: tuple[type[Method], ...] = (RandomSearch, RandomSearchHands)

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from coartic.learner.learning import TRIALS
 from coartic.method import MethodError, Parameters, Result, Session
-from coartic.motion.solution import movements_of
+from coartic.motion.solution import Movement, movements_of
 from coartic.motion.trial import Trials
 from coartic.optimisers import explored_joints
 from coartic.robot import Array
@@ -33,26 +33,31 @@ class UninformedParameters(Parameters):
 class Attempts:
     """The physical trials of one run: makes them and remembers the best."""
 
-    def __init__(self, session: Session, parameters: UninformedParameters) -> None:
+    def __init__(self, session: Session, trials: int) -> None:
         self._session = session
         self.explored = np.tile(explored_joints(session), (session.goals_count, 1))
         """Joints that are explored at each goal, shape ``(G, dof)``."""
         left = session.trials_left
-        self.left = parameters.trials if left is None else min(parameters.trials, left)
-        """Trials left."""
+        self.left = trials if left is None else min(trials, left)
+        """Trials left, of ``trials`` at most."""
         self.trials_made = 0
         self.reward = -math.inf
         """Best reward so far."""
         self.hands = ""
         """Hand sequence of the best trial, empty before the first success."""
-        self._best_trial = -1
-        self._targets: Array = np.empty(0)
+        self.best_trial = -1
+        """Number of the best trial, from 0; -1 before the first success."""
+        self.targets: Array = np.empty(0)
+        """Targets of the best trial, shape ``(G, dof)``."""
+        self.reached: Array = np.empty(0)
+        """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
 
-    def by_correction(self, hands: str) -> Trials:
-        """Make one trial without targets, in which the corrective process alone goes to each goal,
-        with the hands of a sequence such as ``"RRLR"``; return its results (:meth:`by_targets`)."""
-        shape = (1, self._session.goals_count, self._session.dof)
-        return self.by_targets(hands, np.full(shape, np.nan))
+    def by_correction(self, *hands: str) -> Trials:
+        """Make a trial without targets, in which the corrective process alone goes to each goal,
+        with each of some hand sequences such as ``"RRLR"``; return the results
+        (:meth:`by_targets`)."""
+        shape = (len(hands), self._session.goals_count, self._session.dof)
+        return self.by_targets([*hands], np.full(shape, np.nan))
 
     def around(self, hands: str, values: Array) -> Trials:
         """Make N trials with one hand sequence, and return their results. ``values`` ``(N, n)`` are
@@ -75,10 +80,16 @@ class Attempts:
         if rewards[best] > self.reward:
             self.reward = float(rewards[best])
             self.hands = hands if isinstance(hands, str) else hands[best]
-            self._best_trial, self._targets = self.trials_made + best, trials.targets[best]
+            self.best_trial = self.trials_made + best
+            self.targets, self.reached = trials.targets[best], trials.reached[best]
         self.trials_made += len(rewards)
         self.left -= len(rewards)
         return trials
+
+    @property
+    def solution(self) -> tuple[Movement, ...]:
+        """The movements of the best trial."""
+        return movements_of(self.hands, self.targets)
 
     def result(self, **details: Any) -> Result:
         """Return the movements of the best trial, and as details its number (from 0) and
@@ -92,5 +103,4 @@ class Attempts:
                 "no trial hit every goal",
                 details,
             )
-        movements = movements_of(self.hands, self._targets)
-        return Result(movements, {"best_trial": self._best_trial, **details})
+        return Result(self.solution, {"best_trial": self.best_trial, **details})

@@ -1,6 +1,7 @@
 """Signatures on constructed cases whose right answer is known."""
 
 import itertools
+import json
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ from coartic.analysis.control import (
     mean_excess,
     with_control,
 )
-from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH
+from coartic.analysis.methods import EC1, EC3, EC4, RANDOM_SEARCH
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.signatures import context_tests, measures
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
@@ -28,7 +29,7 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.hypotheses import exchange_test
 from coartic.benchmarks.planning import plan_suite
 from coartic.robot import HANDS
 from tests.support.made_up import runs_of, study_of_solutions
@@ -358,7 +359,7 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_p
     }
     assert mean_excess(study, "first", task.name, EC4) == 5 - 135
     table = TABLES["signatures"](study).loc[f"{task.name} {EC4} RRRR"]
-    test = bootstrap_test([5.0] * 18, [2.0, 3.0, 400.0])
+    test = exchange_test([5.0] * 18, [2.0, 3.0, 400.0])
     assert (table["first"], table.first_control, table.first_p) == (5, 135, test.p)
     assert (table.runs, table.control_runs) == (18, 3)
     (tmp_path / "control.toml").write_text(control_suite(study), "utf-8")
@@ -366,6 +367,41 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_p
     cell = job.cell
     assert (cell.task.name, cell.method.name, len(job.numbers)) == (task.name, RANDOM_SEARCH, 20)
     assert (cell.parameters["hands"], cell.parameters["trials"]) == ("RLRR", 10)
+
+
+@pytest.mark.parametrize("has_its_own", [True, False])
+def test_the_control_of_ec3_has_an_idle_arm_that_keeps_still(tmp_path, has_its_own):
+    """Where a folder has it; or else the control that it has, and the table says which it was."""
+    task = load_task("two-armed-2")
+    searches = {"": [2, 3, 4], "stages=10": [6, 6, 6]}
+    searches |= {"idle_arm=False": [1, 1, 1]} if has_its_own else {}
+    cells = [shifted(task, label, 5, hands="RRRR") for label in (EC3, EC4)]
+    rows = [
+        run for label in (EC3, EC4) for run in runs_of(task.name, label, [-300] * 3, hands="RRRR")
+    ]
+    for setting, first in searches.items():
+        cells.append(shifted(task, f"{RANDOM_SEARCH} {setting}".strip(), first, hands="RRRR"))
+        values = {"stages": 1, "idle_arm": True} | {
+            name: json.loads(value.lower())
+            for name, _, value in [setting.partition("=")] if value
+        }  # fmt: skip
+        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 3, setting=setting, hands="RRRR",
+                        parameters=json.dumps(values))  # fmt: skip
+    study = study_of_solutions(cells, rows)
+    of_ec3 = [1, 1, 1] if has_its_own else [2, 3, 4]
+    for label, expected in ((EC3, of_ec3), (EC4, [2, 3, 4])):
+        ((_, control),) = with_control(study, "first", task.name, label).values()
+        assert control.tolist() == expected
+    table = TABLES["signatures"](study).control_idle_arm
+    idle = "still" if has_its_own else "with noise"
+    assert table[f"{task.name} {EC3} RRRR"] == idle
+    assert table[f"{task.name} {EC4} RRRR"] == "with noise"
+    missing = control_suite(study)
+    assert missing.count("idle_arm = false") == missing.count("[[blocks]]") == (not has_its_own)
+    if missing:
+        (tmp_path / "control.toml").write_text(missing, "utf-8")
+        (job,) = plan_suite(tmp_path / "control.toml")
+        assert not job.cell.parameters["idle_arm"]
 
 
 def test_p_of_shared_goals_is_corrected_by_method():

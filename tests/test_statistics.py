@@ -14,49 +14,79 @@ from coartic.analysis.statistics import hypotheses
 from coartic.estimates import LEVEL
 
 
-@pytest.mark.parametrize(
-    ("a", "b"), [([1, 2, 6], [0, 1, 3]), ([1, 2, 6, 6], [3.5]), ([-3, -2], [-2, -5, -9])]
-)
-@pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
-def test_bootstrap_test_against_all_resamples(a, b, alternative):
-    """One value on the second side is a known number: a test of one sample."""
-    other = b[0] if len(b) == 1 else b
-    one = np.array(a) - np.mean(a)
-    two = np.array(b) - np.mean(b)
+def studentised(x, y=(0.0,)):
+    """The difference of means over its standard error, exact for a known number; infinite without
+    spread, 0 without difference."""
+    d = np.mean(x) - np.mean(y)
+    error = math.sqrt(sum(np.var(of, ddof=1) / len(of) for of in (x, y) if len(of) > 1))
+    return 0.0 if abs(d) < 1e-12 else math.copysign(1e9, d) if error < 1e-9 else d / error
 
-    def t(x, y):
-        d = np.mean(x) - np.mean(y)
-        error = math.sqrt(np.var(x, ddof=1) / len(x) + (np.var(y, ddof=1) / len(y) if len(y) > 1
-                                                        else 0))  # fmt: skip
-        return 0.0 if abs(d) < 1e-12 else math.copysign(1e9, d) if error < 1e-9 else d / error
 
-    null = [
-        t(x, y)
-        for x in itertools.product(one, repeat=len(a))
-        for y in itertools.product(two, repeat=len(b))
-    ]
-    observed = t(a, b)
+def share_as_extreme(null, observed, alternative):
     if alternative == "two-sided":
         null, observed = np.abs(null), abs(observed)
     sign = -1 if alternative == "less" else 1
-    expected = np.mean(sign * np.array(null) >= sign * observed - 1e-9)
-    test = hypotheses.bootstrap_test(a, other, alternative)
+    return np.mean(sign * np.array(null) >= sign * observed - 1e-9)
+
+
+@pytest.mark.parametrize(("a", "bound"), [([1, 2, 6, 6], 3.5), ([-3, -2, -7], -5)])
+@pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
+def test_bootstrap_test_against_all_resamples(a, bound, alternative):
+    null = [studentised(x) for x in itertools.product(np.array(a) - np.mean(a), repeat=len(a))]
+    expected = share_as_extreme(null, studentised(np.array(a) - bound), alternative)
+    test = hypotheses.bootstrap_test(a, bound, alternative)
     assert test.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        ([1, 2, 6], [0, 1, 3]), ([-3, -2, -2], [-2, -5, -9, -9, 1]), ([0, 0, 9, 9, 9], [0, 0, 9]),
+        ([5.1] * 3, [5.2] * 4), ([1, 2, 3, 4, 5, 6, 7], [1, 1, 1, 1, 1, 1, 20]),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
+@pytest.mark.parametrize("resamples", [9_999, 15])
+def test_exchange_test_against_all_exchanges(a, b, alternative, resamples):
+    """With fewer resamples than exchanges, some of these are drawn."""
+    pool, null = np.array([*a, *b], float), []
+    for chosen in itertools.combinations(range(len(pool)), len(a)):
+        others = np.delete(np.arange(len(pool)), chosen)
+        null.append(studentised(pool[[*chosen]], pool[others]))
+    expected = share_as_extreme(null, studentised(a, b), alternative)
+    test = hypotheses.exchange_test(a, b, alternative, resamples=resamples)
+    assert test.value == pytest.approx(np.mean(a) - np.mean(b))
+    if resamples == 15:
+        assert test.p == pytest.approx((1 + 15 * expected) / 16, abs=4 * math.sqrt(0.25 / 15))
+        assert test.p >= 1 / 16
+    else:
+        assert test.p == pytest.approx(expected)
+        assert test.resamples == 0
+
+
+def test_rare_levels_do_not_reject():
+    """2 of 20 runs are a tick better than 20 equal runs: Fisher's exact test has p = 0.24."""
+    two_of_20, equal = [-291] * 2 + [-292] * 18, [-292] * 20
+    exact = stats.fisher_exact([[2, 18], [0, 20]], "greater").pvalue
+    assert hypotheses.exchange_test(two_of_20, equal).p == pytest.approx(exact, abs=0.02)
 
 
 def test_smallest_p():
     """No resample comes near: p is that of the sample seen; tests of few values cannot reject."""
     far = 1000 + np.arange(8.0)
     assert hypotheses.bootstrap_test(far, 0, resamples=99).p == 0.01
-    for first, second, alternative, least in (
-        (far[:4], 0, "greater", 1 / 16),  # by signs
-        (far[:4], 0, "two-sided", 2 / 16),
-        (far[:3], far[3:6], "less", 1 / 20),  # by exchange
-        (far[:3], far[3:6], "two-sided", 2 / 20),
-        (far, far, "greater", 1 / 100),  # by the number of resamples
-    ):
-        test = hypotheses.bootstrap_test(first, second, alternative, resamples=99)
+    for alternative, least in (("greater", 1 / 16), ("two-sided", 2 / 16)):  # by signs
+        test = hypotheses.bootstrap_test(far[:4], 0, alternative, resamples=99)
         assert test.least_p == pytest.approx(least)
+    for first, second, alternative, least in (
+        (far[:3], far[3:6], "less", 1 / 20),
+        (far[:3], far[3:6], "two-sided", 2 / 20),
+        (far, 2 * far, "less", 1 / 100),  # by the number of resamples
+    ):
+        test = hypotheses.exchange_test(first, second, alternative, resamples=99)
+        assert test.p == test.least_p == pytest.approx(least)
+    # Without equal numbers no exchange is the mirror of another.
+    assert hypotheses.exchange_test(far[:3], far[3:7], "two-sided").least_p == 1 / 35
 
 
 @pytest.mark.parametrize(
@@ -103,19 +133,17 @@ def test_degenerate_samples():
 
 
 def test_tests_that_cannot_be_made():
-    assert math.isnan(hypotheses.bootstrap_test([1.0], [2.0, 3.0]).p)
+    assert math.isnan(hypotheses.exchange_test([1.0, 2.0], [2.0, 3.0, 4.0]).p)  # too few
     assert math.isnan(hypotheses.bootstrap_test([2.0, 2.0], 2.0).p)
-    assert math.isnan(hypotheses.bootstrap_test([0.1] * 3, [0.1] * 4).p)  # no mean of 0.1 is 0.1
-    one_constant = hypotheses.bootstrap_test([5.0, 6, 7], [1.0] * 3)
-    assert 0 < one_constant.p < 0.2
+    assert math.isnan(hypotheses.exchange_test([0.1] * 3, [0.1] * 4).p)  # no mean of 0.1 is 0.1
 
 
 @pytest.mark.parametrize(("alternative", "share"), [("greater", 1), ("two-sided", 2)])
 def test_without_spread_it_is_an_exact_test(alternative, share):
-    """By signs of three values, all alike; by exchange of two and three."""
+    """By signs of three values, all alike; by exchange of three and three."""
     assert hypotheses.bootstrap_test([2.0] * 3, 1.0, alternative).p == share / 8
-    assert hypotheses.bootstrap_test([2.0] * 3, [1.0] * 2, alternative).p == share / 10
-    assert hypotheses.bootstrap_test([2.0] * 3, [1.0] * 2, "less").p == 1
+    assert hypotheses.exchange_test([2.0] * 3, [1.0] * 3, alternative).p == share / 20
+    assert hypotheses.exchange_test([2.0] * 3, [1.0] * 3, "less").p == 1
 
 
 @pytest.mark.parametrize("values", [[], [[1.0]], [1.0, math.nan], [math.inf]])
@@ -186,7 +214,7 @@ def right_of_rewards(rng, draw, mean):
         holds(statistics.difference_of_means(a, b, **few), 0),
         holds(statistics.mean(a - b, **few), 0),
         hypotheses.bootstrap_test(a, mean, **few).p > LEVEL,
-        hypotheses.bootstrap_test(a, b, **few).p > LEVEL,
+        hypotheses.exchange_test(a, b, **few).p > LEVEL,
     ]
 
 

@@ -54,7 +54,7 @@ SECOND_FOR_THE_RIGHT = tiny_task(
 def one_by_one(task, seed, parameters):
     """Hill climbing as it is defined: draw, make one trial, draw again."""
     session = Session(task, seed, OPTIMISER_INFORMATION)
-    attempts, rng = Attempts(session, parameters), session.rng
+    attempts, rng = Attempts(session, parameters.trials), session.rng
     letters = [hand[0].upper() for hand in session.hands]
     centres, failed, hands = {}, set(), task.initial_hands
 

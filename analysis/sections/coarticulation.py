@@ -14,7 +14,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
-from coartic.analysis.control import contexts_of_control, selects, with_control
+from coartic.analysis.control import (
+    contexts_of_control,
+    control_of,
+    explores_idle_arm,
+    selects,
+    with_control,
+)
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.method_frame import headline_methods
@@ -22,7 +28,7 @@ from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.statistics.hypotheses import exchange_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
 from coartic.analysis.words import number
@@ -100,6 +106,7 @@ def list_contexts(study: Study) -> Rows:
 @table(
     "Signatures of coarticulation, means over runs, next to random search",
     "task; method; hands; runs; control_runs: runs of random search; "
+    "control_idle_arm: idle arm in random search; "
     + "; ".join(
         f"{column}[]: {words} .{digits}; {column}_control: random search .{digits}; "
         f"{column}_difference[]: -; {column}_p: p .p; {column}_control_runs: -"
@@ -117,6 +124,7 @@ def list_signatures(study: Study) -> Rows:
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
     the choice of hands (``hands`` empty). Means over runs; p is one-tailed and uncorrected.
+    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
@@ -133,10 +141,14 @@ def list_signatures(study: Study) -> Rows:
                     row |= {
                         f"{column}_control": control.mean(),
                         **difference_of_means(values, control).columns(f"{column}_difference"),
-                        f"{column}_p": bootstrap_test(values, control).p,
+                        f"{column}_p": exchange_test(values, control).p,
                     }
         for hands, row in rows.items():
             key = " ".join(filter(None, (name, label, hands)))
+            search = control_of(study, name, label, hands) if selects(study, label) else ""
+            if search and len(study.tasks[name].hands) > 1:
+                explored = explores_idle_arm(study, name, search)
+                row["control_idle_arm"] = "with noise" if explored else "still"
             yield key, of_cell | row | {"hands": hands}
 
 

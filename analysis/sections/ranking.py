@@ -27,7 +27,7 @@ from coartic.analysis.standings import (
     shown_name,
     solved_tasks,
 )
-from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.statistics.hypotheses import bootstrap_test, exchange_test, holm
 from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.analysis.words import capital, interval, marked, number
@@ -65,8 +65,11 @@ def list_against_learner(study: Study) -> Rows:
                 solved(each).reward.to_numpy(np.float64) for each in (runs, learner)
             )
             if len(rewards) == len(runs) and len(learned) == len(learner):
-                exact = rewards if method.stochastic else float(rewards[0])
-                tests.append(bootstrap_test(learned, exact, "two-sided"))
+                tests.append(
+                    exchange_test(learned, rewards, "two-sided")
+                    if method.stochastic
+                    else bootstrap_test(learned, float(rewards[0]), "two-sided")
+                )
                 row: Row = {"task": marked(task), "method": label, "runs": len(runs)}
                 row |= {"reward": rewards.mean(), "learner": learned.mean()}
                 cells.append((name, row | run_ids(runs, learner)))

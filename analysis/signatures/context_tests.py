@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coartic.analysis.statistics.hypotheses import drawn_rows
 from coartic.estimates import RESAMPLES, Resamples, centred, slices
 from coartic.internal.arguments import checked_arguments
 from coartic.robot import Array
@@ -109,7 +109,7 @@ def permutation_p(
     null = []
     for rows in slices(resamples if every is None else len(every), IN_MEMORY):
         size = rows.stop - rows.start
-        chosen = _drawn_rows(runs, len(first), size, rng) if every is None else every[rows]
+        chosen = drawn_rows(runs, len(first), size, rng) if every is None else every[rows]
         # Weights that give the first group's mean less the second's.
         weights = np.full((size, runs), -1 / len(second))
         np.put_along_axis(weights, chosen, 1 / len(first), axis=1)
@@ -118,11 +118,6 @@ def permutation_p(
     reached = float((np.concatenate(null) >= np.linalg.norm(observed) * (1 - 1e-9)).sum())
     # Where divisions are drawn, the observed one counts as one more (Davison & Hinkley 1997).
     return reached / len(every) if every is not None else (1 + reached) / (1 + resamples)
-
-
-def _drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Draw ``chosen`` of ``runs`` without replacement, ``size`` times, shape ``(size, chosen)``."""
-    return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
 
 
 def smallest_p(first: int, second: int, resamples: Resamples = RESAMPLES) -> float:
@@ -185,7 +180,7 @@ def beyond_p(
         of_method, of_other = [], []
         for pool, runs in zip(pools, method, strict=True):
             ours = len(runs)
-            chosen = _drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
+            chosen = drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
             total = pool[chosen].sum(axis=1)
             of_method.append(total / ours)
             of_other.append((pool.sum(axis=0) - total) / (len(pool) - ours))

@@ -1,6 +1,7 @@
 """Tests of means and shares, and Holm's correction for several tests.
 
-Means have bootstrap tests, shares exact binomial tests; permutation tests of postures are in
+Two means have tests by exchange, a mean against a number the bootstrap, shares exact binomial
+tests; permutation tests of postures are in
 :mod:`coartic.analysis.signatures`. Samples, exact numbers and seeds are as in
 :mod:`coartic.estimates`.
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import combinations, islice
 from typing import Annotated, Literal
 
 import numpy as np
@@ -21,6 +23,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.estimates import (
+    FEWEST,
     IN_CACHE,
     NEGLIGIBLE,
     RESAMPLES,
@@ -43,83 +46,159 @@ _Share = Annotated[float, 0.0, 1.0]
 
 @checked_arguments
 def bootstrap_test(
-    first: ArrayLike,
-    second: ArrayLike | float,
+    values: ArrayLike,
+    bound: float,
     alternative: Alternative = "greater",
     *,
     resamples: Resamples = RESAMPLES,
 ) -> Estimate:
-    """Test the difference of two means, or of a mean and a number, by the bootstrap. The value of
-    the estimate, which has no interval, is the mean of ``first`` less the mean of ``second`` (or
-    less the number). Raises ValueError for an empty sample, and for NaN or infinity.
+    """Test the difference of a mean and a number by the bootstrap. The value of the estimate, which
+    has no interval, is the mean of ``values`` less ``bound``. Raises ValueError for an empty
+    sample, and for NaN or infinity.
 
-    Algorithm 16.2 of Efron & Tibshirani (1993), the book that the paper cites: every sample is
-    shifted to the mean 0 and resampled, and the statistic is the difference of means over its
-    standard error, with a variance for each sample. Against a number, their one-sample test
-    (section 16.4). Unlike in the book, p = (1 + resamples at least as extreme) / (1 + resamples),
-    never 0 (Davison & Hinkley 1997): the smallest p is 0.0001 by default. ``"greater"``:
-    one-tailed, the mean of ``first`` is higher.
+    Efron & Tibshirani (1993), section 16.4: the sample is shifted to the mean 0 and resampled, and
+    the statistic is the mean over its standard error. Unlike in the book, p = (1 + resamples at
+    least as extreme) / (1 + resamples), never 0 (Davison & Hinkley 1997): the smallest p is 0.0001
+    by default. ``"greater"``: one-tailed, the mean of ``values`` is higher.
 
-    Without spread in any sample, p is the p-value of the exact test of as many values, by signs or
-    by exchange. p is NaN with fewer than two values in a sample, or without spread and difference.
+    Without spread, p is the p-value of the exact test of as many values, by signs. p is NaN with
+    fewer than two values, or without spread and difference.
     """
-    samples: tuple[Array, ...] = vector(first), vector(np.atleast_1d(second))
-    if np.ndim(second) == 0:  # a number without error
-        samples = (samples[0] - samples[1],)
-    difference = float(samples[0].mean() - sum(other.mean() for other in samples[1:]))
-    n = tuple(map(len, samples))
-    shifted = list(map(centred, samples))
-    size = max(np.abs(values).max() for values in shifted)
-    # The smallest p of an exact test of as many values, by signs or by exchange, is a bound.
+    sample = vector(values) - vector([bound])[0]
+    difference, n, shifted = float(sample.mean()), len(sample), centred(sample)
+    size = float(np.abs(shifted).max())
+    # The smallest p of an exact test of as many values, by signs, is a bound.
     tails = 2 if alternative == "two-sided" else 1
-    ways = math.comb(sum(n), n[0]) if len(n) > 1 else 2 ** n[0]
-    least = max(tails / ways, 1 / (1 + resamples))
-    differs = abs(difference) > NEGLIGIBLE * np.abs(first).max()
-    if min(n) < 2 or not (size or differs):
-        return Estimate(difference, n=n)
+    least = max(tails / 2**n, 1 / (1 + resamples))
+    differs = abs(difference) > NEGLIGIBLE * np.abs(vector(values)).max()
+    if n < 2 or not (size or differs):
+        return Estimate(difference, n=(n,))
     if not size:
         as_asked = tails == 2 or (difference > 0) == (alternative == "greater")
         p = least if as_asked else 1.0
-        return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
-    observed = difference / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
-    sums, variances = np.zeros(resamples), np.zeros(resamples)
-    batches = (_kept_places if sum(n) * resamples <= _MOST_PLACES else _places)(n, resamples)
-    for sample, part, places in batches:
-        drawn = shifted[sample][places]
-        means = drawn.mean(axis=0, keepdims=True)
-        sums[part] += (1, -1)[sample] * means[0]
-        variances[part] += drawn.var(axis=0, ddof=1, mean=means) / n[sample]
-    # Rounding is neither spread nor difference: resamples of equal values, equal means.
-    sums[np.abs(sums) < NEGLIGIBLE * size] = 0.0
-    variances[variances < (NEGLIGIBLE * size) ** 2] = 0.0
+        return Estimate(difference, p=p, n=(n,), resamples=resamples, least_p=least)
+    means, variances = np.empty(resamples), np.empty(resamples)
+    for part, places in (_kept_places if n * resamples <= _MOST_PLACES else _places)(n, resamples):
+        drawn = shifted[places]
+        mean = drawn.mean(axis=0, keepdims=True)
+        means[part], variances[part] = mean[0], drawn.var(axis=0, ddof=1, mean=mean) / n
+    observed = difference / math.sqrt(shifted.var(ddof=1) / n)
+    extreme = _extreme(_studentised(means, variances, size), observed, alternative)
+    p = float(1 + extreme) / (1 + resamples)
+    return Estimate(difference, p=p, n=(n,), resamples=resamples, least_p=least)
+
+
+@checked_arguments
+def exchange_test(
+    first: ArrayLike,
+    second: ArrayLike,
+    alternative: Alternative = "greater",
+    *,
+    resamples: Resamples = RESAMPLES,
+) -> Estimate:
+    """Test the difference of two means by exchange of the values' labels. The value of the
+    estimate, which has no interval, is the mean of ``first`` less the mean of ``second``. Raises
+    ValueError for an empty sample, and for NaN or infinity.
+
+    The statistic is the difference of means over its standard error, with a variance for each
+    sample, so that the test holds for samples of unequal spread, too (A. Janssen 1997, Statistics
+    & Probability Letters 36); without spread it is infinite or 0. p is exact where all exchanges
+    are no more than ``resamples``, or else (1 + exchanges at least as extreme) / (1 + resamples).
+    ``"greater"``: one-tailed, the mean of ``first`` is higher; two-sided by the absolute value.
+
+    p is NaN with fewer than three values in a sample, and if all values are equal.
+    """
+    samples = vector(first), vector(second)
+    n, m = map(len, samples)
+    pool = centred(np.concatenate(samples))
+    value = float(samples[0].mean() - samples[1].mean())
+    if min(n, m) < FEWEST or not pool.any():
+        return Estimate(value, n=(n, m))
+    ways = math.comb(n + m, n)
+    exact = ways <= resamples
+    chosen = ways if exact else resamples
+    tails = 2 if alternative == "two-sided" and n == m else 1
+    least = max(tails / ways, 0.0 if exact else 1 / (1 + resamples))
+    extreme = 0
+    observed = _statistics(pool, np.arange(n)[None], n)[0]
+    kept = chosen * min(n, m) <= _MOST_PLACES
+    for places in (_kept_exchanges if kept else _exchanges)(n, m, chosen, exact):
+        extreme += _extreme(_statistics(pool, places, n), observed, alternative)
+    p = extreme / ways if exact else (1 + extreme) / (1 + resamples)
+    return Estimate(value, p=p, n=(n, m), resamples=0 if exact else resamples, least_p=least)
+
+
+def _statistics(pool: Array, places: NDArray[np.intp], n: int) -> Array:
+    """Return the difference of means over its standard error for each row of ``places``: in the
+    pool the places of the first sample, of ``n`` values, or of the second if that is smaller."""
+    few = places.shape[1]
+    values = pool[places]
+    sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
+    mean, other = sums / few, (pool.sum() - sums) / (len(pool) - few)
+    variances = sum(
+        (total - size * centre**2).clip(0) / (size * (size - 1))
+        for total, size, centre in (
+            (squares, few, mean),
+            ((pool**2).sum() - squares, len(pool) - few, other),
+        )
+    )
+    size = float(np.abs(pool).max())
+    variances[variances < 1e-12 * size**2] = 0.0  # sums of squares round
+    return _studentised((mean - other) * (1 if few == n else -1), variances, size)
+
+
+def _studentised(differences: Array, variances: Array, size: float) -> Array:
+    """Return differences over the roots of variances, 0 for no difference and infinite without
+    variance. Rounding is neither, of values of this ``size``."""
+    differences = np.where(np.abs(differences) < NEGLIGIBLE * size, 0.0, differences)
+    variances = np.where(variances < (NEGLIGIBLE * size) ** 2, 0.0, variances)
     with np.errstate(divide="ignore", invalid="ignore"):
-        null = np.where(sums == 0, 0.0, sums / np.sqrt(variances))
+        return np.where(differences == 0, 0.0, differences / np.sqrt(variances))
+
+
+def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
+    """Return how many statistics are at least as extreme as the observed one."""
     if alternative == "two-sided":
         null, observed = np.abs(null), abs(observed)
     extreme = null <= observed if alternative == "less" else null >= observed
-    extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
-    p = float(1 + extreme.sum()) / (1 + resamples)
-    return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
+    return int((extreme | np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)).sum())
 
 
-def _places(
-    sizes: tuple[int, ...], resamples: int
-) -> Iterator[tuple[int, slice, NDArray[np.int64]]]:
-    """Yield the number of a sample, a slice of the resamples, and the places of the values that
-    these draw, shape ``(size, length of the slice)``. Equal arguments give equal places."""
+def _places(size: int, resamples: int) -> Iterator[tuple[slice, NDArray[np.int64]]]:
+    """Yield a slice of the resamples and the places of the values that these draw, shape ``(size,
+    length of the slice)``. Equal arguments give equal places."""
     rng = np.random.default_rng(SEED)
-    for sample, size in enumerate(sizes):
-        for part in slices(resamples, max(1, IN_CACHE // size)):
-            places = rng.integers(size, size=(part.stop - part.start, size))
-            yield sample, part, np.ascontiguousarray(places.T)
+    for part in slices(resamples, max(1, IN_CACHE // size)):
+        places = rng.integers(size, size=(part.stop - part.start, size))
+        yield part, np.ascontiguousarray(places.T)
 
 
 @lru_cache(maxsize=16)  # most samples have as many values as another
-def _kept_places(
-    sizes: tuple[int, ...], resamples: int
-) -> list[tuple[int, slice, NDArray[np.int64]]]:
-    """Return all of :func:`_places`, kept for further samples of these sizes: do not change it."""
-    return [*_places(sizes, resamples)]
+def _kept_places(size: int, resamples: int) -> list[tuple[slice, NDArray[np.int64]]]:
+    """Return all of :func:`_places`, kept for further samples of the size: do not change it."""
+    return [*_places(size, resamples)]
+
+
+def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Draw ``chosen`` of ``runs`` without replacement, ``size`` times, shape ``(size, chosen)``."""
+    return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
+
+
+def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.intp]]:
+    """Yield parts of ``count`` exchanges, all of them if ``exact``: in a pool of ``n + m`` values
+    the places of the sample of ``n`` values, or of the other if that is smaller, a row for each.
+    Equal arguments give equal places."""
+    rng, few = np.random.default_rng(SEED), n if n <= m else m
+    every = combinations(range(n + m), few)
+    for part in slices(count, max(1, IN_CACHE // (n + m))):
+        size = part.stop - part.start
+        yield np.array([*islice(every, size)]) if exact else drawn_rows(n + m, few, size, rng)
+
+
+@lru_cache(maxsize=16)
+def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.intp]]:
+    """Return all of :func:`_exchanges`, kept for further samples: do not change it."""
+    return [*_exchanges(n, m, count, exact)]
 
 
 @checked_arguments

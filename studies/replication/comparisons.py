@@ -1,16 +1,17 @@
 """Comparisons of means, on which most claims rest, and their words."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from published import Summary
 
 from coartic.analysis import interval, mean, number
 from coartic.analysis.judging import Finding
-from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.hypotheses import bootstrap_test, exchange_test
 from coartic.estimates import Estimate, difference_of_means
 
 
@@ -67,14 +68,13 @@ class Higher(NamedTuple):
 
 
 def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ()) -> Finding:
-    """Test that all claimed orders of means hold, by one-tailed bootstrap tests.
+    """Test that all claimed orders of means hold, by one-tailed tests.
 
     The evidence also has the values of ``shown``, and the rewards that the paper publishes.
     """
-    tests, parts, before = [], [], None
+    pairs, parts, before = [], [], None
     for first, second, by in comparisons:
-        other = 0.0 if second is None else second.numbers
-        tests.append(bootstrap_test(first.numbers - by, other))
+        pairs.append((first.numbers - by, 0.0 if second is None else second.numbers))
         words = first.name if first is before else f"{first.name}: {first}"  # said once
         if second is not None:
             words += f" against {second} ({second.who})"
@@ -87,7 +87,7 @@ def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ())
         parts.append((first.quantity, words))
         before = first
     parts += [(values.quantity, f"{values.name}: {values}") for values in shown]
-    return all_positive(tests, parts)
+    return all_positive(pairs, parts)
 
 
 def said(published: Summary) -> str:
@@ -95,15 +95,33 @@ def said(published: Summary) -> str:
     return f"{number(published.mean)}{' (derived)' * published.derived}"
 
 
-def all_positive(tests: Iterable[Estimate], parts: Iterable[tuple[str, str]]) -> Finding:
-    """Return the finding that all tests point as claimed.
+def difference_test(first, other, alternative) -> Estimate:
+    """Test the difference of the mean of ``first`` and of ``other``, values or a number."""
+    if np.ndim(other):
+        return exchange_test(first, other, alternative)
+    return bootstrap_test(first, float(other), alternative)
+
+
+def all_positive(
+    pairs: Iterable[tuple[np.ndarray, ArrayLike]], parts: Iterable[tuple[str, str]]
+) -> Finding:
+    """Return the finding that in all pairs the mean of the first values exceeds the second's mean,
+    or number.
 
     ``parts`` of the evidence are pairs of a measured quantity and words, grouped by quantity.
     """
-    tests = tuple(tests)
+    pairs = list(pairs)
+    tests = tuple(difference_test(*pair, "greater") for pair in pairs)
+    less = (difference_test(*pair, "less") for pair in pairs)
+    against = tuple(replace(test, value=-test.value) for test in less)
+    evidence = in_words(parts)
+    return Finding(all(test.value > 0 for test in tests), evidence, tests, against)
+
+
+def in_words(parts: Iterable[tuple[str, str]]) -> str:
+    """Return parts of the evidence, pairs of a measured quantity and words, by quantity."""
     seen = pd.DataFrame(parts, columns=["quantity", "words"]).groupby("quantity", sort=False)
-    evidence = ". ".join(
+    return ". ".join(
         (f"{quantity[:1].upper()}{quantity[1:]}: " if quantity else "") + "; ".join(words)
         for quantity, words in seen.words
     )
-    return Finding(all(test.value > 0 for test in tests), evidence, tests)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from statistics import median
 
-from comparisons import Higher, all_positive, listed, written
+from comparisons import Higher, in_words, listed, written
 from performance import no_trial_fails
 from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
@@ -48,7 +48,7 @@ def in_every_family(read, families, comparisons):
     if not findings:
         raise MissingError(f"fewer than {FEWEST} instances of {listed(few)} can be judged")
     finding = all_of(*findings)
-    evidence = all_positive(finding.tests, parts).evidence
+    evidence = in_words(parts)
     if few:
         seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
         return Finding(None, seen)

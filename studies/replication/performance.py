@@ -14,7 +14,6 @@ from reader import CELLS_OF_ONE_ARM, CELLS_OF_TWO_ARMS, EC1, EC3, EC4, MARGINS, 
 from coartic.analysis import number
 from coartic.analysis.judging import Finding
 from coartic.analysis.signatures.two_contexts import movable
-from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.estimates import SEED
 
 LEAST_DISPLACEMENT = "trajectory-optimisation/squared-displacement"
@@ -115,7 +114,7 @@ def corrected_less_later(read, cells):
     Trial 0 does not count: all its movements are corrective by construction.
     """
     words = "share of movements that are corrected, in the"
-    tests, parts, learned = [], [], []
+    pairs, parts, learned = [], [], []
     for task, label in cells:
         runs, goals = read.runs(task, label), len(read.task(task).goals)
         movements = (runs.trials - 1) * goals / TENTHS
@@ -129,10 +128,10 @@ def corrected_less_later(read, cells):
                 (runs.solution_corrections / goals, "learned solution"),
             )
         )
-        tests.append(bootstrap_test(early.numbers - late.numbers, 0.0))
+        pairs.append((early.numbers - late.numbers, 0.0))
         parts.append((early.quantity, f"{early.name}: {early}, late {late}"))
         learned.append((last.quantity, f"{last.name}: {last}"))
-    return all_positive(tests, parts + learned)
+    return all_positive(pairs, parts + learned)
 
 
 def resemblance(read, task):
@@ -169,7 +168,8 @@ def some_of(every):
     holds = any(test.value > 0 for test in every.tests)
     if holds:
         best = replace(best, p=min(1.0, best.p * len(every.tests)))
-    return Finding(holds, every.evidence, (best,))
+    contrary = max(every.against, key=lambda test: test.p)
+    return Finding(holds, every.evidence, (best,), (contrary,))
 
 
 def proficiency_rises(read):

@@ -40,10 +40,11 @@ def made(values):
 
 
 def found(holds, *p, against=None, n=20):
-    """A finding of a claim, with tests of these p-values, and of its opposite with others."""
+    """A finding of a claim, with tests of these p-values, and of its opposite with others, by
+    default of the other tails."""
     tests, contrary = (
-        None if each is None else tuple(Estimate(1.0, p=p, n=(n,), resamples=9_999) for p in each)
-        for each in (p, against)
+        tuple(Estimate(1.0, p=each, n=(n,), resamples=9_999) for each in values)
+        for values in (p, [1 - each + 1e-4 for each in p] if against is None else against)
     )
     return Finding(holds, "planted", tests, contrary)
 

@@ -13,7 +13,7 @@ from coartic import corrective_trial, load_task
 from coartic.analysis import judge
 from coartic.analysis.judging import Finding
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.hypotheses import exchange_test
 from tests.support.made_up import found, row, runs_of, study_of, study_of_solutions
 from tests.support.processes import program
 from tests.support.strategies import AS_RELEASED
@@ -207,7 +207,7 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     assert not all_higher([Higher(first, second, by=2)]).holds
     assert finding.evidence.count("t, who: 5.0 [") == 1
     one_of = performance.some_of(all_higher([Higher(second, first), Higher(first, second)]))
-    least = bootstrap_test(first.numbers, second.numbers)
+    least = exchange_test(first.numbers, second.numbers)
     assert one_of.holds
     assert one_of.tests[0].p == pytest.approx(2 * least.p)
 

@@ -1,0 +1,125 @@
+"""Scales, places and what is left at equal gain, of planted cells."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.support.processes import programs
+
+(MEMORY,) = programs("memory", "study")
+STAGES = MEMORY.STAGES
+
+
+def planted(of_stages, learner, families=("aligned", "long"), tasks=6, noise=0.0):
+    """Cells of random search with these values by number of stages, and of the learner; next goal
+    nearer is half the gain. Tasks differ by ``noise``, from which no difference follows."""
+    rows = []
+    rng = np.random.default_rng(0)
+    for family in families:
+        for number in range(tasks):
+            own = noise * rng.normal()
+            cells = [("compared", 0, learner), ("learner", 0, learner)]
+            cells += [(keep, stages, value) for keep in MEMORY.KEEPS
+                      for stages, value in zip(STAGES, of_stages, strict=True)]  # fmt: skip
+            rows += [
+                {"group": family, "task": f"{family}/v1/i{number:03d}", "name": name,
+                 "trials": 10_000, "stages": stages, "gain": value + own, "first": value / 2,
+                 "arm": value / 2, "other arm": value / 100}
+                for name, stages, value in cells
+            ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+RISING = [0.0, 10.0, 20.0, 30.0, 40.0, 41.0, 42.0]
+
+
+def test_a_scale_is_level_where_nothing_exceeds_the_bound():
+    scale = MEMORY.Scale(planted(RISING, 35.0, noise=5.0), "gain", "postures")
+    assert scale.means[30] - scale.means[1] == pytest.approx(40)
+    assert [scale.level(bound) for bound in (0.5, 1.5, 2.5, 13.0, 100.0)] == [1000, 100, 30, 10, 1]
+    assert scale.difference(1000, 1) == pytest.approx((42, 42, 42))
+    assert scale.slopes().to_numpy() == pytest.approx(
+        np.polyfit(np.log10(STAGES), RISING, 1)[0], rel=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("learner", "place", "where"),
+    [
+        (-1.0, 1.0, "below"),
+        (20.0, 4.0, "below"),
+        (35.0, np.sqrt(10 * 30), "below"),
+        (40.5, np.sqrt(30 * 100), "level"),
+        (43.0, np.inf, "level"),
+        (50.0, np.inf, "above"),
+    ],
+)
+def test_the_learner_has_a_place_on_the_scale(learner, place, where):
+    scale = MEMORY.Scale(planted(RISING, learner), "gain", "targets")
+    assert scale.place() == pytest.approx((place,) * 3)
+    assert MEMORY.where(scale, 5.0) == where
+
+
+def test_families_weigh_the_same_whatever_their_tasks():
+    cells = planted(RISING, 0.0)
+    cells.loc[cells.group == "long", "gain"] += 8
+    fewer = cells[~cells.task.isin(["long/v1/i000", "long/v1/i001"])]
+    for each in (cells, fewer):
+        scale = MEMORY.Scale(each, "gain", "postures")
+        assert scale.means["learner"] == pytest.approx(4)
+    assert len(scale) == 10
+
+
+def test_a_spread_between_families_is_no_spread_of_a_difference():
+    cells = planted(RISING, 30.0)
+    more = (cells.group == "long") & (cells.name == "compared")
+    cells.loc[more, "gain"] += 20
+    values = MEMORY.Scale(cells, "gain", "postures").more("learner", 1000)
+    assert values.to_numpy() == pytest.approx(30 + 10 - 42)
+
+
+@pytest.mark.parametrize(
+    ("gain", "arm", "status"),
+    [
+        (5.0, 1.0, "compared"),
+        (15.0, 4.0, "compared"),
+        (20.0, 6.0, "compared"),
+        (0.0, 0.0, "compared"),
+        (-0.1, None, "gain below 0"),
+        (20.1, None, "beyond the learner"),
+    ],
+)
+def test_the_learner_is_interpolated_between_its_gains(gain, arm, status):
+    """What the learner does not gain is counted, and not compared."""
+    rows = [
+        ("learner", 10.0, 2.0),
+        ("learner", 20.0, 6.0),
+        ("learner", -3.0, 9.0),
+        ("a", gain, 7.0),
+    ]
+    cells = pd.DataFrame(rows, columns=["name", "gain", "arm"])
+    others = {"other arm": cells.arm / 2, "first": cells.arm / 2, "stages": 0}
+    (row,) = MEMORY.at_equal_gain(cells.assign(group="long", task="x", **others)).to_dict("records")
+    assert row["status"] == status
+    expected = np.nan if arm is None else arm
+    assert row["learner arm"] == pytest.approx(expected, nan_ok=True)
+    assert row["learner first"] == pytest.approx(expected / 2, nan_ok=True)
+
+
+def runs(**columns):
+    return pd.DataFrame({"group": "long", "task": "t", "first": 1.0, "arm": 2.0, **columns})
+
+
+def test_random_search_has_the_hands_of_the_learner():
+    """Weighted by its runs; hands of fewer than a tenth of them do not count."""
+    hands, gain = ["RR"] * 12 + ["RL"] * 6 + ["LL"], [9.0] * 12 + [3.0] * 6 + [50.0]
+    learner = runs(name="learner", trials=10_000, stages=np.nan, keep=None, hands=hands, gain=gain)
+    learner["other arm"] = np.where(learner.hands == "RR", np.nan, 0.5)
+    search = runs(name="random search", trials=10_000, stages=1, keep="postures",
+                  hands=["RR", "RR", "RL", "LL"], gain=[2.0, 4.0, 9.0, 70.0])  # fmt: skip
+    search["other arm"] = [np.nan, np.nan, 0.25, 0.75]
+    cells = MEMORY.measure_cells(pd.concat([learner, search]))
+    table = cells.set_index("name")[["gain", "other arm"]]
+    assert table.loc["compared"].tolist() == pytest.approx([7.0, 0.5])
+    for keep in MEMORY.KEEPS:  # with one part both are the same
+        assert table.loc[keep].tolist() == pytest.approx([(2 * 3 + 9) / 3, 0.25])
