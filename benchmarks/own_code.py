@@ -1,4 +1,4 @@
-"""What the results of a method file come from: the files and packages that its import loaded.
+"""Find what results of a method file come from: the files and packages that its import loaded.
 
 The process that has imported the file looks at them; built-in methods have a version in their
 place (:attr:`coartic.method.Method.version`).
