@@ -22,7 +22,6 @@ from matplotlib.figure import Figure
 
 from coartic.drawing import box, circle_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import check_ending, check_output, errors_in_words, write_output
 from coartic.internal.text import counted
 
@@ -42,7 +41,6 @@ _COUNTER: Any = {"fontsize": 13, "fontweight": "bold", "va": "bottom"}
 _BESIDE, _BELOW, _ABOVE = 0.08, 0.05, 0.65  # inches beside the axes
 
 
-@checked_arguments
 def write_film(
     movements: Sequence[tuple[str, Trajectory]],
     path: Path,
@@ -91,7 +89,6 @@ def write_film(
     return len(rows), stride / interval_s
 
 
-@checked_arguments
 def check_film(path: Path, *, replace: bool = False) -> None:
     """Raise CoarticError for a film whose ending is not in :data:`FILMS`, for MP4 without ffmpeg,
     and as :func:`check_output` does. Nothing is written."""

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from coartic.errors import CoarticError, NotApplicableError
 from coartic.estimates import Estimate, mean
 from coartic.gym_kernel import VectorState, observe, step_robots
-from coartic.internal.arguments import checked_arguments
+from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import counted, unknown
 from coartic.method import Method, MethodError, run_method
@@ -482,7 +482,6 @@ def score(
     return compare(rewards, column(None if each is None else each.reward for each in shipped))
 
 
-@checked_arguments
 def column(rewards: Iterable[float | None]) -> Array:
     """Return K rewards as an array of shape ``(K, 1)``, with NaN for None."""
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
@@ -539,19 +538,20 @@ def _rollout(
 
 
 @checked_arguments
-def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
+def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
     """Return a table with reward, gap and share of completed trials, a row for each policy and one
     for the best known (:func:`score`). ``rewards``, by policy, have shapes ``(K, trials)`` for K
     tasks, NaN where a trial failed; ``best`` has the best known rewards, shape ``(K, 1)``, NaN
     where none is known. Raises ValueError for other shapes."""
-    best, rewards = np.asarray(best), {name: np.asarray(each) for name, each in rewards.items()}
-    shapes = [earned.shape for earned in (best, *rewards.values())]
-    if any(len(shape) != 2 or shape[0] != len(best) for shape in shapes):
+    optimum = np.asarray(best)
+    earnings = {name: np.asarray(each) for name, each in rewards.items()} | {"best known": optimum}
+    shapes = [earned.shape for earned in earnings.values()]
+    if any(len(shape) != 2 or shape[0] != len(optimum) for shape in shapes):
         raise ValueError(f"rewards have shapes {shapes}; needed is a row for each task")
-    rows, known = {}, np.isfinite(best[:, 0])
-    for name, earned in {**rewards, "best known": best}.items():
-        gap = ((best - earned) / np.abs(best))[known]
-        values = gap.ravel() if len(best) == 1 else gap.mean(axis=1)
+    rows, known = {}, np.isfinite(optimum[:, 0])
+    for name, earned in earnings.items():
+        gap = ((optimum - earned) / np.abs(optimum))[known]
+        values = gap.ravel() if len(optimum) == 1 else gap.mean(axis=1)
         failed = name != "best known" and not np.isfinite(earned).all()
         usable = len(values) > 0 and np.isfinite(values).all() and not failed
         rows[name] = {

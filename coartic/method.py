@@ -27,7 +27,6 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError, SolutionError
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.internal.validation import in_sentences
@@ -216,7 +215,6 @@ class Outline(NamedTuple):
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
-@checked_arguments
 def outline_of(task: Task) -> Outline:
     """Return the properties of a task by which a method says whether it applies to the task."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
@@ -695,7 +693,6 @@ MODULES = (
 """Modules of the built-in methods, each with a list ``METHODS``."""
 
 
-@checked_arguments
 def run_method(
     method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
 ) -> tuple[Result, Session]:

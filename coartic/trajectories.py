@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from coartic.errors import SolutionError
 from coartic.internal.arguments import checked_arguments
@@ -130,7 +131,11 @@ class Trajectory:
 
     @checked_arguments
     def animate(
-        self, path: str | Path, *, width: Annotated[int, 200, 3840] = 560, replace: bool = False
+        self,
+        path: str | Path,
+        *,
+        width: Annotated[int, Field(ge=200, le=3840)] = 560,
+        replace: bool = False,
     ) -> None:
         """Write a film of the movement.
 
