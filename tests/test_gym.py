@@ -22,8 +22,8 @@ from coartic import (
 from coartic.baselines.corrective_alone import METHODS as ALONE
 from coartic.estimates import mean
 from coartic.learner.method import METHODS as LEARNERS
+from coartic.method.optimisers import FAILED
 from coartic.motion.solution import movements_of
-from coartic.optimisers import FAILED
 from coartic.tasks import families
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import address_of
@@ -395,7 +395,7 @@ def test_an_agent_is_scored_as_it_was_trained():
 
 
 def test_what_is_not_installed_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "coartic.sb3", None)
+    monkeypatch.setitem(sys.modules, "coartic.gym.stable_baselines", None)
     with pytest.raises(coartic.CoarticError, match=r"needs: pip install 'coartic\[rl\]'"):
         sb3(TWO)
 

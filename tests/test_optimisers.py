@@ -26,7 +26,7 @@ from coartic import (
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session, run_method
-from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
+from coartic.method.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
 from tests.support.processes import ROOT
 from tests.support.strategies import shipped_optima, tiny_task
 

@@ -11,7 +11,7 @@ A goal has five phases. A run, one of many side by side,
 
 (paper, sections *Generating Movement for Each Goal* and *The Corrective Process*). Three loops are
 made of these phases: :func:`reach_kernel` moves to given targets, :mod:`coartic.learner.kernel`
-explores around learned targets, and :mod:`coartic.gym_kernel` does what actions say. The result of
+explores around learned targets, and :mod:`coartic.gym.kernel` does what actions say. The result of
 a run depends neither on the others nor on their number.
 """
 

@@ -112,7 +112,7 @@ class Trajectory:
         hand that hits."""
         from matplotlib.figure import Figure
 
-        from coartic.drawing import box, circle_goals, draw_robot, number_goals
+        from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
 
         figure = Figure(figsize=(6, 4.5), layout="constrained")
         low, high = box(self.task, self.configurations)
@@ -153,7 +153,7 @@ class Trajectory:
         CoarticError
             The file cannot be written, or is there and ``replace`` is False.
         """
-        from coartic.film import write_film
+        from coartic.pictures.film import write_film
 
         title = f"{self.task.name}, {self.execution.hands}"
         write_film([(title, self)], Path(path), width=width, replace=replace)

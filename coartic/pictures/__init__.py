@@ -1,0 +1,1 @@
+"""Pictures of the robot, movements tick by tick, and films of them."""
