@@ -2,7 +2,7 @@
 
 Importing this module registers ``coartic/Ascending-v2``, ``Descending-v2``, ``TwoArmed1-v2``,
 ``TwoArmed2-v2``, and ``coartic/Task-v2`` for any other task or a family. It needs the extra
-``coartic[gym]``.
+``coartic[gym]``. Environments know tasks and motion; only scoring knows methods, which it compares.
 """
 
 import gymnasium
