@@ -9,8 +9,9 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence, Set
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -310,6 +311,22 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     return table.reset_index()
 
 
+def compared_tasks(on: Iterable[tuple[Hashable, Set[Any]]]) -> Set[Any]:
+    """Return the tasks over which algorithms are ranked, given each algorithm with the tasks on
+    which one of its methods ran.
+
+    The tasks of that method for which the number of its tasks, times the number of algorithms that
+    ran on all of them, is largest; of several the most tasks. Empty without a method.
+    """
+    pairs = [*on]
+
+    def size(tasks: Set[Any]) -> tuple[int, int]:
+        there = len({algorithm for algorithm, others in pairs if others >= tasks})
+        return len(tasks) * there, len(tasks)
+
+    return max((tasks for _, tasks in pairs), key=size, default=frozenset())
+
+
 def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     """Rank methods by their mean gap over tasks.
 
@@ -352,10 +369,12 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     yours   0.062        0       0
     """
     frame = scored(frame)
-    every, rows = {*frame.task[frame.best_known.notna()]}, []
     by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
-    for of_method in by_method.values():
-        of_tasks = of_method[of_method.best_known.notna()]
+    known = [of_method[of_method.best_known.notna()] for of_method in by_method.values()]
+    every = compared_tasks(zip(by_method, ({*runs.task} for runs in known), strict=True))
+    rows = []
+    for of_method, runs in zip(by_method.values(), known, strict=True):
+        of_tasks = runs[runs.task.isin(every)]
         has_failed = of_tasks.gap.isna().groupby(of_tasks.task).transform("any")
         solved = of_tasks[~has_failed]
         by_task = dict([*solved.groupby("task").gap])

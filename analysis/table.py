@@ -12,9 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from coartic.analysis.standings import common_tasks, compared, shown_name
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
+from coartic.internal.text import counted
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -138,17 +140,26 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
 
     ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
     and ablation, by label; ``own``: labels of methods from files; ``best_known``: True if a best
-    known reward does not come from this folder alone.
+    known reward does not come from this folder alone; ``compared``: number of compared tasks, in
+    words.
     """
     methods, tasks = study.methods, study.tasks
+    names = {label: shown_name(study, label) if label in compared(study) else title
+             for label, title in methods.title.items()}  # fmt: skip
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
     marks = {name: marked(task) for name, task in tasks.items()}
     return {
-        "titles": {**families, **marks, **methods.title},
+        "titles": {**families, **marks, **names},
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
+        "compared": counted(len(common_tasks(study)), "task"),
         "best_known": any(not best.only_here for best in study.optima.values()),
     }
+
+
+def caption_of(table: Table, frame: pd.DataFrame) -> str:
+    """Return the caption of a table's frame; ``{tasks}`` in it is the number of compared tasks."""
+    return table.caption.replace("{tasks}", frame.attrs["compared"])
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:

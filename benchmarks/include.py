@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -29,11 +29,17 @@ from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, explain_errors, open_store, writing
 
 
-def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
+def include_folders(
+    plan: Sequence[Job],
+    folders: Sequence[str | Path],
+    out: Path,
+    tasks: Collection[str] | None = None,
+) -> list[Job]:
     """Copy the runs of other folders into ``out``; store there, and return, the plan of all runs.
 
     ``shipped`` names the shipped results. To perform the returned plan in ``out`` makes only those
-    runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has.
+    runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has,
+    those on ``tasks`` alone if tasks are named.
     A warning names an unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
@@ -65,7 +71,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
             if wrong:
                 more = f" (`coartic verify` names {len(wrong) - 1} more)" * (len(wrong) > 1)
                 raise CoarticError(f"{name} is not included. {wrong[0]}{more}")
-        joined = _join(plan, sources)
+        joined = _join(plan, sources, tasks)
         target = stack.enter_context(writing(out))
         if SHIPPED in sources and target.begin_as(sources[SHIPPED]):
             del sources[SHIPPED]  # all its runs are there
@@ -77,15 +83,21 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
     return joined
 
 
-def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
+def _join(
+    plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
+) -> list[Job]:
     """Return the plan with the cells of the sources, its own cells first. A cell has the runs that
     the plan asks for, and the runs that follow in the sources without a gap.
 
     Raises CoarticError if sources contradict each other, or the plan about runs that no source has.
     """
-    plans = {name: source.plan() for name, source in sources.items()}
+    whole = {name: source.plan() for name, source in sources.items()}
+    plans = {
+        name: [job for job in jobs if tasks is None or job.cell.task.name in tasks]
+        for name, jobs in whole.items()
+    }
     held = {
-        (plans[name][position].cell.digest, number)
+        (whole[name][position].cell.digest, number)
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }

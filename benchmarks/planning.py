@@ -320,7 +320,7 @@ def _job_of(
     numbers = asked if isinstance(asked, range) else range(asked)
     numbers = numbers if method.stochastic else range(numbers.start, 1)
     limit_s = request.time_limit_s or suite.time_limit_s
-    return Job(cell, request.seed, numbers, limit_s, suite.name)
+    return Job(cell, request.seed, numbers, limit_s, suite.name, suite.trials)
 
 
 def _why_nothing_runs(

@@ -12,10 +12,17 @@ from typing import Any, TypeVar
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
-from coartic.analysis.method_frame import GROUPS, joined_label
+from coartic.analysis.method_frame import GROUPS, joined_label, without_settings
 from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH, title_of
 from coartic.analysis.sections import SECTIONS, Section
-from coartic.analysis.standings import common_tasks, reference
+from coartic.analysis.standings import (
+    board,
+    common_tasks,
+    equal_trials,
+    not_ranked,
+    reference,
+    trials_of,
+)
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import is_setting
 from coartic.analysis.words import (
@@ -72,14 +79,19 @@ def finding(study: Study, section: Section) -> list[str]:
     if not section.sentence or not len(frame := section.tables[0](study)):
         return []
     rows, *others = (
-        each.assign(title=each.method.map(study.methods.title))[~is_setting(each)]
+        each.assign(title=each.method.map(each.attrs["titles"]))[~is_setting(each)]
         for each in (table(study) for table in section.tables)
     )
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "counts": lambda each: tally(Counter(each))}
+    standings, asked = without_settings(board(study)), trials_of(study)
+    below = standings.index[~standings.ranked.astype(bool)]
+    unequal = standings[[asked[label] != equal_trials(study) for label in standings.index]]
+    rows = rows[~rows.method.isin(below)]
     environment.globals |= {
+        "not_ranked": not_ranked(study), "unequal": {*unequal.information},
         "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
-        "uses": GROUPS, "titles": study.methods.title,
+        "uses": GROUPS, "titles": frame.attrs["titles"],
         "reference": reference(study, common_tasks(study)),
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)

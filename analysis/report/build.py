@@ -26,7 +26,7 @@ from coartic.analysis.report.render import (
 )
 from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.study import Study, cached
-from coartic.analysis.table import Table, is_setting
+from coartic.analysis.table import Table, caption_of, is_setting
 from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
@@ -86,7 +86,9 @@ def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, by
         return {}
     files = {f"tables/{table.id}.csv": table_csv(frame).encode()}
     if for_paper and table.id in IN_LATEX:
-        text = latex_table(table, frame, table.caption, about.notes_of(study, frame.columns))
+        text = latex_table(
+            table, frame, caption_of(table, frame), about.notes_of(study, frame.columns)
+        )
         files[f"tables/{table.id}.tex"] = text.encode()
     return files
 
@@ -121,8 +123,8 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
         if len(frame):
             settings = sum("setting" in names for names in classes_of(table, frame))
             tables.append({
-                "id": table.id, "caption": table.caption, "rows": len(frame),
-                "settings": settings, "html": html_table(table, frame, table.caption),
+                "id": table.id, "caption": caption_of(table, frame), "rows": len(frame),
+                "settings": settings, "html": html_table(table, frame, caption_of(table, frame)),
             })  # fmt: skip
     return {
         "finding": about.finding(study, section),

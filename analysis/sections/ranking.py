@@ -90,23 +90,23 @@ def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
 
 
 @table(
-    "Gap and share of the possible gain, over all tasks, and gap on each",
+    "Gap and share of the possible gain, means over {tasks}, and gap on each",
     "method; gap[]: gap (%) .1; share[]: share of the gain (%) .0; information: use of the reward; "
     "better: better than the learner on (tasks); worse: worse on (tasks); "
-    "gap_early: -; on *: {} (%) .1; tasks; missing: -; without_gain: -; "
+    "gap_early: -; ranked: -; on *: {} (%) .1; tasks; missing: -; without_gain: -; "
     "forward_kinematics: -; cpu_s: -; runs; failed: -",
 )
 def list_ranking(study: Study) -> Rows:
-    """List gaps and shares over all tasks, and gaps on each, methods from files first, settings
-    after their method.
+    """List gaps and shares over all tasks, and gaps on each, in the order of :func:`.board`,
+    settings after their method.
 
     ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
-    them, over the ``tasks`` that it solved. Also the gap after a thousand trials, and means of what
-    a run costs.
+    them, which is not ``ranked``, over the ``tasks`` that it solved. Also the gap after a thousand
+    trials, and means of what a run costs.
     """
     tested, runs = list_against_learner(study), common_runs(study)
     scores = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
-    wide = board(study).reindex(columns=[*scores, "tasks", "without_gain"])
+    wide = board(study).reindex(columns=[*scores, "tasks", "without_gain", "ranked"])
     if len(runs):
         wide["gap_early"] = ranking(_after(study, runs, _EARLY)).gap
     wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
@@ -131,15 +131,11 @@ def list_ranking(study: Study) -> Rows:
 
 
 def _ranked(study: Study) -> list[str]:
-    """Return the labels of the methods of the ranking: methods from files, then built-in ones.
-
-    In both groups the smallest mean gap is first, and methods without a gap follow in the
-    order of :attr:`.Study.methods`. But a setting or an ablation stands after its method, if
-    that method is in the list.
-    """
+    """Return the labels of the methods of the ranking, in the order of :func:`.board`; methods
+    without a gap follow in the order of :attr:`.Study.methods`. But a setting or an ablation stands
+    after its method, if that method is in the list."""
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
-    names.sort(key=lambda method: bool(study.methods.built_in[method]))
     under = study.methods.under
 
     def with_settings(first: str) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,33 +60,38 @@ def report(
         sys.exit(1)
 
 
-def say_ranking(study: Study, *more: tuple[str, str]) -> None:
+def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
     """Print a table, then pairs of a word and a text.
 
     The table has at most ten methods of the ranking, without settings and ablations: those
-    with the smallest gaps and, wherever they rank, the learner and random search. The pairs
-    are the findings on coarticulation and on cost, numbers of runs and trials that are not
-    those of the paper, the failed runs, and ``more``.
+    with the smallest gaps and, wherever they rank, the learner and random search; and all methods
+    from files and of the labels ``asked``, also below the ranking. The pairs are the reasons why
+    these are not ranked, the findings on coarticulation and on cost, numbers of runs and trials
+    that are not those of the paper, the failed runs, and ``more``.
     """
+    from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
-    from coartic.analysis.sections import SECTIONS, TABLES
+    from coartic.analysis.sections import SECTIONS
+    from coartic.analysis.standings import board, not_ranked, shown_name
     from coartic.analysis.words import interval, number
     from coartic.learner.learning import TRIALS
 
-    rows = TABLES["ranking"](study).dropna(subset="gap").sort_values("gap", kind="stable")
-    rows = rows[~rows.method.isin(study.methods.index[study.methods.under != ""])]
-    named = [row["method"] for row in leading(rows)]
-    rows = rows[rows.method.isin([*rows.method[: 12 - len(named)], *named])]
+    also = frozenset(asked)
+    rows = without_settings(board(study, also)).reset_index(names="method")
+    named = [row["method"] for row in leading(rows[rows.ranked])]
+    first = rows.method[rows.ranked][: 12 - len(named)]
+    rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
     say_table(
         ("method", "gap (%)", "share of the gain (%)", "runs"),
         [
-            (study.methods.title[row["method"]], interval(row, "gap", scale=100),
+            (shown_name(study, row["method"]), interval(row, "gap", scale=100),
              interval(row, "share", 0, 100), number(row["runs"]))
             for row in rows.to_dict("records")
         ],
     )  # fmt: skip
+    pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
-    pairs = [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
+    pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
     unlike = [f"{what['few']} runs, not {RUNS}"] * bool(what["few"])
     unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]

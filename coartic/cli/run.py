@@ -111,9 +111,11 @@ def run(
         kept = others if display.others else ""
         return one_line(f"Saved in {out}: {done}; repeat the command to resume.{kept}")
 
+    labels = {job.cell.label for job in asked}
     with interruptible(saved), display:
         if include:
-            asked = include_folders(asked, include, out)
+            only = {job.cell.task.name for job in asked} if tasks else None
+            asked = include_folders(asked, include, out, only)
             display.line(f"Included the runs of {' and '.join(include)}.")
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(asked, out, executor=executor, watch=display.update)
@@ -123,7 +125,7 @@ def run(
         part = f"{out} has a part of the runs: --include {named}, with all other parts, joins them"
         say_pairs([("Next", part)])
     else:
-        say_ranking(load(out), ("Next", f"coartic report {quote(str(out))}"))
+        say_ranking(load(out), labels, ("Next", f"coartic report {quote(str(out))}"))
     if progress.crashed:
         sys.exit(1)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from coartic.runs.plan import Cell
 
 _READABLE = 24  # least width of a column of text, characters
-_ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\u202f": " ", "\xa0": " "}
+_ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\xa0": " "}
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
@@ -36,7 +36,8 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
     those that the terminal lacks (:func:`_replaced`)."""
     stream = stream or sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
-    text = "\n".join(map(one_line, lines)).encode(encoding, "replaced").decode(encoding)
+    text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
+    text = text.encode(encoding, "replaced").decode(encoding)
     print(text, file=stream, end=end, flush=True)
 
 

@@ -84,6 +84,8 @@ class Job:
     """CPU time of all these runs together, s."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
+    suite_trials: int | None = None
+    """Trials of a run by the suite's file, whatever a command asks for; None if it names none."""
 
     def run_id(self, number: int, code: str | None = None) -> str:
         """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and

@@ -160,7 +160,8 @@ class Store:
 
         Raises CoarticError if the folder holds another suite.
         """
-        first, environment = plan[0], dict(made_with)
+        first = plan[0]
+        environment = dict(made_with) | {"suite_trials": first.suite_trials}
         suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
         suite |= {name: environment.pop(name) for name in ("command", "date")}
         with self.transaction():
@@ -190,6 +191,7 @@ class Store:
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
                 raise ValueError("the plan is not as it was written")
+            trials = json.loads(suite["content"]).get("suite_trials")
             return [
                 Job(
                     self._read_cell(row),
@@ -197,6 +199,7 @@ class Store:
                     range(row["runs"]),
                     suite["time_limit_s"],
                     suite["name"],
+                    trials,
                 )
                 for row in self._db.execute(_PLANNED[1])
             ]
