@@ -73,8 +73,8 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 @cached
 def equal_trials(study: Study) -> int:
     """Return the number of trials of a run with which methods are ranked: the number in the suite's
-    file or, where no compared method has it, the number of most algorithms, the least of several; 0
-    where no method has such a parameter."""
+    file or, where no compared method has it, the number of most algorithms, the least of several;
+    the most that a run made, where no method has such a parameter."""
     asked, algorithms = _trials_asked(study), dict[int, set[str]]()
     for method in compared(study):
         for part in study.methods.parts[method]:
@@ -84,7 +84,9 @@ def equal_trials(study: Study) -> int:
     by_suite = study.plan[0].suite_trials
     if by_suite in algorithms:
         return by_suite
-    return max(sorted(algorithms), key=lambda n: len(algorithms[n]), default=0)
+    if not algorithms:
+        return int(study.runs.trials.max())
+    return max(sorted(algorithms), key=lambda n: len(algorithms[n]))
 
 
 @cached

@@ -91,7 +91,7 @@ def finding(study: Study, section: Section) -> list[str]:
     environment.globals |= {
         "not_ranked": not_ranked(study), "unequal": {*unequal.information},
         "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
-        "uses": GROUPS, "titles": frame.attrs["titles"],
+        "uses": GROUPS, "titles": study.methods.title,
         "reference": reference(study, common_tasks(study)),
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
@@ -99,10 +99,10 @@ def finding(study: Study, section: Section) -> list[str]:
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the first two rows of a table, and the rows of the paper's learner (EC1, EC4) and of
-    random search, each row a dict."""
-    kept = rows.method.isin([*rows.method[:2], joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH])
-    return rows[kept].to_dict("records")
+    """Return the first two rows of a table, and the rows of the paper's learner (EC1, EC4), of
+    random search and of methods from files, each row a dict."""
+    always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH, *rows.attrs.get("own", [])]
+    return rows[rows.method.isin([*rows.method[:2], *always])].to_dict("records")
 
 
 @cached
