@@ -9,7 +9,7 @@ group. If the common folder is removed or full, answers are lost, and the suite 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
 used up its limit: other work on the machine changes no result. The CPU time of processes that a
 method starts is not counted. A job that waits forever is ended later, by wall time, and repeated
-once: the machine may have slept.
+once, as the machine may have slept; a job that waits twice has timed out.
 """
 
 from __future__ import annotations
@@ -75,9 +75,8 @@ class Local:
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
-    time is repeated once. Then its runs end as crashed, and a suite does not keep them, so that the
-    next command performs them again. The time in which coartic's kernels are compiled does not
-    count. ``verbose`` shows what methods print and log, and their tracebacks.
+    time is repeated once; then its runs have timed out. The time in which coartic's kernels are
+    compiled does not count. ``verbose`` shows what methods print and log, and their tracebacks.
     """
 
     @checked_arguments
@@ -273,7 +272,7 @@ class Worker:
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
-            return fail(job, "crashed", reason, wall_s=self.wall_limit_s)
+            return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
         if exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME:
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:

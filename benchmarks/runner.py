@@ -116,7 +116,9 @@ class Progress:
         minutes, seconds = divmod(self.wall_s, 60)
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
-        runs = counted(self.total, "run") + (f" ({self.present} reused)" if self.present else "")
+        there = self.present + self.done
+        runs = counted(there, "run") if there == self.total else f"{there} of {self.total} runs"
+        runs += f" ({self.present} reused)" if self.present else ""
         failed = f"{self.failed} failed" if self.failed else "none failed"
         left_out = [
             f"{counted(count, 'run')} {what}"
@@ -185,10 +187,9 @@ def perform(
 
     The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
     that fail are stored and counted, and raise nothing; those that crashed, or timed out under a
-    lower limit, are performed again by the next call. An interruption keeps finished runs. Runs
-    that waited without computing are not kept; a warning names them. For each method of a file, a
-    run is made again after a run with another seed; a warning says if the results differ, or if
-    targets may be meant in degrees.
+    lower limit, are performed again by the next call. An interruption keeps finished runs. For each
+    method of a file, a run is made again after a run with another seed; a warning says if the
+    results differ, or if targets may be meant in degrees.
 
     Parameters
     ----------
@@ -239,7 +240,6 @@ def perform(
                     if len(runs) > 1:  # a failure may come from other runs of the job
                         alone += [run.job for run in runs if run.outcome.status not in _SURE]
                         runs = [run for run in runs if run.outcome.status in _SURE]
-                    runs = [run for run in runs if not _has_waited(run)]
                     store.write(runs)
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
@@ -253,17 +253,6 @@ def perform(
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
-
-
-def _has_waited(run: Run) -> bool:
-    """Return whether a run waited, without using its CPU time, until its limit of wall time ended
-    it. That is no result: the run is not stored, and a warning says to repeat the command."""
-    times = run.outcome.times
-    if run.outcome.status != "crashed" or times.wall_s is None or times.cpu_s is not None:
-        return False
-    where = f"run {run.number} of {run.cell.label} on {run.cell.task.name}"
-    warnings.warn(f"{where} is not kept: {run.outcome.reason}. Repeat the command", stacklevel=3)
-    return True
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:

@@ -224,7 +224,10 @@ def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_p
     monkeypatch.setattr("coartic.cli.run.interruptible", interruptible)
     error = coartic(*SMALL, "--out", out, "--seed", 7)[2]
     assert f"{out} holds 2 runs of seed 0" in error.partition("Runs: ")[0]
+    assert f"Saved in {out}: 2 runs; " in sentences[0]()
     assert "To report 2 runs of seed 0 there, repeat the earlier command" in sentences[0]()
+    edit(out, "DELETE FROM results")
+    assert f"Saved in {out}: 0 runs; " in sentences[0]()
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -86,32 +87,36 @@ def run(
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.runner import perform
     from coartic.benchmarks.suites import load_suite, suites
+    from coartic.runs.store import open_store
 
     if suite is None:
         raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
-    chosen, registered = load_suite(suite), registry(method_file or ())
-    names = given.methods_meant(given.names_in(methods), registered, expand=False)
-    if include and not names:  # the user's own methods alone
-        names = [name for name, info in registered.items() if info.where.endswith(".py")]
-    request = request_for(
-        tasks=given.tasks_meant(given.names_in(tasks)),
-        methods=names,
-        family_files=family_file or (),
-        **{"runs": runs, "trials": trials, "seed": seed},
-        **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
-    )
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
+    chosen, display = load_suite(suite), Display()
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    asked, display = plan(chosen, request, registered), Display()
 
     def saved() -> str:
-        done = counted(display.done, "finished run")
+        there = "no run yet"
+        with suppress(CoarticError), open_store(out) as store:
+            there = counted(len(store.present()), "run")
         others = f" To report {display.others} there, repeat the earlier command."
         kept = others if display.others else ""
-        return one_line(f"Saved in {out}: {done}; repeat the command to resume.{kept}")
+        return one_line(f"Saved in {out}: {there}; repeat the command to resume.{kept}")
 
     with interruptible(saved), display:
+        registered = registry(method_file or ())
+        names = given.methods_meant(given.names_in(methods), registered, expand=False)
+        if include and not names:  # the user's own methods alone
+            names = [name for name, info in registered.items() if info.where.endswith(".py")]
+        request = request_for(
+            tasks=given.tasks_meant(given.names_in(tasks)),
+            methods=names,
+            family_files=family_file or (),
+            **{"runs": runs, "trials": trials, "seed": seed},
+            **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
+        )
+        asked = plan(chosen, request, registered)
         if include:
             asked = include_folders(asked, include, out)
             display.line(f"Included the runs of {' and '.join(include)}.")
@@ -120,7 +125,7 @@ def run(
     say(str(progress))
     if isinstance(runs, range):
         named = quote(str(out))
-        part = f"{out} has a part of the runs: --include {named}, with all other parts, joins them"
+        part = f"{out} has runs {runs[0]} to {runs[-1]}: --include {named}, and all other parts"
         say_pairs([("Next", part)])
     else:
         say_ranking(load(out), ("Next", f"coartic report {quote(str(out))}"))

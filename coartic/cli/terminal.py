@@ -85,8 +85,6 @@ class Display:
     EVERY_S = 30.0
 
     def __init__(self) -> None:
-        self.done = 0
-        """Runs performed now."""
         self.others = ""
         """Number and seeds of the runs of earlier commands in the folder, in words."""
         self._is_live = sys.stderr.isatty()
@@ -105,7 +103,7 @@ class Display:
         from coartic.analysis.methods import title_of
         from coartic.runs.record import late_import
 
-        self.done, total = progress.done, progress.total
+        total = progress.total
         if cell is None:
             for sentence in progress.unused:
                 self.line(sentence)
@@ -132,7 +130,7 @@ class Display:
                 last = f"{cell.task.label}, {title_of(cell.method.name)}"
             say_part(f"{text}  {last}")
             self._end = "\n"
-        elif there == total or (self.done and time.monotonic() - self._last >= self.EVERY_S):
+        elif there == total or (progress.done and time.monotonic() - self._last >= self.EVERY_S):
             self._last = time.monotonic()
             self.line(f"Runs: {text}")
 
