@@ -235,6 +235,10 @@ def test_ten_thousand_movements_are_not_too_many():
     task, move = load_task("ascending"), Movement(1, "right", "corrective")
     assert too_long(task, [move] * 10_000) is None
     assert "10001 movements" in str(too_long(task, [move] * 10_001))
+    still = [Movement(1, "right", "path", waypoints=np.tile(task.q0, (count, 1)))
+             for count in (39_999, 40_000)]  # fmt: skip
+    assert too_long(task, still[:1]) is None
+    assert "400010 numbers; at most 400000" in str(too_long(task, still[1:]))
 
 
 @pytest.mark.usefixtures("in_this_process")

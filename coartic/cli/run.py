@@ -124,9 +124,8 @@ def run(
         progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
     if isinstance(runs, range):
-        named = quote(str(out))
-        part = f"{out} has runs {runs[0]} to {runs[-1]}: --include {named}, and all other parts"
-        say_pairs([("Next", part)])
+        part = f"--include {quote(str(out))}, with all other parts, joins them"
+        say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
         say_ranking(load(out), ("Next", f"coartic report {quote(str(out))}"))
     if progress.crashed:

@@ -36,6 +36,10 @@ LATE = "late_imports"
 late to count as the code of its method."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
+_MOST_NUMBERS = 400_000
+"""Most entries of the targets and waypoints of a solution, each of at most 25 characters."""
+LONGEST_SOLUTION = 25 * _MOST_NUMBERS
+"""Most characters of the stored paths of a solution."""
 MOST_STEPS = 1_000_000
 """Most movement steps of a solution through its targets in order; solutions of the paper's tasks
 have some thousands."""
@@ -345,7 +349,7 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution with more than 10,000 movements or more than
+    """Return the error of a solution with more than 10,000 movements, 400,000 numbers or
     :data:`MOST_STEPS` steps; None for any other solution."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
@@ -353,6 +357,8 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
+    if (count := sum(map(np.size, corners))) > _MOST_NUMBERS:
+        return SolutionError(f"its paths have {count} numbers; at most {_MOST_NUMBERS} are allowed")
     if (
         len({np.shape(corner) for corner in corners}) == 1
     ):  # otherwise the solution breaks the rules

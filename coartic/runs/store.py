@@ -25,11 +25,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
-from coartic.internal.limits import MOST_TRIALS
+from coartic.internal.limits import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, check_limits
 from coartic.internal.text import one_line, plain
 from coartic.internal.validation import explain_inline
 from coartic.method import Meter
@@ -41,6 +41,7 @@ from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
     LATE,
+    LONGEST_SOLUTION,
     PREFIXES,
     Outcome,
     Run,
@@ -133,9 +134,27 @@ _PLANNED = (
 )
 """Queries of all that a plan says; ``plan_hash`` is a hash of their rows."""
 
+LONGEST_VALUE = 50_000_000  # bytes of a value in the file
+LONGEST_TASK = 100_000  # characters of the definition of a task
 _LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
 WAIT_S = 1.0  # wait for another program
 _LONGEST_PATH = 500  # letters of the path of a file; SQLite adds those of its journal
+
+
+class _Commit(BaseModel):
+    id: str
+    dirty: bool
+
+
+class _Surroundings(BaseModel):
+    """Facts on the last ``coartic run`` that reports and citations state."""
+
+    coartic: str
+    commit: _Commit | None
+    processor: str
+    cores: int
+    command: list[str]
+    date: str
 
 
 class Store:
@@ -190,16 +209,17 @@ class Store:
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
                 raise ValueError("the plan is not as it was written")
-            return [
-                Job(
-                    self._read_cell(row),
-                    suite["seed"],
-                    range(row["runs"]),
-                    suite["time_limit_s"],
-                    suite["name"],
-                )
-                for row in self._db.execute(_PLANNED[1])
-            ]
+            check_limits("the seed", suite["seed"], 0, MOST_SEED)
+            if suite["time_limit_s"] is not None:
+                check_limits("the time limit", suite["time_limit_s"], 0.0, MOST_SECONDS)
+            plan = list[Job]()
+            for row in self._db.execute(_PLANNED[1]):
+                check_limits("the number of runs", row["runs"], 1, MOST_RUNS)
+                cell, numbers = self._read_cell(row), range(row["runs"])
+                plan.append(Job(cell, suite["seed"], numbers, suite["time_limit_s"], suite["name"]))
+            if not plan:
+                raise ValueError("the plan is empty")
+            return plan
 
     def made_with(self) -> dict[str, Any]:
         """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``,
@@ -207,7 +227,9 @@ class Store:
         with explain_errors(self.folder):
             row = self._suite()
             how = {"command": json.loads(row["command"]), "date": row["date"]}
-            return dict(json.loads(row["content"]) | how)
+            content = dict(json.loads(row["content"])) | how
+            _Surroundings.model_validate(content, strict=True)
+            return content
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -298,6 +320,7 @@ class Store:
             blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
             rewards = _unpack(blob[0], row["trials"]) if blob else np.empty(0)
             meter = {name: row[name] for name in vars(Meter())}
+            self._check_lengths("WHERE result_id = ?", row["id"])
             parts: dict[str, list[Movement]] = {part: [] for part in PREFIXES}
             query = """SELECT part, goal, hand, kind, ticks, path FROM movements
                 WHERE result_id = ? ORDER BY "order\""""
@@ -306,12 +329,12 @@ class Store:
             outcome = Outcome(
                 row["status"],
                 row["reason"],
-                details=json.loads(row["details"]),
+                details=dict(json.loads(row["details"])),
                 used=tuple(filter(None, row["used"].split(", "))),
                 meter=None if row["trials"] is None else Meter(**meter),
                 rewards=[None if np.isnan(reward) else int(reward) for reward in rewards.tolist()],
                 times=Times(**{name: row[name] for name in vars(Times())}),
-                environment=json.loads(environment["content"]),
+                environment=dict(json.loads(environment["content"])),
             )
             scores = {
                 part: Score(row[f"{prefix}reward"], row[f"{prefix}hands"], tuple(parts[part]))
@@ -335,6 +358,7 @@ class Store:
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions``, a row for each movement, as a data frame (nullable types)."""
+        self._check_lengths()
         return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
@@ -345,6 +369,7 @@ class Store:
             FROM asked WHERE status = 'ok') AS solved
             JOIN movements ON result_id = solved.id AND part = ? WHERE place <= ?
             ORDER BY position, run, "order\""""
+        self._check_lengths()
         with explain_errors(self.folder):
             rows = self._execute(query, (part, most))
             return {
@@ -403,6 +428,8 @@ class Store:
             "defaults": json.loads(row["defaults"]),
             "information": tuple(filter(None, row["information"].split(", "))),
         }
+        if len(row["definition"]) > LONGEST_TASK:
+            raise ValueError(f"the task of {len(row['definition'])} characters is too long")
         content = {
             "task": parse_task(json.loads(row["definition"]), str(self.folder / RUNS_FILE)),
             "method": method,
@@ -410,9 +437,19 @@ class Store:
             "trial_budget": row["trial_budget"],
         }
         cell: Cell = _CELL.validate_python(content)
-        if (cell.digest, cell.setting) != (row["digest"], row["setting"]):
+        named = cell.digest, cell.setting, cell.task.name
+        if named != (row["digest"], row["setting"], row["task"]):
             raise ValueError(f"{cell.label} on {cell.task.name} is not the cell that was run")
         return cell
+
+    def _check_lengths(self, condition: str = "", *values: object) -> None:
+        """Raise CoarticError, before it is read, for a solution that is longer than runs keep, of
+        all runs or of those that satisfy an SQL ``condition``."""
+        query = f"""SELECT max(length) FROM (SELECT sum(length(path)) AS length FROM movements
+            {condition} GROUP BY result_id, part)"""
+        with explain_errors(self.folder):
+            if ((self._one(query, *values)[0]) or 0) > LONGEST_SOLUTION:
+                raise ValueError("a solution is too long")
 
     def _plan_hash(self) -> str:
         """Return the hash of the last suite: settings, command, date, environment, cells."""
@@ -624,6 +661,7 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")
     connection.execute("PRAGMA cell_size_check = ON")
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
     return connection
 
 
@@ -707,6 +745,10 @@ _SENTENCES = {
     "back, or repeat the command to start again",
     "SQLITE_CORRUPT": _DAMAGED,
     "SQLITE_NOTADB": _DAMAGED,
+    "SQLITE_TOOBIG": f"a value has more than {LONGEST_VALUE} bytes, which coartic does not write",
+    "SQLITE_IOERR": "the system cannot read or write it, as where a disk, a quota or the limit of "
+    "file size (`ulimit -f`) is full: make room, and repeat the command",
+    "SQLITE_FULL": "the disk is full: make room, and repeat the command",
 }
 """Sentences by SQLite's names of errors, or by the first two words of the names."""
 
