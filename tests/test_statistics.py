@@ -125,6 +125,16 @@ def test_intervals_of_many_normal_values_are_the_usual_ones():
     assert (alone.low, alone.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
 
 
+def test_an_interval_of_very_many_values_is_the_normal_one():
+    """At the bound the bootstrap's percentiles are the same, to a tenth of the width."""
+    values = np.random.default_rng(0).exponential(size=50_001)
+    for sample, near in ((values, 1e-12), (values[:-1], 0.1)):
+        found = statistics.mean(sample)
+        width = stats.norm.ppf(0.975) * sample.std(ddof=1) / math.sqrt(len(sample))
+        for end, sign in ((found.low, -1), (found.high, 1)):
+            assert end == pytest.approx(sample.mean() + sign * width, abs=near * width)
+
+
 def test_degenerate_samples():
     assert math.isnan(statistics.mean([4.0, 5.0]).low)
     assert statistics.mean([4.0, 5.0, 6.0]).low < 5
