@@ -2,10 +2,22 @@
 
 import pytest
 
-from coartic.analysis.judging import all_of, judge
+from coartic import CoarticError
+from coartic.analysis.judging import all_of, judge, mean_beyond
 from tests.support.made_up import found
 
 NAN = float("nan")
+
+
+@pytest.mark.parametrize("sentence", ["It saves ticks", "{} {}", "It saves {:d}", "{mean}"])
+def test_a_sentence_has_one_place_for_the_mean(sentence):
+    with pytest.raises(CoarticError, match="needs one {}, for the mean"):
+        mean_beyond(sentence, [4.0, 5.0, 6.0])
+
+
+def test_other_braces_are_text():
+    found = mean_beyond("Goals {a, b} save {} {1} ticks {", [4.0, 5.0, 6.0])
+    assert found.evidence.startswith("Goals {a, b} save 5.00 [4.00, 6.00] {1} ticks { (3")
 
 
 def test_joined_findings_have_the_opposites_of_all():
