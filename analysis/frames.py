@@ -150,8 +150,8 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
     number of the task, from 0, in the order of names; ``key`` is the same number in all rows of a
-    run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError as :func:`checked` and :func:`_with_gaps` do, and for a task with
-    several best known rewards.
+    run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError
+    as :func:`checked` and :func:`_with_gaps` do, and for a task with several best known rewards.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)

@@ -38,7 +38,7 @@ from coartic.motion.trial import count_trials
 from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
-from coartic.tasks.families import LOCKED, instance_names, shipped_families
+from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import MOST_GOALS, Split, Task, parse_task
 
@@ -86,7 +86,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
     num_envs : int
         Number of robots.
     task : Task, str or Path
-        The task; or a family, ``"two-armed/v1"``: each trial has an instance of the family.
+        The task; or a family, ``"two-armed/v1"`` or the path of its file: each trial has an
+        instance of the family.
     split : {"development", "test", "fresh"}, optional
         Instances to train on (by default), to report on, or those of a ``year``. They never mix.
     count : int, optional
@@ -143,8 +144,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self.num_envs, self.model = num_envs, check_model(model)
         self.options = {"task": task, "ahead": ahead, "model": model}
         self.tasks: list[Task | str]  # or names of instances
-        if isinstance(task, str) and task in shipped_families():
-            family = shipped_families()[task]
+        if isinstance(task, str | Path) and is_family(str(task)):
+            task = str(task)
+            family = load_family(task)
             self.tasks = [*instance_names(task, split or "development", count, year)]
             locked = set.intersection(*({*LOCKED[base]} for base in family.base))
             (fewest, links), hands, goals = family.links, family.hands, family.goals[1]
@@ -461,7 +463,7 @@ def score(
     check_limits("episodes", episodes, 1, MOST_CELLS)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
     given = _options_of(env) | options
-    if given.get("task") in [*shipped_families()]:  # a Task has no hash
+    if isinstance(task := given.get("task"), str | Path) and is_family(str(task)):
         given = {"split": "test", **given}
     setting = TaskVectorEnv(1, **given)
     model, shape = setting.model, setting.single_action_space.shape

@@ -239,8 +239,14 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
     assert coartic(*SMALL, "--out", "paper")[0] == 0
     assert coartic(*SMALL, "--out", "out")[0] == 0
     assert coartic("new", "my-search")[0] == 0
-    for command in ("check", "list", "run"):
+    for command in ("check", "run"):
         assert "out is a results folder: coartic report out" in coartic(command, "out")[2]
+    code, text, _ = coartic("list", "out")
+    runs = load("out").runs
+    assert (code, text.splitlines()[-1]) == (0, f"out: {len(runs)} runs.")
+    assert all(run_id in text for run_id in runs.run_id)
+    assert coartic("list", "paper")[1].startswith("Suite")
+    assert coartic("list", "./paper")[1].startswith("run_id")
     for command in ("check", "list"):
         assert "add --method-file my_search.py" in coartic(command, "my-search")[2]
 

@@ -13,7 +13,7 @@ import typer
 
 from coartic.cli import arguments as given
 from coartic.cli.read import say_ranking
-from coartic.cli.terminal import Display, say, say_pairs
+from coartic.cli.terminal import Display, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
@@ -134,15 +134,15 @@ def run(
 
 def list_(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Task, suite, method or family.")
+        str | None, typer.Argument(metavar="NAME", help="Task, suite, method, family or results.")
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """List tasks, suites and methods, or describe one of them."""
+    """List tasks, suites and methods, describe one of them, or list the runs of a folder."""
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
-    from coartic.tasks.families import shipped_families
+    from coartic.tasks.families import load_family, shipped_families
     from coartic.tasks.task import address_of
 
     registered, families = registry(method_file or []), shipped_families()
@@ -162,14 +162,19 @@ def list_(
         )
     (name,) = given.tasks_meant([name])
     if name.endswith(".toml"):
-        check_kind(name, "suite", "task")
+        check_kind(name, "suite", "task", "family")
     kind, methods = kind_of(name), list[str]()
     if kind == "suite":
         pairs = _describe_suite(name, load_suite(name))
-    elif name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
+    elif kind == "results folder":
+        return _list_runs(Path(name))
+    elif kind == "family":
+        pairs = _describe_family(load_family(name), name)
+    elif name in builtin_tasks() or address_of(name) or ".toml" in name:
         pairs = _describe_task(name, load_task(name))
     elif kind == "shipped family":
-        pairs = _describe_family(families.get(name) or families[f"{name}/v1"])
+        family = families.get(name) or families[f"{name}/v1"]
+        pairs = _describe_family(family, family.name)
     else:
         try:
             methods = given.methods_meant([name], registered)
@@ -211,11 +216,23 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
         yield "Goals are", "reconstructed" if task.reconstructed else "published in the paper"
 
 
-def _describe_family(family: Family) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: description and instances of a family."""
-    yield "Family", f"{family.name}: {family.description}"
-    yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
-    yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
+def _list_runs(folder: Path) -> None:
+    """Print a line for each run of the plan that a results folder has, with the id by which other
+    commands name the run."""
+    from coartic.runs.store import open_store
+
+    with open_store(folder) as store:
+        runs = store.runs()
+    columns = ["run_id", "task", "method", "setting", "run", "reward", "status"]
+    say_table(columns, runs[columns].astype("string").fillna("").to_numpy().tolist())
+    say(f"{folder}: {counted(len(runs), 'run')}.")
+
+
+def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
+    """Yield pairs of word and text: description and instances of a family, by its name or file."""
+    yield "Family", f"{name}: {family.description}"
+    yield "Instances", f"{name}/i000, ... (test); {name}/d000, ... (development)"
+    yield "Draw some", f"coartic draw {quote(name)}/i000..i003 --out FOLDER"
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
