@@ -99,6 +99,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         Goals in view beyond the next one.
     model : MotionModel
         Constants of movement.
+    render_mode : {"rgb_array"}, optional
+        With it ``render`` returns a picture of each robot.
 
     Raises
     ------
@@ -123,25 +125,40 @@ class TaskVectorEnv(Recorded, VectorEnv):
     takes the place of its result. Entries of joints that a robot does not have do nothing.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}
+    metadata: ClassVar[dict[str, Any]] = {
+        **{"render_modes": ["rgb_array"], "render_fps": 4},
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
 
     def __init__(
         self,
         num_envs: int,
-        task: Task | str | Path,
+        task: Task | str | Path | None = None,
         *,
         split: Split | None = None,
         count: int | None = None,
         year: int | None = None,
         ahead: int = 1,
         model: MotionModel = PAPER,
+        render_mode: str | None = None,
     ) -> None:
+        if task is None:
+            raise TypeError(
+                "task is missing: give task=, a task, its name or file, or a family, such as "
+                "task='two-armed/v1'"
+            )
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode is {brief_value(render_mode)}; it must be 'rgb_array' or None. "
+                "gymnasium.make knows others, such as 'human' for a window"
+            )
         check_limits("num_envs", num_envs, 1, 1_000_000)
         check_limits("ahead", ahead, 0, MOST_GOALS)
         # As a specification has them.
         task = parse_task(task, "task") if isinstance(task, dict) else task
         model = MotionModel(**model) if isinstance(model, dict) else model
         self.num_envs, self.model = num_envs, check_model(model)
+        self.render_mode = render_mode
         self.options = {"task": task, "ahead": ahead, "model": model}
         self.tasks: list[Task | str]  # or names of instances
         if isinstance(task, str | Path) and is_family(str(task)):
@@ -300,6 +317,30 @@ class TaskVectorEnv(Recorded, VectorEnv):
         infos = self._masked_infos() | final
         return state.seen.copy(), state.rewards.copy(), ended, np.zeros_like(ended), infos
 
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of each robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
+        so far are filled; None if the environment was made without ``render_mode``."""
+        if self.render_mode is None:
+            return None
+        return tuple(map(self.picture, range(self.num_envs)))
+
+    def picture(self, row: int) -> NDArray[np.uint8]:
+        """Return a picture of robot ``row``, from 0, as :meth:`render` does of all."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from coartic.drawing import box, circle_goals, draw_robot, fill_goals
+
+        task, state = self.task_at(self.state.task.item(row)), self.state
+        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+        figure = Figure(figsize=(6, 4))
+        canvas: Any = FigureCanvasAgg(figure)
+        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        draw_robot(axes, task, state.q[row, self._places_of(task.robot)], weight=1.5)
+        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[row])
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
     def _begin_anew(self, ended: NDArray[np.bool_]) -> None:
         number, rows = len(self.tasks), np.flatnonzero(ended)
         drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
@@ -318,14 +359,13 @@ class TaskEnv(Recorded, gymnasium.Env):
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
 
     def __init__(
-        self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
+        self,
+        task: Task | str | Path | None = None,
+        *,
+        render_mode: str | None = None,
+        **options: Any,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode is {brief_value(render_mode)}; it must be 'rgb_array' or None. "
-                "gymnasium.make knows others, such as 'human' for a window"
-            )
-        self.robots = TaskVectorEnv(1, task, **options)
+        self.robots = TaskVectorEnv(1, task, render_mode=render_mode, **options)
         self.action_space = self.robots.single_action_space
         self.observation_space = self.robots.single_observation_space
         self.render_mode = render_mode
@@ -356,23 +396,7 @@ class TaskEnv(Recorded, gymnasium.Env):
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture of the robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
         so far are filled; None if the environment was made without ``render_mode``."""
-        if self.render_mode is None:
-            return None
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        from coartic.drawing import box, circle_goals, draw_robot, fill_goals
-
-        robots, state = self.robots, self.robots.state
-        task = robots.task_at(state.task.item())
-        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
-        figure = Figure(figsize=(6, 4))
-        canvas: Any = FigureCanvasAgg(figure)
-        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-        draw_robot(axes, task, state.q[0, robots._places_of(task.robot)], weight=1.5)
-        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        return None if self.render_mode is None else self.robots.picture(0)
 
     def _info(self) -> dict[str, Any]:
         state, number = self.robots.state, self.robots.state.task.item()
@@ -427,9 +451,9 @@ def score(
 
     Parameters
     ----------
-    env : str, Env or VectorEnv
-        An environment of this package without wrappers, or its id. Of a family the instances of
-        the test split are scored, or of the ``split`` that is given here.
+    env : str, Env, VectorEnv or VecEnv
+        An environment of this package without wrappers, except ``VecNormalize``, or its id. Of a
+        family the instances of the test split are scored, or of the ``split`` that is given here.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
@@ -474,7 +498,7 @@ def score(
         if isinstance(each, Method):
             rewards[name] = column(_reward_of(each, task, seed, model) for task in tasks)
         elif each is not None:
-            rewards[name] = _rollout(_acting(each), given, len(tasks))
+            rewards[name] = _rollout(_acting(each, _normaliser(env)), given, len(tasks))
     rng = np.random.default_rng(seed)
     rewards["random actions"] = _rollout(
         lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), given, len(tasks), episodes
@@ -490,17 +514,18 @@ def column(rewards: Iterable[float | None]) -> Array:
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
 
 
-def _acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
+def _acting(policy: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
     """Return a function from observations to actions for a policy, a function or an agent with
-    ``predict``; an agent that was trained in ``VecNormalize`` gets observations normalised as
-    there. Raises TypeError for any other object and for an agent trained in another wrapper."""
+    ``predict``; one that was trained in ``VecNormalize``, or is given with it (``normal``), gets
+    observations normalised as there. Raises TypeError for any other object and for an agent
+    trained in another wrapper."""
+    normal = getattr(policy, "get_vec_normalize_env", lambda: None)() or normal
+    see = normal.normalize_obs if normal else np.asarray
     if hasattr(policy, "predict"):
-        normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
         get_env = getattr(policy, "get_env", lambda: None)
         env = _without_wrappers(get_env(), "the agent's environment", normal)
         for each in getattr(env, "envs", ()):
             _without_wrappers(each, "the agent's environment")
-        see = normal.normalize_obs if normal else np.asarray
         return lambda seen: policy.predict(see(seen), deterministic=True)[0]
     if not callable(policy):
         raise TypeError(
@@ -509,7 +534,7 @@ def _acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
         )
 
     def act(seen: NDArray[np.float32]) -> Any:
-        if isinstance(actions := policy(seen), tuple):
+        if isinstance(actions := policy(see(seen)), tuple):
             raise TypeError(
                 f"the policy returned a tuple of {len(actions)}; needed are the actions alone, "
                 "which are the first entry of what an agent's predict returns"
@@ -577,13 +602,19 @@ def _options_of(env: Any) -> dict[str, Any]:
         if env not in IDS:
             raise ValueError(unknown("environment", env, IDS))
         return IDS[env]
-    if not isinstance(getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
+    envs = getattr(env, "unwrapped", env)
+    if not isinstance(getattr(envs, "robots", envs), TaskVectorEnv):
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
-    env = _without_wrappers(env, "env")
-    options: dict[str, Any] = (env.robots if isinstance(env, TaskEnv) else env).options
+    env = _without_wrappers(env, "env", _normaliser(env))
+    options: dict[str, Any] = getattr(env, "robots", env).options
     return options
+
+
+def _normaliser(env: Any) -> Any:
+    """Return the environment itself if it is a ``VecNormalize`` of Stable-Baselines3, or None."""
+    return env if type(env).__name__ == "VecNormalize" else None
 
 
 def _without_wrappers(env: Any, name: str, known: Any = None) -> Any:
