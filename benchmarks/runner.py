@@ -13,7 +13,6 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import made_with
-from coartic.benchmarks.reproduce import doubts_of
+from coartic.benchmarks.reproduce import AFTER_ANOTHER, doubts_of
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
@@ -30,7 +29,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
-from coartic.runs.record import Run, late_import
+from coartic.runs.record import EARLIER, Run
 from coartic.runs.store import Store, writing
 
 _EXECUTORS = {
@@ -61,8 +60,8 @@ class Progress:
     """Runs of the plan that are not ok."""
     crashed: int = 0
     """Runs of the plan that crashed."""
-    late: dict[str, list[str]] = field(default_factory=dict)
-    """Files that runs of the folder loaded too late, by method (:meth:`Store.late_imports`)."""
+    marks: dict[str, list[str]] = field(default_factory=dict)
+    """Sentences on methods against which runs of the folder speak (:meth:`Store.marks`)."""
     others: Counter[int] = field(default_factory=Counter)
     """Runs of earlier commands in the folder that the plan does not ask for, by the seed of their
     suite. They are kept, and no report shows them."""
@@ -225,7 +224,7 @@ def perform(
         store.replace_plan(plan, made_with())
         progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
         progress.others[plan[0].seed] -= progress.stale.total()
-        progress.late = store.late_imports()
+        progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.cell.method.name] += len(job.numbers)
@@ -247,9 +246,17 @@ def perform(
                         progress.finish(run)
                         watch(progress, run.cell)
             jobs = alone
-        known, progress.late = progress.late, store.late_imports()
-        late = [late_import(*each) for each in progress.late.items() if each[0] not in known]
-        for doubt in chain(late, chain.from_iterable(map(doubts_of, first.values()))):
+        doubts = list[str]()
+        for run in first.values():
+            of_run = [*doubts_of(run)]
+            doubts += of_run
+            if any(AFTER_ANOTHER in doubt for doubt in of_run):
+                details = run.outcome.details | {EARLIER: [run.cell.task.name]}
+                store.write([replace(run, outcome=replace(run.outcome, details=details))])
+        known, progress.marks = progress.marks, store.marks()
+        found = {sentence for of_method in known.values() for sentence in of_method}
+        marks = [each for of_method in progress.marks.values() for each in of_method]
+        for doubt in [*(each for each in marks if each not in found), *doubts]:
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress

@@ -6,6 +6,7 @@ import math
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,7 +32,6 @@ from coartic.analysis.words import (
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
-from coartic.runs.record import late_import
 
 Made = TypeVar("Made")
 RUNS = 20
@@ -128,7 +128,7 @@ def limits(study: Study) -> dict[str, Any]:
                 if m.code != m.version
             }
         ),
-        "late": [late_import(*each) for each in study.late_imports.items()],
+        "late": [*chain.from_iterable(study.marks.values())],
         "cores": made_with["cores"],
     }
 

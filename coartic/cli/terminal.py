@@ -101,7 +101,6 @@ class Display:
         """Show the progress and the last run; before the first run (``cell`` None) what the folder
         holds already."""
         from coartic.analysis.methods import title_of
-        from coartic.runs.record import late_import
 
         total = progress.total
         if cell is None:
@@ -115,8 +114,8 @@ class Display:
             if progress.present:
                 coming = counted(total - progress.present, "run")
                 self.line(f"Already there: {progress.present} of {total}; to come: {coming}.")
-                for each in progress.late.items():
-                    self.line(f"{late_import(*each)}.")
+                for sentences in progress.marks.values():
+                    self.line(f"{'; '.join(sentences)}.")
         if progress.present == total:
             return
         there, seconds, left = progress.present + progress.done, progress.time_left, ""

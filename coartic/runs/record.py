@@ -34,6 +34,8 @@ PARTS = tuple(PREFIXES)
 LATE = "late_imports"
 """Entry of the details of a run: files of the user's that a run of its process first loaded, too
 late to count as the code of its method."""
+EARLIER = "earlier_runs"
+"""Entry of the details of a run that came out otherwise after another run: its task, in a list."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
 _MOST_NUMBERS = 400_000
@@ -58,8 +60,11 @@ class Score(NamedTuple):
     """Joint travel of the arm that a solution does not choose, rad."""
 
 
-def late_import(method: str, files: Sequence[str]) -> str:
-    """Return a sentence on files (:data:`LATE`) that runs of a method loaded too late."""
+def mark_of(method: str, kind: str, files: Sequence[str]) -> str:
+    """Return a sentence on a method some of whose runs have an entry ``kind`` in their details: on
+    ``files`` that were loaded too late (:data:`LATE`), or the tasks of these (:data:`EARLIER`)."""
+    if kind == EARLIER:
+        return f"{method}: results depend on earlier runs (seen on {', '.join(files)})"
     was = "was" if len(files) == 1 else "were"
     return (
         f"{method}: {', '.join(files)} {was} first loaded during a run, so that a change there is "

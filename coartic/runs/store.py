@@ -40,6 +40,7 @@ from coartic.runs.method_info import version_of
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
+    EARLIER,
     LATE,
     LONGEST_SOLUTION,
     PREFIXES,
@@ -48,6 +49,7 @@ from coartic.runs.record import (
     Score,
     Status,
     Times,
+    mark_of,
     movement_data,
     movement_from,
     reward_bytes,
@@ -270,14 +272,15 @@ class Store:
             {(name, version_of(old), version_of(now)): n for name, old, now, n in self._rows(query)}
         )
 
-    def late_imports(self) -> dict[str, list[str]]:
-        """Return, by method, the files that runs of the plan first loaded while they ran
-        (``late_imports`` of their details)."""
-        query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{LATE}')
-            WHERE json_type(details, '$.{LATE}') = 'array' ORDER BY method, value"""
+    def marks(self) -> dict[str, list[str]]:
+        """Return, by method, sentences on what details of runs of the plan say against them
+        (:func:`.mark_of`)."""
         found = defaultdict[str, list[str]](list)
-        for method, name in self._rows(query):
-            found[method].append(str(name))
+        for kind in (LATE, EARLIER):
+            query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{kind}')
+                WHERE json_type(details, '$.{kind}') = 'array' ORDER BY method, value"""
+            for method, rows in groupby(self._rows(query), itemgetter(0)):
+                found[method].append(mark_of(method, kind, [str(value) for _, value in rows]))
         return dict(found)
 
     def others(self) -> Counter[int]:
