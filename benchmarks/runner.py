@@ -26,7 +26,7 @@ from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted
+from coartic.internal.text import counted, error_line
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
 from coartic.runs.record import EARLIER, Run
@@ -132,7 +132,8 @@ class Progress:
 
 
 Watcher = Callable[[Progress, Cell | None], None]
-"""Function that is called before the first run, and after each run with its cell."""
+"""Function that is called before the first run, and after each run with its cell. An exception in
+it ends no run: a warning says so, and it is not called again."""
 
 
 def run_suite(
@@ -215,7 +216,16 @@ def perform(
         a method with missing runs has no code here.
     """
     folder, clock = folder_named(folder), time.perf_counter()
-    watch = watch or (lambda progress, cell: None)
+    watches = [watch] if watch else []
+
+    def tell(cell: Cell | None) -> None:
+        try:
+            for each in watches:
+                each(progress, cell)
+        except Exception as error:
+            watches.clear()
+            warnings.warn(f"watch is not called again: {error_line(error)}", stacklevel=3)
+
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
         known = " or ".join(_EXECUTORS.values())
@@ -229,7 +239,7 @@ def perform(
         for job in missing:
             progress.waiting[job.cell.method.name] += len(job.numbers)
         progress.workers = executor.workers
-        watch(progress, None)
+        tell(None)
         jobs, first = _divided(missing, executor.workers), dict[str, Run]()
         while jobs:
             alone: list[Job] = []
@@ -244,7 +254,7 @@ def perform(
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
                             first.setdefault(run.cell.method.name, run)
                         progress.finish(run)
-                        watch(progress, run.cell)
+                        tell(run.cell)
             jobs = alone
         doubts = list[str]()
         for run in first.values():

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from coartic import __version__, film, load_task
+from coartic import CoarticError, __version__, film, load_task
 from coartic.analysis.report import build
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
@@ -20,6 +20,7 @@ from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
+from coartic.runs.store import lock
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
@@ -482,3 +483,26 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
         for option in known.params:
             if command != "run" and option.opts[0] not in (option.name, "--help", "--open"):
                 assert {f"{command} {each}" for each in option.opts} & tried, option.opts
+
+
+@pytest.mark.process
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is full")
+def test_a_full_device_behind_a_stream_ends_no_run(tmp_path):
+    """What is printed on it is lost; of the standard output a sentence says so."""
+    command = [sys.executable, "-m", "coartic", *map(str, SMALL), "--runs", "3", "--out"]
+    for stream, code in (("stderr", 0), ("stdout", 2)):
+        out = tmp_path / stream
+        with open("/dev/full", "w") as full:
+            streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, stream: full}
+            done = subprocess.run([*command, out], text=True, cwd=ROOT, **streams)
+        assert done.returncode == code, done
+        assert (load(out).runs.status == "ok").all()
+        if stream == "stdout":
+            assert "Error: the standard output cannot be written: No space left" in done.stderr
+            assert "Traceback" not in done.stderr
+
+
+def test_two_reports_of_a_folder_are_written_one_after_the_other(tmp_path, traced):
+    with lock(tmp_path), pytest.raises(CoarticError, match="another `coartic report` is at work"):
+        build.write_report(traced, tmp_path)
+    assert not (tmp_path / "report.html").exists()

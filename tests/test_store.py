@@ -258,6 +258,20 @@ def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lo
         perform(PLAN, tmp_path / "out", executor=InProcess(2), watch=watch)
 
 
+def test_an_error_of_the_watch_ends_no_run(tmp_path):
+    def watch(progress, _):
+        seen.append(progress.done)
+        if progress.done == 1:
+            raise OSError(28, "No space left on device")
+
+    seen = []
+    with pytest.warns(UserWarning, match="watch is not called again: OSError.*No space left"):
+        progress = perform(PLAN, tmp_path, executor=InProcess(), watch=watch)
+    assert (progress.done, seen) == (9, [0, 1])
+    with open_store(tmp_path) as store:
+        assert len(store.ids()) == 9
+
+
 class TooSlow(InProcess):
     def perform(self, jobs):
         for job in jobs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import os
 import shutil
 import sys
 import textwrap
@@ -10,6 +11,7 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, TextIO
 
+from coartic.errors import CoarticError
 from coartic.internal.text import counted, one_line, plain
 
 if TYPE_CHECKING:
@@ -33,11 +35,21 @@ codecs.register_error("replaced", _replaced)
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print lines; characters that do not print, such as line breaks in names, are replaced, and
-    those that the terminal lacks (:func:`_replaced`)."""
+    those that the terminal lacks (:func:`_replaced`). Raises CoarticError if the standard output
+    cannot be written; where standard error cannot, the lines are lost."""
     stream = stream or sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
     text = "\n".join(map(one_line, lines)).encode(encoding, "replaced").decode(encoding)
-    print(text, file=stream, end=end, flush=True)
+    try:
+        print(text, file=stream, end=end, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # such as a full device
+        with open(os.devnull, "w", encoding="utf-8") as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())  # what is left to be written
+        if stream is sys.stdout:
+            words = f"the standard output cannot be written: {error.strerror or error}"
+            raise CoarticError(words) from None
 
 
 def complain(kind: str, text: str) -> None:
@@ -74,7 +86,7 @@ def say_part(name: str) -> None:
     """Show on a terminal what is being made, in one line that changes; an empty name ends it."""
     if sys.stderr.isatty():
         width = shutil.get_terminal_size().columns - 1
-        print("\r", end="", file=sys.stderr)
+        say("", stream=sys.stderr, end="\r")
         say(f"{plain(name, width):{width}}", stream=sys.stderr, end="" if name else "\r")
 
 
@@ -95,7 +107,7 @@ class Display:
         return self
 
     def __exit__(self, *_: object) -> None:
-        print(end=self._end, file=sys.stderr, flush=True)
+        say("", stream=sys.stderr, end=self._end)
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
         """Show the progress and the last run; before the first run (``cell`` None) what the folder
@@ -135,6 +147,6 @@ class Display:
 
     def line(self, text: str) -> None:
         """Print a line; the progress continues below the line."""
-        print(end=self._end, file=sys.stderr)
+        say("", stream=sys.stderr, end=self._end)
         self._end = ""
         say(text, stream=sys.stderr)

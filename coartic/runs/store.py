@@ -580,7 +580,7 @@ def open_store(folder: Path) -> Iterator[Store]:
             connection.execute("BEGIN")  # all reads of this block see one state
             if not _has_tables(connection):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
-            with _lock(folder, shared=True):  # refused while a process writes
+            with lock(folder, shared=True):  # refused while a process writes
                 pass
         yield Store(folder, connection)
 
@@ -607,7 +607,7 @@ def writing(folder: Path) -> Iterator[Store]:
                 f"{folder} is not empty and holds no results of coartic. Choose another folder."
             )
         make_folder(folder)
-    with _lock(folder):
+    with lock(folder):
         with explain_errors(folder):
             _check_files(folder)
             opened = _connect((folder / RUNS_FILE).absolute().as_uri(), WAIT_S)
@@ -625,9 +625,9 @@ def writing(folder: Path) -> Iterator[Store]:
 
 
 @contextmanager
-def _lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Lock a folder for this process, or share the lock with other readers. Systems and disks
-    without such locks are left as they are.
+def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
+    """Lock a folder for this process, which performs a ``command``, or share the lock with other
+    readers. Systems and disks without such locks are left as they are.
 
     Raises CoarticError while another process holds the lock.
     """
@@ -647,7 +647,7 @@ def _lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
             except BlockingIOError:
                 if time.monotonic() > end:
                     raise CoarticError(
-                        f"another `coartic run` is at work in {folder}; wait for it, or choose "
+                        f"another `{command}` is at work in {folder}; wait for it, or choose "
                         "another folder"
                     ) from None
                 time.sleep(WAIT_S / 20)
