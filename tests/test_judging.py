@@ -1,5 +1,6 @@
 """Verdicts on planted findings, and tests of planted means over tasks."""
 
+import numpy as np
 import pytest
 
 from coartic import CoarticError
@@ -64,3 +65,18 @@ def test_opposites_are_corrected_over_the_claims_too():
     entries = judged(*(found(False, p) for p in (0.96, 0.975, 0.999)))
     assert entries.verdict.tolist() == ["undecided", "undecided", "not supported"]
     assert entries.opposite_p_holm.tolist() == pytest.approx([0.0502, 0.0502, 0.0033])
+
+
+def test_each_bound_of_a_verdict_on_both_sides():
+    """5 % does not support, and does not refute; two tasks are too few, three are judged."""
+    seen = mean_beyond("{}", [4.0, 5.0, 6.0])
+    unseen = mean_beyond("{}", [-4.0, 5.0, -6.0])
+    below = np.nextafter(0.05, 0)
+    assert [seen.verdict(p, NAN) for p in (below, 0.05)] == ["supported", "undecided"]
+    assert [unseen.verdict(NAN, p) for p in (below, 0.05)] == ["not supported", "undecided"]
+    assert [mean_beyond("{}", [4.0] * n).holds for n in (2, 3)] == [None, True]
+    assert [mean_beyond("{}", [1.0, 2.0, 3.0], bound).holds for bound in (1.99, 2.0, 2.01)] == [
+        True, False, False,
+    ]  # fmt: skip
+    below_two = [mean_beyond("{}", [1.0, 2.0, 3.0], bound, "less").holds for bound in (2.0, 2.01)]
+    assert below_two == [False, True]

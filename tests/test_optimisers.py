@@ -436,3 +436,11 @@ def test_a_method_cannot_see_its_task():
         cost.fresh()
     assert "best known" not in repr(cost)
     assert cost.hand_sequences == coartic.hand_sequences(FOUR)
+
+
+def test_targets_are_costs_from_zero_to_that_of_a_failure():
+    cost = objective("ascending")
+    assert cost.evaluations_to([0, FAILED]).tolist() == [np.inf, 0.0]
+    for target in (-1e-9, -1, FAILED + 1, np.nan):
+        with pytest.raises(ValueError, match="each must be a cost"):
+            cost.evaluations_to(target)

@@ -94,6 +94,7 @@ def test_smallest_p():
     [
         ([[0.0, 1.0, 2.5, 4.2, 9.1, 17.3]], [1]),
         ([[0.0, 2.1, 5.3, 12.7], [3.0, 4.6, 5.9, 9.2]], [1, -1]),
+        ([[0.0, 1.0, 2.5, 4.2, 9.1, 13.3], [0.3, 1.6, 5.9]], [1, -1]),  # of unequal sizes
     ],
 )
 def test_bca_interval_against_all_resamples(samples, weights):
@@ -238,3 +239,14 @@ def test_procedures_are_calibrated_on_rewards_with_a_known_truth(population):
     rates = np.mean([right_of_rewards(rng, draw, mean) for _ in range(100)], axis=0)
     assert (rates >= 0.8).all(), rates
     assert not right_of_rewards(rng, draw, 5.0)[0]
+
+
+def test_the_least_number_of_values_on_both_sides():
+    two, three = [1.0, 4.0], [1.0, 2.0, 4.0]
+    assert [math.isnan(statistics.mean(of).low) for of in (two, three)] == [True, False]
+    for first, second, none in ((two, three, True), (three, two, True), (three, three[::-1], True),
+                                (three, [5.0, 6.0, 9.0], False)):  # fmt: skip
+        tested = hypotheses.exchange_test(first, second)
+        assert math.isnan(tested.p) == (none and min(len(first), len(second)) < 3)
+    assert math.isnan(hypotheses.bootstrap_test([1.0], 0).p)
+    assert not math.isnan(hypotheses.bootstrap_test(two, 0).p)
