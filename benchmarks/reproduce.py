@@ -16,10 +16,10 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.motion.solution import hint_of
+from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
 from coartic.runs.record import EARLIER, LATE, PARTS, Run, too_long
 from coartic.runs.store import open_store
-from coartic.trajectories import Trajectory, trajectory
 
 AFTER_ANOTHER = "with the same seed after another run"
 """Words of a doubt about a method whose results depend on its earlier runs (:func:`doubts_of`)."""

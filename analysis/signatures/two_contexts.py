@@ -25,12 +25,10 @@ from coartic.analysis.signatures.context_tests import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.estimates import SEED
-from coartic.internal.arguments import checked_arguments
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import KEPT
 
 
-@checked_arguments
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
     shared first goals have a following goal in both tasks. Pairs with n = 0, and with different
@@ -45,14 +43,12 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     return [pair for pair in pairs if pair[2]]
 
 
-@checked_arguments
 def movable(task: Task, hand: Hand) -> Array:
     """Return the indices in a configuration that move a hand: free base coordinates and its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
-@checked_arguments
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
     """Return the motor-equivalent part and the other part of a difference of configurations Δq.
 
@@ -152,7 +148,6 @@ class TwoContexts:
         """P-value of the permutation test of runs; NaN if a context has a single run."""
         return permutation_p(*self.configurations, self._rng("context dependence"))
 
-    @checked_arguments
     def p_beyond(self, other: TwoContexts) -> float:
         """Return the p-value of the test that the posture difference exceeds that of ``other``,
         another method at the same goal (:func:`.beyond_p`); NaN if a context has a single run."""

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.limits import brief_value, real_array, refuse_entries
+from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
 from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel
@@ -78,10 +78,9 @@ class Movement:
     __eq__ = equal_contents
 
     def __post_init__(self) -> None:
-        if type(self.target) is not np.ndarray:
-            refuse_entries("target", self.target)
-        if self.waypoints is not None:
-            refuse_entries("waypoints", self.waypoints)
+        for name, given in (("target", self.target), ("waypoints", self.waypoints)):
+            if given is not None:
+                real_array(name, given)
 
     def __repr__(self) -> str:
         named = ("goal", "hand", "kind", "target", "ticks", "waypoints")

@@ -1,54 +1,34 @@
-"""Tasks and families as environments of Gymnasium: a step is a goal, its reward minus the ticks.
-
-Importing this module registers ``coartic/Ascending-v2``, ``Descending-v2``, ``TwoArmed1-v2``,
-``TwoArmed2-v2``, and ``coartic/Task-v2`` for any other task or a family. It needs the extra
-``coartic[gym]``.
-"""
+"""N robots that act side by side, each in a trial of its own, as a vector environment."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
-import gymnasium
 import numpy as np
-import pandas as pd
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
+from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from coartic.errors import CoarticError, NotApplicableError
-from coartic.estimates import Estimate, mean
-from coartic.gym_kernel import VectorState, observe, step_robots
-from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
-from coartic.internal.text import counted, unknown
-from coartic.method import Method, MethodError, run_method
+from coartic.gym.kernel import VectorState, observe, step_robots
+from coartic.internal.limits import MOST_RUN_SEED, brief_value, check_limits, real_array
+from coartic.internal.text import counted
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import robot_parameters
-from coartic.motion.solution import execute, initial_reward
 from coartic.motion.trial import count_trials
-from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
-from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import MOST_GOALS, Split, Task, parse_task
-
-if TYPE_CHECKING:
-    from coartic.sb3 import RobotEnvs
 
 REACH = 0.5
 """Half the width of the box of targets, length unit (base) and rad (angles)."""
-ADDED = ("OrderEnforcing", "PassiveEnvChecker", "Monitor", "VecMonitor")
-"""Wrappers that the libraries add by themselves; they change neither observations nor actions."""
 RowIndex = NDArray[np.int64] | slice
 
 
@@ -77,9 +57,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
     """Let N robots act side by side, in a fraction of the time of N :class:`TaskEnv`.
 
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
-    process fails, which costs ``coartic.optimisers.FAILED``. A trial that has ended starts again in
-    the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info`` are what
-    it ended with. Nothing is random but which instance of a family is drawn.
+    process fails, which costs ``coartic.method.optimisers.FAILED``. A trial that has ended starts
+    again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info``
+    are what it ended with. Nothing is random but which instance of a family is drawn.
 
     Parameters
     ----------
@@ -276,11 +256,11 @@ class TaskVectorEnv(Recorded, VectorEnv):
         0) has ``seed + i``; a robot with None keeps its random generator, which draws the tasks.
         Raises ValueError for any option, and for seeds that are not whole numbers from 0.
         """
-        _check_no_options(options)
+        check_no_options(options)
         if isinstance(seed, Iterable):
-            seeds = [*map(_whole_seed, seed)]
+            seeds = [*map(whole_seed, seed)]
         else:
-            first = _whole_seed(seed)
+            first = whole_seed(seed)
             seeds = [None if first is None else first + row for row in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             there = counted(self.num_envs, "environment")
@@ -329,7 +309,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        from coartic.drawing import box, circle_goals, draw_robot, fill_goals
+        from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals
 
         task, state = self.task_at(self.state.task.item(row)), self.state
         (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
@@ -351,309 +331,16 @@ class TaskVectorEnv(Recorded, VectorEnv):
         return infos | {f"_{name}": np.full(self.num_envs, there) for name in infos}
 
 
-class TaskEnv(Recorded, gymnasium.Env):
-    """Environment of one robot: options, observations, actions and rewards of
-    :class:`TaskVectorEnv`, whose trials begin with a reset only; ``render_mode`` may be
-    ``"rgb_array"``."""
-
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
-
-    def __init__(
-        self,
-        task: Task | str | Path | None = None,
-        *,
-        render_mode: str | None = None,
-        **options: Any,
-    ) -> None:
-        self.robots = TaskVectorEnv(1, task, render_mode=render_mode, **options)
-        self.action_space = self.robots.single_action_space
-        self.observation_space = self.robots.single_observation_space
-        self.render_mode = render_mode
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin a trial, of the task or of a random instance of the family; return observation
-        ``(O,)`` and info. With ``seed`` None the generator goes on. Raises ValueError for any
-        option, and for a seed that is no whole number from 0."""
-        super().reset(seed=_whole_seed(seed))
-        _check_no_options(options)
-        self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
-        return self.robots.state.seen[0].copy(), self._info()
-
-    def step(
-        self, action: ArrayLike
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Reach for the next goal by an action ``(A,)``; return observation ``(O,)``, reward (ticks
-        below 0), whether the trial has ended, False (no trial is truncated) and info. Raises
-        ResetNeeded if the trial had ended before or no trial was begun."""
-        state = self.robots.state
-        if not state.going[0]:
-            raise ResetNeeded("no trial goes on: reset first")
-        self.robots._move(real_array("action", action)[None])
-        return state.seen[0].copy(), state.rewards.item(), not state.going[0], False, self._info()
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture of the robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
-        so far are filled; None if the environment was made without ``render_mode``."""
-        return None if self.render_mode is None else self.robots.picture(0)
-
-    def _info(self) -> dict[str, Any]:
-        state, number = self.robots.state, self.robots.state.task.item()
-        is_success = state.goal.item() == state.counts.item(number)
-        return {"task": self.robots.names[number], "is_success": is_success}
-
-
-def _check_no_options(options: Mapping[str, Any] | None) -> None:
+def check_no_options(options: Mapping[str, Any] | None) -> None:
     """Raise ValueError if a reset has options; None and an empty mapping pass."""
     if options is not None and not (isinstance(options, Mapping) and not options):
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 
 
-def _whole_seed(seed: Any) -> int | None:
+def whole_seed(seed: Any) -> int | None:
     """Return a seed, a whole number from 0, as an int, or None for None. Raises ValueError for
     anything else."""
     if seed is None:
         return None
     check_limits("seed", seed, 0, MOST_RUN_SEED)
     return int(seed)
-
-
-def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
-    """Make ``num_envs`` robots side by side a ``VecEnv`` of Stable-Baselines3.
-
-    ``env`` is an id, such as ``"coartic/TwoArmed1-v2"``; ``options`` are options of
-    :class:`TaskVectorEnv`. Trials start again by themselves, actions are clipped, and rewards are
-    minus the ticks, as shares of what the corrective process takes for the whole trial. Raises
-    ValueError or TypeError for an id of another package and for a wrong option, and CoarticError
-    if Stable-Baselines3 is not installed.
-    """
-    try:
-        from coartic.sb3 import RobotEnvs
-    except ImportError:
-        raise CoarticError("coartic.gym.sb3 needs: pip install 'coartic[rl]'") from None
-
-    return RobotEnvs(TaskVectorEnv(num_envs, **_options_of(env) | options))
-
-
-Policy = Callable[[NDArray[np.float32]], ArrayLike] | Method | Any
-
-
-def score(
-    env: str | gymnasium.Env | VectorEnv,
-    policy: Policy | Mapping[str, Policy] | None = None,
-    *,
-    episodes: int = 20,
-    seed: int = 0,
-    **options: Any,
-) -> pd.DataFrame:
-    """Compare policies and planners with random actions and the best known solutions.
-
-    Parameters
-    ----------
-    env : str, Env, VectorEnv or VecEnv
-        An environment of this package without wrappers, except ``VecNormalize``, or its id. Of a
-        family the instances of the test split are scored, or of the ``split`` that is given here.
-    policy : callable, agent, Method or mapping, optional
-        Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
-        ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
-        benchmark, such as a planner, that solves each task. For an agent that was trained in
-        ``VecNormalize``, observations are normalised as there. A mapping has several, by their
-        names.
-    episodes : int
-        Trials of random actions on each task.
-    seed : int
-        Of random actions and of methods.
-    **options
-        Those of :class:`TaskVectorEnv`.
-
-    Returns
-    -------
-    DataFrame
-        A row for each policy, for uniformly random actions, for the corrective process alone with
-        the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
-        over tasks, ticks; ``gap`` to the best known reward, a share of it, with its 95 % interval
-        ``gap_low`` to ``gap_high`` (BCa bootstrap) over tasks, or of one task over trials;
-        ``completed``, the share of trials that hit all goals: where it is below 1, reward and gap
-        are NaN. NaN also where nothing is known, or too few trials for an interval.
-        ``attrs["units"]`` has the units.
-
-    Raises
-    ------
-    ValueError, TypeError
-        The environment is not coartic's or has a wrapper, an option is wrong, or the policy is
-        no policy, or an agent that was trained in another wrapper.
-    """
-    check_limits("episodes", episodes, 1, MOST_CELLS)
-    check_limits("seed", seed, 0, MOST_RUN_SEED)
-    given = _options_of(env) | options
-    if isinstance(task := given.get("task"), str | Path) and is_family(str(task)):
-        given = {"split": "test", **given}
-    setting = TaskVectorEnv(1, **given)
-    model, shape = setting.model, setting.single_action_space.shape
-    tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
-    policies = policy if isinstance(policy, Mapping) else {"policy": policy}
-    rewards = {}
-    for name, each in policies.items():
-        if isinstance(each, Method):
-            rewards[name] = column(_reward_of(each, task, seed, model) for task in tasks)
-        elif each is not None:
-            rewards[name] = _rollout(_acting(each, _normaliser(env)), given, len(tasks))
-    rng = np.random.default_rng(seed)
-    rewards["random actions"] = _rollout(
-        lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), given, len(tasks), episodes
-    )
-    rewards["corrective process"] = column(initial_reward(task, model) for task in tasks)
-    shipped = [best_shipped(task) if model == PAPER else None for task in tasks]
-    return compare(rewards, column(None if each is None else each.reward for each in shipped))
-
-
-@checked_arguments
-def column(rewards: Iterable[float | None]) -> Array:
-    """Return K rewards as an array of shape ``(K, 1)``, with NaN for None."""
-    return np.array([[np.nan if reward is None else reward] for reward in rewards])
-
-
-def _acting(policy: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a function from observations to actions for a policy, a function or an agent with
-    ``predict``; one that was trained in ``VecNormalize``, or is given with it (``normal``), gets
-    observations normalised as there. Raises TypeError for any other object and for an agent
-    trained in another wrapper."""
-    normal = getattr(policy, "get_vec_normalize_env", lambda: None)() or normal
-    see = normal.normalize_obs if normal else np.asarray
-    if hasattr(policy, "predict"):
-        get_env = getattr(policy, "get_env", lambda: None)
-        env = _without_wrappers(get_env(), "the agent's environment", normal)
-        for each in getattr(env, "envs", ()):
-            _without_wrappers(each, "the agent's environment")
-        return lambda seen: policy.predict(see(seen), deterministic=True)[0]
-    if not callable(policy):
-        raise TypeError(
-            f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
-            "with predict, or a Method"
-        )
-
-    def act(seen: NDArray[np.float32]) -> Any:
-        if isinstance(actions := policy(see(seen)), tuple):
-            raise TypeError(
-                f"the policy returned a tuple of {len(actions)}; needed are the actions alone, "
-                "which are the first entry of what an agent's predict returns"
-            )
-        return actions
-
-    return act
-
-
-def _rollout(
-    act: Callable[[NDArray[np.float32]], ArrayLike],
-    options: Mapping[str, Any],
-    tasks: int,
-    trials: int = 1,
-) -> Array:
-    """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make ``trials``
-    trials on each of ``tasks`` tasks of a :class:`TaskVectorEnv` with these options.
-
-    Returns the total rewards, ticks, shape ``(tasks, trials)``; NaN where a trial failed.
-    """
-    rows = np.arange(trials * tasks)
-    robots, totals = TaskVectorEnv(len(rows), **options), np.zeros(len(rows))
-    robots._begin(rows, rows // trials)
-    while len(rows):
-        robots._move(real_array("actions", act(robots.state.seen[rows])), rows)
-        totals[rows] += robots.state.rewards[rows]
-        rows = np.flatnonzero(robots.state.going)
-    return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
-
-
-@checked_arguments
-def compare(rewards: Mapping[str, Array], best: Array) -> pd.DataFrame:
-    """Return a table with reward, gap and share of completed trials, a row for each policy and one
-    for the best known (:func:`score`). ``rewards``, by policy, have shapes ``(K, trials)`` for K
-    tasks, NaN where a trial failed; ``best`` has the best known rewards, shape ``(K, 1)``, NaN
-    where none is known. Raises ValueError for other shapes."""
-    best, rewards = np.asarray(best), {name: np.asarray(each) for name, each in rewards.items()}
-    shapes = [earned.shape for earned in (best, *rewards.values())]
-    if any(len(shape) != 2 or shape[0] != len(best) for shape in shapes):
-        raise ValueError(f"rewards have shapes {shapes}; needed is a row for each task")
-    rows, known = {}, np.isfinite(best[:, 0])
-    for name, earned in {**rewards, "best known": best}.items():
-        gap = ((best - earned) / np.abs(best))[known]
-        values = gap.ravel() if len(best) == 1 else gap.mean(axis=1)
-        failed = name != "best known" and not np.isfinite(earned).all()
-        usable = len(values) > 0 and np.isfinite(values).all() and not failed
-        rows[name] = {
-            "reward": earned.mean(axis=1).mean(),
-            **(mean(values) if usable else Estimate(np.nan)).columns("gap"),
-            "completed": float(np.isfinite(earned).mean()),
-        }
-    rows["best known"]["completed"] = np.nan
-    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("policy")
-    gaps = dict.fromkeys(["gap", "gap_low", "gap_high"], "share of the best known reward")
-    table.attrs["units"] = {"reward": "ticks", **gaps, "completed": "share of trials"}
-    return table
-
-
-def _options_of(env: Any) -> dict[str, Any]:
-    """Return the options ``task``, ``ahead`` and ``model`` of an environment of this package, or
-    the options with which an id is registered, as a dictionary, not a copy: do not change it.
-    Raises ValueError for an unknown id, and TypeError for anything else and for an environment
-    in a wrapper that is not among :data:`ADDED`."""
-    if isinstance(env, str):
-        if env not in IDS:
-            raise ValueError(unknown("environment", env, IDS))
-        return IDS[env]
-    envs = getattr(env, "unwrapped", env)
-    if not isinstance(getattr(envs, "robots", envs), TaskVectorEnv):
-        raise TypeError(
-            f"env is {brief_value(env)}; it must be an environment of coartic or its id"
-        )
-    env = _without_wrappers(env, "env", _normaliser(env))
-    options: dict[str, Any] = getattr(env, "robots", env).options
-    return options
-
-
-def _normaliser(env: Any) -> Any:
-    """Return the environment itself if it is a ``VecNormalize`` of Stable-Baselines3, or None."""
-    return env if type(env).__name__ == "VecNormalize" else None
-
-
-def _without_wrappers(env: Any, name: str, known: Any = None) -> Any:
-    """Return the environment inside its wrappers: those that Gymnasium and Stable-Baselines3 add by
-    themselves (:data:`ADDED`), and the wrapper ``known``, the object itself, if given. Raises
-    TypeError for any other wrapper, whose changes would be left out; the message calls the
-    environment ``name``."""
-    while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
-        if env is not known and type(env).__name__ not in ADDED:
-            raise TypeError(
-                f"{name} is wrapped in {type(env).__name__}, which score would leave out: give the "
-                "environment without wrappers (env.unwrapped), and a policy that does to "
-                "observations and actions what they do"
-            )
-        env = env.venv if hasattr(env, "venv") else env.env
-    return env
-
-
-def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Return the reward, ticks, of a method's solution of a task when executed; None if the method
-    does not apply, finds no solution, or the solution misses a goal."""
-    with suppress(MethodError, NotApplicableError):
-        result, _ = run_method(method, task, seed, model=model)
-        return execute(task, result.solution, model=model).reward
-    return None
-
-
-IDS: dict[str, dict[str, Any]] = {
-    "coartic/Ascending-v2": {"task": "ascending"},
-    "coartic/Descending-v2": {"task": "descending"},
-    "coartic/TwoArmed1-v2": {"task": "two-armed-1"},
-    "coartic/TwoArmed2-v2": {"task": "two-armed-2"},
-    "coartic/Task-v2": {},
-}
-for _name, _given in IDS.items():
-    if _name not in gymnasium.registry:
-        gymnasium.register(
-            _name,
-            entry_point="coartic.gym:TaskEnv",
-            vector_entry_point="coartic.gym:TaskVectorEnv",
-            kwargs=_given,
-        )
