@@ -249,7 +249,8 @@ BOUNDS = re.findall(r"^\| (\w+) \| `(.*?)`", PAGE, re.MULTILINE)
 
 
 @pytest.mark.parametrize(("library", "line"), BOUNDS)
-def test_bounds_are_taken_by_each_library_of_the_page(library, line):
+def test_bounds_are_taken_by_each_library_of_the_page(library, line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # pycma writes a log
     name = {"pycma": "cma", "IOHprofiler": "ioh"}.get(library, library.lower())
     module, cost = pytest.importorskip(name), objective("ascending", budget=30)
     names = {name: module, "cost": cost}
