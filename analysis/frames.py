@@ -33,9 +33,14 @@ from coartic.internal.text import counted, plain
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
-_LARGEST_GAP = 10
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
+_TWICE = (
+    "a run is there twice (runs of two sources that count alike need a column seed, folder or "
+    "run_id; number the draws of a bootstrap in a column run)"
+)
+_SOURCES = ("folder", "seed", "run_id", "run")
+"""Columns by which runs of a method on a task differ: all of them that a frame has."""
 
 
 def checked(
@@ -46,7 +51,8 @@ def checked(
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
     """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
-    missing numbers, ``names`` and ``others`` as they are.
+    missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` has
+    to agree: a run has a reward if it is ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
     that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
@@ -77,6 +83,11 @@ def checked(
             _refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
         columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
         _refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
+    if "reward" in numbers and "status" in frame.columns:
+        is_ok = (frame.status.astype(object) == "ok").to_numpy(bool)
+        stated = columns.assign(status=frame.status)
+        rule = "a run has a reward if its status is ok, and NaN otherwise"
+        _refuse_rows(stated, "status", is_ok != columns.reward.notna(), rule)
     return columns
 
 
@@ -139,26 +150,36 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     ``share`` where the frame has ``corrective_best``.
 
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
-    number of the task, from 0, in the order of names. ``more``: names of other columns of numbers
-    to keep. Raises CoarticError as :func:`checked` and :func:`_with_gaps` do, and for a task with
-    several best known rewards.
+    number of the task, from 0, in the order of names; ``key`` is the same number in all rows of a
+    run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError
+    as :func:`checked` and :func:`_with_gaps` do, and for a task with several best known rewards.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
-    setting = ["setting"] * ("setting" in there)
-    columns = _with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=setting))
+    others = [name for name in ("setting", *_SOURCES) if name in there]
+    columns = _with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=others))
     number, tasks = pd.factorize(columns.task)
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     for name in {"best_known", ZERO} & {*columns}:
         several = columns[name].groupby(task).transform("nunique") > 1
         _refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
     names = columns.method.to_numpy(object)
-    if setting:
+    if "setting" in there:
         settings = columns.setting.astype(object).where(columns.setting.notna(), "").astype(str)
         several = settings.groupby(pd.factorize(names)[0]).transform("nunique") > 1
         labels = np.array([*map(label_of, map(str, names), settings)], dtype=object)
         names = np.where(several, labels, names)
-    return columns.assign(task=task, method=pd.Series(names, columns.index, dtype=object))
+    frame = columns.assign(task=task, method=pd.Series(names, columns.index, dtype=object))
+    keys = [name for name in _SOURCES if name in there]
+    run = frame.groupby(["method", "task", *keys], dropna=False, sort=False).ngroup()
+    return frame.assign(key=run if keys else np.arange(len(frame)))
+
+
+def _scored_runs(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the frame of :func:`scored`. Raises CoarticError also for two rows of a run."""
+    found = scored(frame)
+    _refuse_rows(found, "method", found.duplicated("key"), f"{_TWICE}; needed is a row for a run")
+    return found
 
 
 def gaps(frame: pd.DataFrame) -> pd.Series:
@@ -304,7 +325,7 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
             task method  reward  n    gap
     0  ascending   mine  -298.0  2  0.021
     """
-    values = scored(frame).assign(task=frame.task)
+    values = _scored_runs(frame).assign(task=frame.task)
     scores = [name for name in ("gap", "share") if name in values]
     groups = values.groupby(["task", "method"], sort=False)
     table = groups.agg(reward=("reward", "mean"), n=("reward", "count")).join(groups[scores].mean())
@@ -368,7 +389,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     mine    0.021        0       0
     yours   0.062        0       0
     """
-    frame = scored(frame)
+    frame = _scored_runs(frame)
     by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
     known = [of_method[of_method.best_known.notna()] for of_method in by_method.values()]
     every = compared_tasks(zip(by_method, ({*runs.task} for runs in known), strict=True))
@@ -432,16 +453,23 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     0   mine    40.0    0.5
     1   mine   900.0    1.0
     """
-    run = checked(frame, names=("run",)).run
-    frame = scored(frame, "trials").assign(run=run)
+    checked(frame, names=("run",))
+    frame = scored(frame, "trials")
+    in_order = frame.sort_values(["trials", "reward"], kind="stable")
+    again = in_order.duplicated(["key", "trials"]) & ~in_order.duplicated(
+        ["key", *SCORES, "trials"]
+    )
+    falls = in_order.groupby("key").reward.diff() < 0
+    improve = f"{_TWICE}, or its reward falls; needed are the best rewards so far"
+    _refuse_rows(in_order, "method", again | falls, improve)
     _refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
     reach = np.empty(0)
     with suppress(TypeError, ValueError):  # no numbers
         reach = real_array("targets", targets)
-    if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach < _LARGEST_GAP)).all():
+    if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach <= 1)).all():
         raise CoarticError(
             f"targets are {brief_value(targets)}: needed are gaps, shares of the best known reward "
-            f"from 0 to {_LARGEST_GAP} (not per cent), such as [0.1, 0.05, 0.01]"
+            "from 0 to 1, such as [0.1, 0.05, 0.01] for 10, 5 and 1 % (no per cent, no ticks)"
         )
     if not frame.best_known.notna().any():
         raise CoarticError("the frame has no best_known reward, so no targets")
@@ -449,7 +477,7 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     for method, of_method in frame.groupby("method", sort=False):
         times = []
         for task in every:
-            runs = of_method[of_method.task == task].groupby("run")
+            runs = of_method[of_method.task == task].groupby("key")
             reached = [[run.trials[run.gap <= gap].min() for gap in reach] for _, run in runs]
             trials = np.array(reached or [[np.nan] * len(reach)], dtype=np.float64)
             times.append(np.where(np.isnan(trials), np.inf, trials))

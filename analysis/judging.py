@@ -21,6 +21,7 @@ from coartic.analysis.words import capital, interval, p_value
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.internal.arguments import Numbers, checked_arguments
+from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
 
 RESAMPLES_OF_CLAIMS = 99_999
@@ -93,7 +94,8 @@ def mean_beyond(
     Parameters
     ----------
     sentence : str
-        Sentence of the evidence, with ``{}`` in the place of the mean and its interval.
+        Sentence of the evidence, with one ``{}`` in the place of the mean and its interval; other
+        braces are text.
     values : array_like, shape (tasks,)
         A value for each task; NaN, which does not count, for a task without a value.
     bound : float
@@ -111,7 +113,7 @@ def mean_beyond(
     Raises
     ------
     CoarticError
-        For another side.
+        For another side, and for a sentence that has not one ``{}``.
 
     Examples
     --------
@@ -119,6 +121,8 @@ def mean_beyond(
     >>> finding.holds, finding.evidence
     (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
     """
+    if sentence.count("{}") != 1:
+        raise CoarticError(f"the sentence {brief_value(sentence)} needs one {{}}, for the mean")
     there = np.asarray(values)
     there = there[~np.isnan(there)]
     if len(there) < FEWEST:
@@ -127,7 +131,7 @@ def mean_beyond(
     test, without = _tests_over_tasks(sign * there, sign * bound)
     opposite = max(_tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
     found = interval(mean(there).columns("mean"), "mean", 2)
-    evidence = f"{sentence.format(found)} ({counted(len(there), 'task')})"
+    evidence = f"{sentence.replace('{}', found)} ({counted(len(there), 'task')})"
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
 

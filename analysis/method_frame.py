@@ -36,8 +36,8 @@ OWN_COLOR = "brown"
 """Colour of methods from files: no built-in method has it."""
 
 
-LATE_MARK = " ‡"
-"""Mark behind the title of a method that loaded files of the user's too late."""
+MARK = " ‡"
+"""Mark behind the title of a method against which something was found (:attr:`.Study.marks`)."""
 
 
 def methods_of(
@@ -54,7 +54,7 @@ def methods_of(
     declared : mapping of str to MethodInfo
         Declaration of each method, by its id without a setting.
     marked : collection of str, optional
-        Ids of methods whose titles get :data:`LATE_MARK`.
+        Ids of methods whose titles get :data:`MARK`.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def methods_of(
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
             "parts": (label,),
-            "title": title_of(base, setting) + LATE_MARK * (base in marked),
+            "title": title_of(base, setting) + MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,

@@ -129,7 +129,7 @@ def load(folder: str | Path) -> Study:
                 "or has a part of the runs. Repeat the `coartic run` command, which does what is "
                 "missing, or --include all parts in another folder."
             )
-        return Study(folder, plan, store.made_with(), runs, store.late_imports())
+        return Study(folder, plan, store.made_with(), runs, store.marks())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,8 +143,9 @@ class Study:
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     stored: pd.DataFrame
     """Runs as stored, a row for each; :attr:`runs` has further columns."""
-    late_imports: dict[str, list[str]] = field(default_factory=dict)
-    """Files that runs loaded too late to count as code of their method, by the method's id."""
+    marks: dict[str, list[str]] = field(default_factory=dict)
+    """What was found against methods, sentences by the method's id: code that was loaded too late,
+    and results that depend on earlier runs."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -200,7 +201,7 @@ class Study:
         kept = pd.MultiIndex.from_tuples([(job.cell.task.name, job.cell.label) for job in jobs])
         of = pd.MultiIndex.from_frame(self.runs[["task", "label"]])
         stored = self.stored[of.isin(kept)]
-        part = Study(self.folder, jobs, self.made_with, stored, self.late_imports)
+        part = Study(self.folder, jobs, self.made_with, stored, self.marks)
         vars(part)["optima"] = {
             name: self.optima[name] for name in part.tasks if name in self.optima
         }
@@ -309,7 +310,7 @@ class Study:
         - ``under``: label of the method of a setting or ablation, if this method ran; or empty;
         - ``look``: colour and dash in figures.
         """
-        return methods_of(self.runs, self.declared, self.late_imports)
+        return methods_of(self.runs, self.declared, self.marks)
 
     @cached_property
     def cells(self) -> dict[CellKey, pd.DataFrame]:

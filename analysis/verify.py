@@ -58,8 +58,10 @@ PLANNED = (  # all that a plan says
     "SELECT * FROM plan JOIN cells ON cells.id = cell ORDER BY position",
 )
 # Whatever a file says, it is checked in bounded time and memory.
-MOST_GOALS, LONGEST_TEXT, LONGEST_PATH = 256, 100_000, 10_000_000  # characters of tasks, paths
+MOST_GOALS, LONGEST_TEXT, LONGEST_PATH = 256, 100_000, 10_000_000  # characters of tasks, solutions
 MOST_TRIALS, MOST_TICKS, MOST_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run, movement
+LONGEST_VALUE = 50_000_000  # bytes of a value in the file
+NO_PLAN = "It has no plan yet: repeat the `coartic run` command."
 UNCHECKED = (
     "Times, dates, reasons, counts of what was spent, and where and with what it was run are taken "
     "as stored; so is what methods declare, and what the suite was called.",
@@ -241,8 +243,8 @@ def check_runs(folder: Path) -> _Report:
     """Execute all stored runs of a results folder again, check its cells and plan; report what
     differs or is unchecked.
 
-    Runs that the last plan does not ask for are among them. Raises sqlite3.Error if the folder
-    cannot be read.
+    Runs that the last plan does not ask for are among them. Raises sqlite3.Error or ValueError if
+    the folder cannot be read.
     """
     with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:
         db.row_factory = sqlite3.Row
@@ -253,6 +255,12 @@ def _check_all(db: sqlite3.Connection) -> _Report:
     """Check the plan, the cells, and the runs one by one; none if a table or view is foreign."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
+    db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
+    if not db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+        return _Report(0, 0, [], [NO_PLAN], [])
+    for name, ours in (("application_id", 0x636F6172), ("user_version", 6)):
+        (there,) = db.execute(f"PRAGMA {name}").fetchone()
+        need(there == ours, f"its {name} is {there}, and {ours} in a file of coartic of format 6")
     query = f"""SELECT sql FROM sqlite_master WHERE sql IS NOT NULL
         AND (type = 'trigger' OR name IN ({", ".join("?" for _ in OURS)})) ORDER BY type, name"""
     if hash_of([sql for (sql,) in db.execute(query, OURS)])[:16] != SCHEMA:
@@ -352,7 +360,7 @@ def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
 def _missing(db: sqlite3.Connection) -> Iterator[str]:
     """Yield a sentence if the plan, or a part of its runs, is not there."""
     if not db.execute("SELECT count(*) FROM suite").fetchone()[0]:
-        yield "It has no plan yet: repeat the `coartic run` command."
+        yield NO_PLAN
     query = """SELECT runs, count(run), min(run) FROM plan LEFT JOIN asked USING (position)
         GROUP BY position"""
     counts = db.execute(query).fetchall()
@@ -394,6 +402,9 @@ def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[Mo
     """Return the movements of a run by part (empty where it has none), and all as stored, part by
     part, which the result's hash covers. Raises ValueError for a missing or malformed one."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
+    query = "SELECT part, sum(length(path)) FROM movements WHERE result_id = ? GROUP BY part"
+    for part, length in db.execute(query, [run]):
+        need(length <= LONGEST_PATH, f"{part} is too long")
     stored: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
         WHERE result_id = ? ORDER BY "order\""""
@@ -401,7 +412,6 @@ def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[Mo
         need(order == len(parts[part]), f"movement {len(parts[part])} is missing")
         which, is_count = f"movement {order}", type(ticks) is int and 0 <= ticks <= MOST_TICKS
         need(is_count, f"{which} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
-        need(len(text) <= LONGEST_PATH, f"{which} is too long")
         points = np.array(json.loads(text), dtype=np.float64)
         is_place = points.ndim == 1 + (kind == "path") and len(points)
         need(is_place, f"{which}: {kind} has no such points")
@@ -416,14 +426,14 @@ def main() -> int:
     folder = Path(*sys.argv[1:])
     try:
         report = check_runs(folder)
-    except sqlite3.Error as error:
-        print(f"{folder} cannot be read: {error}.")
-        return 2
-    print(f"{report.runs} runs checked, {report.movements} movements executed.")
-    lines = [*(report.wrong or ["Nothing differs."]), *report.unfinished, "Not checked:"]
-    lines += report.unchecked
+        code = 1 if report.wrong or report.unfinished else 0
+        lines = [f"{report.runs} runs checked, {report.movements} movements executed."]
+        lines += [*(report.wrong or ["Nothing differs."]), *report.unfinished, "Not checked:"]
+        lines += report.unchecked
+    except Exception as error:  # whatever the file holds
+        code, lines = 2, [f"{folder} cannot be read: {error}."]
     print(*("".join(c if c.isprintable() else "?" for c in line) for line in lines), sep="\n")
-    return 1 if report.wrong or report.unfinished else 0
+    return code
 
 
 if __name__ == "__main__":

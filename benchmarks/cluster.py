@@ -22,6 +22,7 @@ from coartic.runs.record import Outcome
 WORKERS_S = 600.0  # longest wait for a worker
 _PAUSE_S = 0.05  # pause between looks for finished jobs
 _RETURN_S = 2.0  # time in which a restarted worker connects again
+_LOGGERS = "distributed", "distributed.client", "tornado.application", "asyncio"
 _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
@@ -79,11 +80,12 @@ class Dask:
             client.close(timeout=3)
 
     def _client(self) -> Any:
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported here
         try:
             from distributed import Client
             from distributed.comm.addressing import resolve_address
 
+            for name in _LOGGERS:  # to which Dask gives levels when it is imported
+                logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported here
             resolve_address(self.address)  # without a port, a client would wait for a minute
             return Client(self.address, set_as_default=False)
         except ImportError:

@@ -148,7 +148,8 @@ def _warn_of_gaps(
             )
         if few:
             words = (
-                f"{counted(len(few[0].numbers), 'run')} of {_named(few)}; {most} are asked for here"
+                f"{counted(len(jobs[few[0].cell.digest].numbers), 'run')} of {_named(few)}; "
+                f"{most} are asked for here"
             )
             warnings.warn(f"{name} has {words}", stacklevel=4)
 

@@ -34,7 +34,15 @@ from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain_inline, sentence_error
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, tasks_by_name, trials_in
-from coartic.tasks.families import instance_of, named_by, own_families, read_family
+from coartic.tasks.families import (
+    instance_of,
+    is_file,
+    load_family,
+    named_by,
+    own_families,
+    read_family,
+    shipped_families,
+)
 from coartic.tasks.task import address_of, check_task
 
 
@@ -219,7 +227,9 @@ def _asked_tasks(
     """
     for path in request.family_files:
         check_kind(str(path), "family")
-    families = own_families(request.family_files)
+    of_tasks = [each.rpartition("/")[0] for each in request.tasks if isinstance(each, str)]
+    paths = (*request.family_files, *(Path(each) for each in of_tasks if is_file(each)))
+    families = own_families([*dict.fromkeys(paths)])
     names, own = dict[str, None](), dict[str, Task]()
 
     def task_named(name: str) -> Task:
@@ -232,10 +242,12 @@ def _asked_tasks(
 
     for each in request.tasks:
         if isinstance(each, str) and not each.endswith(".toml"):
-            names |= dict.fromkeys(named_by(each))
+            place, _, numbers = each.rpartition("/")
+            named = f"{load_family(place).name}/{numbers}" if is_file(place) else each
+            names |= dict.fromkeys(named_by(named))
             continue
         task = load_task(each) if isinstance(each, str) else check_task(each)
-        is_known = task.name in builtin_tasks() or address_of(task.name)
+        is_known = task.name in builtin_tasks() or task.family in (*families, *shipped_families())
         if (task_named(task.name) if is_known else own.setdefault(task.name, task)) != task:
             whose = "a shipped task" if is_known else "another task"
             raise CoarticError(

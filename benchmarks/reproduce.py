@@ -18,8 +18,11 @@ from coartic.method import Meter
 from coartic.motion.solution import hint_of
 from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
-from coartic.runs.record import LATE, PARTS, Run, too_long
+from coartic.runs.record import EARLIER, LATE, PARTS, Run, too_long
 from coartic.runs.store import open_store
+
+AFTER_ANOTHER = "with the same seed after another run"
+"""Words of a doubt about a method whose results depend on its earlier runs (:func:`doubts_of`)."""
 
 
 def find_run(prefix: str, folder: Path) -> Run:
@@ -122,7 +125,7 @@ def doubts_of(run: Run) -> Iterator[str]:
     other, again = perform_in_order(jobs)
     for change in compare_runs(run, again)[:1]:
         yield (
-            f"{name} gives another result on {task} with the same seed after another run "
+            f"{name} gives another result on {task} {AFTER_ANOTHER} "
             f"({change}): it keeps something, or draws from a generator without a seed; {advice}"
         )
     changes = compare_runs(run, other)
@@ -140,12 +143,13 @@ def doubts_of(run: Run) -> Iterator[str]:
 
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Return the differences between the results of two runs, in words, an empty list for equal
-    results. Times and environments do not count, nor rewards that one run does not keep, nor files
-    that were loaded late: earlier runs of a process may have loaded them."""
+    results. Times and environments do not count, nor rewards that one run does not keep, nor marks
+    (:func:`.mark_of`), which depend on earlier runs."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
+    marks = LATE, EARLIER
     first, second = (
-        run.to_row() | {"details": {k: v for k, v in run.outcome.details.items() if k != LATE}}
+        run.to_row() | {"details": {k: v for k, v in run.outcome.details.items() if k not in marks}}
         for run in (a, b)
     )
     changes = [

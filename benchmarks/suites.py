@@ -119,7 +119,7 @@ _TAKEN_BY = {
     "results folder": "coartic report {}",
     "suite": "coartic run {}",
     "task": "coartic run SUITE --tasks {}",
-    "family": "coartic run SUITE --family-file {}",
+    "family": "coartic run SUITE --tasks {}/i000..i009",
     "method file": "coartic check METHOD --method-file {}",
     "shipped family": "coartic list {}",
 }

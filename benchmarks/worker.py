@@ -38,6 +38,7 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
+_LONGEST_DETAILS = 10_000_000
 
 
 def process_peak_mb() -> float | None:
@@ -204,6 +205,8 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
 
 def _plain_details(details: Any) -> dict[str, Any]:
     """Return a copy of the details of a result as plain data. Raises TypeError or ValueError for
-    details that JSON cannot hold."""
+    details that JSON cannot hold, and for more than 10,000,000 characters."""
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
+    if len(text) > _LONGEST_DETAILS:
+        raise ValueError(f"details of {len(text)} characters; at most {_LONGEST_DETAILS} are kept")
     return dict(json.loads(text.encode()))

@@ -46,6 +46,8 @@ FEWER_RESAMPLES = 1_999
 LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""
+HUGE = 50_000
+"""Beyond so many values an interval is that of a normal distribution, which the mean then has."""
 IN_CACHE = 1 << 18
 """Values that are drawn at once: few enough for the processor's cache."""
 NEGLIGIBLE = 1e-9
@@ -136,7 +138,8 @@ def mean_of_means(
     - no spread in any sample: the interval is that point, which says that the samples have no
       spread, not that the populations have none;
     - a sample of more than :data:`LARGE` values, or one for which BCa is not defined: the
-      percentile interval.
+      percentile interval;
+    - a sample of more than :data:`HUGE` values: the normal interval.
     """
     if not samples:
         raise ValueError("needed is a sample at least")
@@ -148,6 +151,10 @@ def mean_of_means(
         return Estimate(value, n=n)
     if not any(map(varies, samples)):
         return Estimate(value, value, value, n=n)
+    if max(n) > HUGE:
+        variances = (weight**2 * sample.var(ddof=1) / len(sample) for sample, weight in parts)
+        width = scipy.special.ndtri(TAILS[1]) * math.sqrt(sum(variances))
+        return Estimate(value, value - width, value + width, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
     kept = sum(n) <= LARGE

@@ -6,9 +6,11 @@ import math
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
@@ -38,7 +40,6 @@ from coartic.analysis.words import (
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
-from coartic.runs.record import late_import
 
 Made = TypeVar("Made")
 RUNS = 20
@@ -86,7 +87,8 @@ def finding(study: Study, section: Section) -> list[str]:
     environment.filters |= {"number": number, "counts": lambda each: tally(Counter(each))}
     standings, asked = without_settings(board(study)), trials_of(study)
     below = standings.index[~standings.ranked.astype(bool)]
-    unequal = standings[[asked[label] != equal_trials(study) for label in standings.index]]
+    is_unequal = [asked[label] != equal_trials(study) for label in standings.index]
+    unequal = standings[np.array(is_unequal, dtype=bool)]
     rows = rows[~rows.method.isin(below)]
     environment.globals |= {
         "not_ranked": not_ranked(study), "unequal": {*unequal.information},
@@ -140,7 +142,7 @@ def limits(study: Study) -> dict[str, Any]:
                 if m.code != m.version
             }
         ),
-        "late": [late_import(*each) for each in study.late_imports.items()],
+        "late": [*chain.from_iterable(study.marks.values())],
         "cores": made_with["cores"],
     }
 

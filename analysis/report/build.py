@@ -31,6 +31,7 @@ from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of
+from coartic.runs.store import lock
 
 HERE = Path(__file__).parent
 
@@ -56,6 +57,14 @@ def write_report(
             "of its own."
         )
     make_folder(folder, ["report.html"])
+    with lock(folder, command="coartic report"):
+        return _write_locked(study, folder, for_paper, watch)
+
+
+def _write_locked(
+    study: Study, folder: Path, for_paper: bool, watch: Callable[[str], object]
+) -> tuple[list[str], dict[str, str]]:
+    """Write a report as :func:`write_report` does into a folder that this process has locked."""
     home, report = os.path.relpath(study.folder, folder), folder / "report.html"
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)

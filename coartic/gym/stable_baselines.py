@@ -31,7 +31,7 @@ class RobotEnvs(VecEnv):
 
     def __init__(self, envs: Any) -> None:
         self.render_mode = envs.render_mode
-        self._envs, self._lost = envs, np.zeros(envs.num_envs)
+        self.robots, self._lost = envs, np.zeros(envs.num_envs)
         self._steps = np.zeros(envs.num_envs, dtype=np.int64)
         self._costs: dict[int, float] = {}
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
@@ -44,7 +44,7 @@ class RobotEnvs(VecEnv):
         self._reset_seeds()
         self._reset_options()
         self._lost[:], self._steps[:] = 0, 0
-        observations: NDArray[np.float32] = self._envs.reset(seed=seeds, options=options)[0]
+        observations: NDArray[np.float32] = self.robots.reset(seed=seeds, options=options)[0]
         return observations
 
     def step_async(self, actions: Array) -> None:
@@ -59,8 +59,8 @@ class RobotEnvs(VecEnv):
         and N dictionaries. A trial that has ended starts again at once: its observation is the
         first of the next trial, and its dictionary has ``terminal_observation`` and ``episode``.
         """
-        costs = np.array([self._cost(task) for task in self._envs.state.task.tolist()])
-        observations, rewards, ended, _, seen = self._envs.step(self._actions)
+        costs = np.array([self._cost(task) for task in self.robots.state.task.tolist()])
+        observations, rewards, ended, _, seen = self.robots.step(self._actions)
         self._lost += rewards
         self._steps += 1
         infos: list[dict[str, Any]] = [{} for _ in costs]
@@ -94,6 +94,6 @@ class RobotEnvs(VecEnv):
         """Return the ticks of the corrective process alone on task ``number`` (from 0), at least 1;
         ``FAILED`` if the process fails."""
         if number not in self._costs:
-            reward = initial_reward(self._envs.task_at(number), self._envs.model)
+            reward = initial_reward(self.robots.task_at(number), self.robots.model)
             self._costs[number] = float(FAILED if reward is None else max(-reward, 1))
         return self._costs[number]

@@ -24,7 +24,7 @@ from coartic.motion.batch import robot_parameters
 from coartic.motion.trial import count_trials
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
-from coartic.tasks.families import LOCKED, instance_names, shipped_families
+from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
 from coartic.tasks.task import MOST_GOALS, Split, Task, parse_task
 
 REACH = 0.5
@@ -66,7 +66,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
     num_envs : int
         Number of robots.
     task : Task, str or Path
-        The task; or a family, ``"two-armed/v1"``: each trial has an instance of the family.
+        The task; or a family, ``"two-armed/v1"`` or the path of its file: each trial has an
+        instance of the family.
     split : {"development", "test", "fresh"}, optional
         Instances to train on (by default), to report on, or those of a ``year``. They never mix.
     count : int, optional
@@ -78,6 +79,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         Goals in view beyond the next one.
     model : MotionModel
         Constants of movement.
+    render_mode : {"rgb_array"}, optional
+        With it ``render`` returns a picture of each robot.
 
     Raises
     ------
@@ -102,29 +105,45 @@ class TaskVectorEnv(Recorded, VectorEnv):
     takes the place of its result. Entries of joints that a robot does not have do nothing.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}
+    metadata: ClassVar[dict[str, Any]] = {
+        **{"render_modes": ["rgb_array"], "render_fps": 4},
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
 
     def __init__(
         self,
         num_envs: int,
-        task: Task | str | Path,
+        task: Task | str | Path | None = None,
         *,
         split: Split | None = None,
         count: int | None = None,
         year: int | None = None,
         ahead: int = 1,
         model: MotionModel = PAPER,
+        render_mode: str | None = None,
     ) -> None:
+        if task is None:
+            raise TypeError(
+                "task is missing: give task=, a task, its name or file, or a family, such as "
+                "task='two-armed/v1'"
+            )
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode is {brief_value(render_mode)}; it must be 'rgb_array' or None. "
+                "gymnasium.make knows others, such as 'human' for a window"
+            )
         check_limits("num_envs", num_envs, 1, 1_000_000)
         check_limits("ahead", ahead, 0, MOST_GOALS)
         # As a specification has them.
         task = parse_task(task, "task") if isinstance(task, dict) else task
         model = MotionModel(**model) if isinstance(model, dict) else model
         self.num_envs, self.model = num_envs, check_model(model)
+        self.render_mode = render_mode
         self.options = {"task": task, "ahead": ahead, "model": model}
         self.tasks: list[Task | str]  # or names of instances
-        if isinstance(task, str) and task in shipped_families():
-            family = shipped_families()[task]
+        if isinstance(task, str | Path) and is_family(str(task)):
+            task = str(task)
+            family = load_family(task)
             self.tasks = [*instance_names(task, split or "development", count, year)]
             locked = set.intersection(*({*LOCKED[base]} for base in family.base))
             (fewest, links), hands, goals = family.links, family.hands, family.goals[1]
@@ -277,6 +296,30 @@ class TaskVectorEnv(Recorded, VectorEnv):
             self._begin_anew(ended)
         infos = self._masked_infos() | final
         return state.seen.copy(), state.rewards.copy(), ended, np.zeros_like(ended), infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of each robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
+        so far are filled; None if the environment was made without ``render_mode``."""
+        if self.render_mode is None:
+            return None
+        return tuple(map(self.picture, range(self.num_envs)))
+
+    def picture(self, row: int) -> NDArray[np.uint8]:
+        """Return a picture of robot ``row``, from 0, as :meth:`render` does of all."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals
+
+        task, state = self.task_at(self.state.task.item(row)), self.state
+        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+        figure = Figure(figsize=(6, 4))
+        canvas: Any = FigureCanvasAgg(figure)
+        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        draw_robot(axes, task, state.q[row, self._places_of(task.robot)], weight=1.5)
+        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[row])
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _begin_anew(self, ended: NDArray[np.bool_]) -> None:
         number, rows = len(self.tasks), np.flatnonzero(ended)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from abc import abstractmethod
 from collections.abc import Sequence
 from contextlib import suppress
@@ -34,7 +35,13 @@ from coartic.method import (
 )
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.motion.solution import Movement, corrective_trial, movements_of
+from coartic.motion.solution import (
+    WHOLE_TURNS,
+    Movement,
+    corrective_trial,
+    hint_of,
+    movements_of,
+)
 from coartic.motion.trial import (
     Accounts,
     HandSequences,
@@ -94,6 +101,14 @@ def sequences_of(session: Session) -> list[str]:
     return sorted(sequences, key=lambda hands: hands != session.initial_hands)
 
 
+def _entries_of(name: str, points: ArrayLike) -> Array:
+    """Return points as an array (:func:`real_array`). Raises ValueError for a frame or a series of
+    pandas, whose names of columns could say another order."""
+    if hasattr(points, "iloc"):
+        raise ValueError(f"{name} has names of pandas: give {name}.to_numpy(), in order of entries")
+    return real_array(name, points)
+
+
 class Objective:
     """Cost of a trial, its ticks, as a function of its target configurations.
 
@@ -118,8 +133,18 @@ class Objective:
     """
 
     __slots__ = (
-        *("joints", "configurations", "dim", "bounds", "evaluations", "best_cost", "best_hands"),
-        *("_asked", "_best_targets", "_best_x", "_better", "_codes", "_end", "_entries", "_hands"),
+        *("joints", "configurations", "dim", "bounds"),
+        *(
+            "_asked",
+            "_best_cost",
+            "_best_hands",
+            "_best_targets",
+            "_best_x",
+            "_better",
+            "_codes",
+            "_end",
+        ),
+        *("_entries", "_evaluations", "_hands"),
         *("_process", "_session", "_targets", "_task"),
     )  # no others are set by mistake, such as a budget
 
@@ -160,15 +185,12 @@ class Objective:
         """Number of parameters."""
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
-        self.evaluations = 0
-        """Number of points evaluated; the first trials are not among them."""
-        self.best_cost = float(-alone.rewards[best])
-        """Cost of the best trial so far, ticks; at first that of the corrective process alone."""
-        self.best_hands = self.hands
-        """Hand sequence of the best trial so far."""
+        self._evaluations = 0
+        self._best_cost = float(-alone.rewards[best])
+        self._best_hands = self.hands
         self._best_x: Array = np.full(self.dim, np.nan)
         self._best_targets = alone.targets[best].copy()
-        self._better = [(0, self.best_cost)]
+        self._better = [(0, self._best_cost)]
 
     def __reduce__(self) -> Any:
         raise CoarticError(NO_COPIES)
@@ -229,6 +251,31 @@ class Objective:
     # What was found so far.
 
     @property
+    def evaluations(self) -> int:
+        """Number of points evaluated; the first trials are not among them."""
+        return self._evaluations
+
+    @property
+    def best_cost(self) -> float:
+        """Cost of the best trial so far, ticks; at first that of the corrective process alone."""
+        return self._best_cost
+
+    @property
+    def best_hands(self) -> str:
+        """Hand sequence of the best trial so far."""
+        return self._best_hands
+
+    @property
+    def lower(self) -> Array:
+        """Lower ends of ``bounds``, shape ``(dim,)``, a copy."""
+        return self.bounds[:, 0].copy()
+
+    @property
+    def upper(self) -> Array:
+        """Upper ends of ``bounds``, shape ``(dim,)``, a copy."""
+        return self.bounds[:, 1].copy()
+
+    @property
     def history(self) -> pd.DataFrame:
         """Table of the best costs so far, a row each time the best cost fell. Columns:
         ``evaluations``, the number made until then, 0 for the corrective process alone, and
@@ -281,7 +328,7 @@ class Objective:
         its goal are NaN. Goals that are missed are corrected by ``execute``. Raises UndeclaredError
         in a method, which has :attr:`solution`, and ValueError if point or hands do not fit.
         """
-        task, point = self.task, real_array("x", x)
+        task, point = self.task, _entries_of("x", x)
         if point.shape != (self.dim,):
             raise ValueError(f"x has shape {point.shape}; needed is ({self.dim},)")
         self._check(point[None])
@@ -313,7 +360,7 @@ class Objective:
         """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
         columns as scipy has them. Raises ValueError for shape ``(dim, dim)``, in which points may
         be rows: :meth:`many` takes rows. Other errors are those of :meth:`many`."""
-        point = real_array("x", x)
+        point = _entries_of("x", x)
         if point.ndim == 2 and len(point) == self.dim:
             if point.shape[1] == self.dim:
                 raise ValueError(
@@ -333,9 +380,10 @@ class Objective:
             self._targets.put(self._entries, point)
             made = self._session._make_trials(self._codes, self._targets)
             cost = float(min(-made.rewards.item(), FAILED))
-            self.evaluations += 1
-            if cost < self.best_cost:
-                self._keep(cost, self.evaluations, point, self._codes, made, 0)
+            self._evaluations += 1
+            if cost < self._best_cost:
+                self._keep(cost, self._evaluations, point, self._codes, made, 0)
+            self._warn_of_degrees(cost, made, 0)
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
@@ -351,7 +399,7 @@ class Objective:
         are made, for the first points. Raises ValueError for another shape, for infinite entries,
         for a goal that is NaN in part, and for hands that do not fit the task.
         """
-        array = real_array("points", points)
+        array = _entries_of("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
             raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
         self._check(array)
@@ -371,21 +419,31 @@ class Objective:
         ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and note each new best."""
         made = self._session._make_trials(codes, self._targets_of(points))
         np.minimum(-made.rewards, FAILED, out=costs)
-        if costs.min() < self.best_cost:
-            before = np.minimum.accumulate(np.append(self.best_cost, costs))[:-1]
+        if costs.min() < self._best_cost:
+            before = np.minimum.accumulate(np.append(self._best_cost, costs))[:-1]
             for n in np.flatnonzero(costs < before).tolist():
-                at = self.evaluations + n + 1
+                at = self._evaluations + n + 1
                 self._keep(float(costs[n]), at, points[n], codes, made, n)
-        self.evaluations += len(points)
+        self._evaluations += len(points)
+        worst = int(costs.argmax())
+        self._warn_of_degrees(costs[worst], made, worst)
+
+    def _warn_of_degrees(self, cost: float, made: Accounts, trial: int) -> None:
+        """Warn, outside of a method, of a costly trial (row ``trial`` of ``made``) whose targets
+        may be meant in degrees, as :func:`coartic.execute` does."""
+        if self._task is not None and cost > WHOLE_TURNS / self._session.model.step:
+            targets = self._targets_in(made, trial)
+            if hint := hint_of(movements_of(self.hands, targets)):
+                warnings.warn(hint, stacklevel=4)
 
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
         """Note a point as the best so far, evaluated as number ``evaluations`` (from 1): ``trial``
         (from 0) is the row of its trial in ``codes`` and in ``made``."""
-        self.best_cost, self._best_x = cost, point.copy()
+        self._best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
-        self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
+        self._best_hands = letters_of([HANDS[code] for code in codes[trial]])
         self._better.append((evaluations, cost))
 
     def _targets_in(self, made: Accounts, trial: int) -> Configs:

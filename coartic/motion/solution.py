@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
+from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import width_of
 from coartic.motion.movement import LARGEST_ENTRY, configuration, correct, follow, move
@@ -48,7 +49,7 @@ HELD = 1e-6
 less."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Movement:
     """Movement of a solution (:func:`execute`).
 
@@ -74,6 +75,7 @@ class Movement:
     waypoints: Array | None = None
     """Configurations that a path passes through, shape ``(k, dof)``, from where the robot stands
     to ``waypoints[-1]``, length unit (base) and rad (joints); None for the other kinds."""
+    __eq__ = equal_contents
 
     def __post_init__(self) -> None:
         for name, given in (("target", self.target), ("waypoints", self.waypoints)):
@@ -86,7 +88,7 @@ class Movement:
         return short_repr(self, **{k: v for k, v in facts.items() if v is not None})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Execution:
     """An executed solution (:func:`execute`)."""
 
@@ -105,6 +107,7 @@ class Execution:
     """Forward-kinematics evaluations made."""
     reason: str = ""
     """Why the task was not completed; empty where it was."""
+    __eq__ = equal_contents
 
     def __repr__(self) -> str:
         names = ("hands", "reward", "ticks", "corrections")

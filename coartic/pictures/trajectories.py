@@ -15,6 +15,7 @@ from coartic.errors import SolutionError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import check_limits
 from coartic.internal.text import short_repr
+from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import line_points, path_points
 from coartic.motion.solution import Execution, Movement, execute
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Every control tick of an execution that hit all goals (:func:`trajectory`)."""
 
@@ -42,6 +43,7 @@ class Trajectory:
     hits: NDArray[np.int64]
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""
+    __eq__ = equal_contents
 
     def __repr__(self) -> str:
         return short_repr(

@@ -34,8 +34,14 @@ PARTS = tuple(PREFIXES)
 LATE = "late_imports"
 """Entry of the details of a run: files of the user's that a run of its process first loaded, too
 late to count as the code of its method."""
+EARLIER = "earlier_runs"
+"""Entry of the details of a run that came out otherwise after another run: its task, in a list."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
+_MOST_NUMBERS = 400_000
+"""Most entries of the targets and waypoints of a solution, each of at most 25 characters."""
+LONGEST_SOLUTION = 25 * _MOST_NUMBERS
+"""Most characters of the stored paths of a solution."""
 MOST_STEPS = 1_000_000
 """Most movement steps of a solution through its targets in order; solutions of the paper's tasks
 have some thousands."""
@@ -54,8 +60,11 @@ class Score(NamedTuple):
     """Joint travel of the arm that a solution does not choose, rad."""
 
 
-def late_import(method: str, files: Sequence[str]) -> str:
-    """Return a sentence on files (:data:`LATE`) that runs of a method loaded too late."""
+def mark_of(method: str, kind: str, files: Sequence[str]) -> str:
+    """Return a sentence on a method some of whose runs have an entry ``kind`` in their details: on
+    ``files`` that were loaded too late (:data:`LATE`), or the tasks of these (:data:`EARLIER`)."""
+    if kind == EARLIER:
+        return f"{method}: results depend on earlier runs (seen on {', '.join(files)})"
     was = "was" if len(files) == 1 else "were"
     return (
         f"{method}: {', '.join(files)} {was} first loaded during a run, so that a change there is "
@@ -345,7 +354,7 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution with more than 10,000 movements or more than
+    """Return the error of a solution with more than 10,000 movements, 400,000 numbers or
     :data:`MOST_STEPS` steps; None for any other solution."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
@@ -353,6 +362,8 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
+    if (count := sum(map(np.size, corners))) > _MOST_NUMBERS:
+        return SolutionError(f"its paths have {count} numbers; at most {_MOST_NUMBERS} are allowed")
     if (
         len({np.shape(corner) for corner in corners}) == 1
     ):  # otherwise the solution breaks the rules

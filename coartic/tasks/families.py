@@ -21,6 +21,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -331,15 +332,22 @@ def instance_of(family: Family, address: Address) -> Task:
 
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """Return an instance of a shipped family, a task, by its name, such as ``two-armed/v1/i017``;
-    the last 4096 are kept. Raises TaskError for any other name."""
-    address = address_of(name)
+    """Return an instance of a family, a task, by its name, such as ``two-armed/v1/i017``, or
+    ``mine.v1.toml/i017`` of the family of a file; the last 4096 are kept. Raises TaskError for any
+    other name."""
+    place, _, short = name.rpartition("/")
+    address = address_of(f"{load_family(place).name}/{short}" if is_file(place) else name)
     if address is None:
         raise TaskError(
             f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
             "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
         )
-    return instance_of(load_family(address.family), address)
+    return instance_of(load_family(place), address)
+
+
+def is_file(family: str) -> bool:
+    """Return whether a family is named by its file, whose name ends in ``.toml``."""
+    return family.endswith(".toml")
 
 
 def named_by(text: str) -> list[str]:
@@ -348,10 +356,12 @@ def named_by(text: str) -> list[str]:
     unchecked. Raises TaskError for a range that is malformed, goes backwards or has more than
     10,000 instances.
     """
-    if "/" not in text or ".." not in text or text.endswith(".toml"):
+    if "/" not in text or ".." not in text.rpartition("/")[2] or text.endswith(".toml"):
         return [text]
     written = _RANGE.fullmatch(text)
-    ends = [address_of(written[1] + end) for end in written.groups()[1:]] if written else [None]
+    start = written[1] if written else ""
+    known = f"{load_family(start[:-1]).name}/" if is_file(start[:-1]) else start
+    ends = [address_of(known + end) for end in written.groups()[1:]] if written else [None]
     first, last = ends[0], ends[-1]
     if first is None or last is None or first.stream != last.stream:
         raise TaskError(
@@ -363,7 +373,7 @@ def named_by(text: str) -> list[str]:
     if last.number - first.number >= MOST_CELLS:
         raise TaskError(f"{text!r} names more than {MOST_CELLS:,} instances")
     numbers = range(first.number, last.number + 1)
-    return [str(first._replace(number=number)) for number in numbers]
+    return [str(first._replace(family=start[:-1], number=number)) for number in numbers]
 
 
 def shipped_families() -> dict[str, Family]:
@@ -386,12 +396,24 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 
 def load_family(name: str) -> Family:
-    """Return a shipped family by its name with version, such as ``two-armed/v1``. Raises TaskError
-    for an unknown name."""
+    """Return a shipped family by its name with version, such as ``two-armed/v1``, or a family of
+    your own by the path of its file. Raises TaskError for an unknown name."""
+    if is_file(name):
+        return read_family(Path(name))
     shipped = shipped_families()
     if name not in shipped:
         raise TaskError(unknown("family", name, shipped))
     return shipped[name]
+
+
+def is_family(name: str) -> bool:
+    """Return whether a text is the name of a shipped family, or of a file that holds a family. A
+    file that cannot be read holds none."""
+    with suppress(TaskError):
+        return name in shipped_families() or (
+            is_file(name) and "region" in read_toml(name, error=TaskError)
+        )
+    return False
 
 
 @cache
@@ -419,7 +441,8 @@ def instance_names(
     family: str, split: Split, count: int | None = None, year: int | None = None
 ) -> list[str]:
     """List the names of instances 0 to ``count`` - 1 of a split (``"development"``, ``"test"``,
-    ``"fresh"``) of a shipped family; by default ``count`` is 1000 for development, else 10.
+    ``"fresh"``) of a family, by its name or its file; by default ``count`` is 1000 for development,
+    else 10.
 
     Raises ValueError for another split, for a count that is not from 1 to 10,000, for fresh
     instances without a year and for others with one; TaskError for an unknown family.
