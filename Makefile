@@ -21,6 +21,7 @@ benchmark: $(READY)
 	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
 	done
 	$(BIN)/python studies/replication/study.py $(SUITES:%=$(OUT)/%) --out $(OUT)/replication
+	@$(BIN)/python docs/scripts/check_readme.py $(OUT)/comparison
 	@echo "Look at $(OUT)/comparison/report/report.html and $(OUT)/replication/page.html."
 
 # Bytecode is kept, even where the environment says no: each worker, and each process that a

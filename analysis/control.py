@@ -23,6 +23,7 @@ from typing import Annotated
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.methods import RANDOM_SEARCH
@@ -174,7 +175,7 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 
 @checked_arguments
-def control_suite(study: Study, *, runs: Annotated[int, 1, MOST_RUNS] = 20) -> str:
+def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] = 20) -> str:
     """Return a suite of random search, the control of signatures, where the study lacks it.
 
     For each method that may select its solution by rewards (:func:`selects`), the suite has random

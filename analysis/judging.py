@@ -15,14 +15,12 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.words import capital, interval, p_value
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
-from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import real_array
+from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.text import counted
 
 RESAMPLES_OF_CLAIMS = 99_999
@@ -76,7 +74,7 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
-def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
+def _tests_over_tasks(values: Numbers, bound: float) -> tuple[Estimate, Estimate]:
     """Test that the mean of values, one for each task, exceeds a bound: with all values, and
     without the largest value."""
     every = np.asarray(values, dtype=np.float64)
@@ -88,7 +86,7 @@ def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estima
 
 @checked_arguments
 def mean_beyond(
-    sentence: str, values: ArrayLike, bound: float = 0.0, side: Side = "greater"
+    sentence: str, values: Numbers, bound: float = 0.0, side: Side = "greater"
 ) -> Finding:
     """Test whether the mean over tasks lies beyond a bound, by a one-tailed bootstrap test.
 
@@ -121,7 +119,7 @@ def mean_beyond(
     >>> finding.holds, finding.evidence
     (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
     """
-    there = real_array("values", values)
+    there = np.asarray(values)
     there = there[~np.isnan(there)]
     if len(there) < FEWEST:
         return Finding(None, f"fewer than {FEWEST} random tasks can be judged")

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from coartic import Task
 from coartic.analysis.methods import SEARCHES
-from coartic.internal.arguments import checked_arguments
 from coartic.robot import Array
 from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
@@ -31,7 +30,6 @@ class BestKnown(KnownOptimum):
     """True if no reward is shipped and no search for the optimum has a solution."""
 
 
-@checked_arguments
 def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown]:
     """Return the best known reward of each task, from shipped rewards and all runs of a folder.
 
@@ -75,7 +73,6 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     return rewards
 
 
-@checked_arguments
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the parameters ``base`` and ``other_arm`` of each run, with which searches for the
     optimum restrict movements, as columns by the index of ``runs``; ``task`` and ``free`` for other
@@ -91,7 +88,6 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-@checked_arguments
 def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
     """Return (optimum − reward) / |optimum|: 0 at the optimum, 0.01 for 1 % more ticks."""
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
@@ -12,16 +12,13 @@ from coartic.analysis.words import interval, listed, number, p_value
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 PAGE = "README.md.jinja"
 """Name of the template of a study's page."""
 
 
 @checked_arguments
 def write_study(
-    folder: str | Path, tables: dict[str, pd.DataFrame], draw: Callable[[pd.DataFrame], Figure]
+    folder: str | Path, tables: dict[str, pd.DataFrame], draw: Callable[[pd.DataFrame], Any]
 ) -> None:
     """Write tables, figure and page of a study into its folder.
 
@@ -34,7 +31,8 @@ def write_study(
         Tables by name; table ``results`` becomes ``results.csv``. Other CSV files of the folder
         stay as they are.
     draw : callable
-        Draws table ``results``, as it is read from its file, as ``figure.svg``.
+        Takes table ``results``, as it is read from its file, and returns the figure (Matplotlib)
+        that becomes ``figure.svg``.
 
     Raises
     ------
@@ -109,7 +107,6 @@ def fill_page(template: str | Path, **values: Any) -> str:
     return environment.get_template(template.name).render()
 
 
-@checked_arguments
 def expect(holds: bool, what: str) -> str:
     """Return an empty text if a sentence of the page holds. Raises ValueError with the words
     ``what`` if ``holds`` is False."""

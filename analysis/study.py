@@ -30,7 +30,7 @@ from coartic.analysis.signatures.measures import signature_named
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
-from coartic.internal.arguments import Asked, Computed, checked_arguments, checker_of
+from coartic.internal.arguments import Asked, Computed, checked_arguments
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
@@ -60,14 +60,12 @@ UNITS = {
 """Units of columns of :attr:`Study.runs`, also in its ``attrs["units"]``."""
 
 
-@checked_arguments
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the runs with a solution, status ``ok``; the frame itself if all runs have one."""
     have_one = runs.status.to_numpy() == "ok"
     return runs if have_one.all() else runs[have_one]
 
 
-@checked_arguments
 def typical_run(runs: pd.DataFrame) -> str:
     """Return the id of the run with the reward nearest to the median, the first of several. All
     runs need a solution (:func:`solved`)."""
@@ -97,19 +95,22 @@ def cached(
     The function raises CoarticError for an object that is no study, and for an argument of another
     kind than its hint says.
     """
-    check = checker_of(function)
 
+    @checked_arguments
     @wraps(function)
     def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
-        check_study(study)
-        check(study, *args, **named)
         key = function, args, tuple(named.items())
         if key not in study._computed:
             study._computed[key] = function(study, *args, **named)
         result: Computed = study._computed[key]
         return result
 
-    return once
+    @wraps(function)
+    def of_study(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
+        check_study(study)
+        return once(study, *args, **named)
+
+    return of_study
 
 
 def load(folder: str | Path) -> Study:

@@ -15,7 +15,6 @@ import pandas as pd
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
-from coartic.internal.arguments import checked_arguments
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -160,7 +159,6 @@ def is_setting(frame: pd.DataFrame) -> pd.Series:
     return label.map(frame.attrs.get("under", {})).isin([*label])
 
 
-@checked_arguments
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
     """Return the common entries of a row for a cell with these runs: task, method, numbers of runs
     and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.

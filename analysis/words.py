@@ -9,6 +9,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
+from pydantic import Field
+
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import one_line
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from coartic import Task
 
 _LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
-_Digits = Annotated[int, 0, 30]
+_Digits = Annotated[int, Field(ge=0, le=30)]
 NONE = "–"
 """Text of a missing value."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"

@@ -37,7 +37,7 @@ from pydantic import Field
 from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Method, Result, Session
-from coartic.optimisers import OPTIMISER_INFORMATION, sequences_of
+from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import Array
 
 _CITATION = (

@@ -13,7 +13,7 @@ import numpy as np
 
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Method, Result, Session
-from coartic.optimisers import OPTIMISER_INFORMATION
+from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 

@@ -22,7 +22,6 @@ from coartic import Task, TaskError, parse_task
 from coartic.baselines.posture_graph import Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
-from coartic.internal.arguments import checked_arguments
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.tasks.task import letters_of
 
@@ -92,7 +91,6 @@ class OptimumSearch(Method):
         return Result(best.movements, details)
 
 
-@checked_arguments
 def with_locks(task: Task, base: str) -> Task:
     """Return a task with base coordinates locked in addition to its own: ``base`` is ``"y"``,
     ``"xy"``, or ``"task"`` for none, which returns the task itself. Raises MethodError if the task

@@ -30,7 +30,7 @@ from coartic.internal.validation import sentence_error
 from coartic.learner.conditions import MOST_NOISE
 from coartic.learner.learning import TRIALS, runs_at_once
 from coartic.method import Method, MethodError, Parameters, Result, Session
-from coartic.optimisers import OPTIMISER_INFORMATION, sequences_of
+from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import HANDS
 
 _POINTS_AT_ONCE = 500

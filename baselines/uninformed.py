@@ -15,9 +15,9 @@ from pydantic import Field
 
 from coartic.learner.learning import TRIALS
 from coartic.method import MethodError, Parameters, Result, Session
+from coartic.method.optimisers import explored_joints
 from coartic.motion.solution import Movement, movements_of
 from coartic.motion.trial import Trials
-from coartic.optimisers import explored_joints
 from coartic.robot import Array
 
 

@@ -16,10 +16,10 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.motion.solution import hint_of
+from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
 from coartic.runs.record import LATE, PARTS, Run, too_long
 from coartic.runs.store import open_store
-from coartic.trajectories import Trajectory, trajectory
 
 
 def find_run(prefix: str, folder: Path) -> Run:

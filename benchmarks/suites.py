@@ -15,7 +15,6 @@ from pydantic import Field, PlainValidator, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from coartic import CoarticError, Task, builtin_tasks, parse_task
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_TRIALS, brief_value
 from coartic.internal.text import Line, unknown
 from coartic.internal.toml_files import read_toml
@@ -127,7 +126,6 @@ _TAKEN_BY = {
 """Command that takes a thing of each kind."""
 
 
-@checked_arguments
 def kind_of(name: str) -> str:
     """Return the kind of what is named, a key of :data:`_TAKEN_BY`: of a shipped suite or family,
     of a file ``.py`` (a method file, by its ending alone), of a file ``.toml`` (a suite, family or
@@ -146,7 +144,6 @@ def kind_of(name: str) -> str:
     return next((kind for key, kind in keys.items() if key in content), "")
 
 
-@checked_arguments
 def check_kind(name: str, *kinds: str) -> None:
     """Check that what is named, if it has a kind (:func:`kind_of`), is of one of these kinds.
     Raises CoarticError, which names the command for its kind; without ``kinds`` for every kind."""
@@ -160,7 +157,6 @@ def suites() -> dict[str, Suite]:
     return {path.stem: _read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
-@checked_arguments
 def load_suite(name: str) -> Suite:
     """Return a shipped suite by name, or read a suite file (``.toml``).
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from coartic.learner.learning import learn, learn_many
     from coartic.learner.learning_run import LearningRun
     from coartic.method import BudgetError, MethodError, UndeclaredError
+    from coartic.method.optimisers import Objective, Optimiser, objective, problems
     from coartic.model import PAPER, MotionModel
     from coartic.motion.movement import Correction, MoveResult, correct, move
     from coartic.motion.solution import (
@@ -26,11 +27,10 @@ if TYPE_CHECKING:
         initial_hands,
         movements_of,
     )
-    from coartic.optimisers import Objective, Optimiser, objective, problems
+    from coartic.pictures.trajectories import Trajectory, trajectory
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
     from coartic.tasks.task import Provenance, Start, Task, parse_task
-    from coartic.trajectories import Trajectory, trajectory
 
 __version__ = "4.0.0"
 
@@ -91,11 +91,11 @@ _HOMES = {
         *("Execution", "Movement", "corrective_trial", "execute"),
         *("hand_sequences", "initial_hands", "movements_of"),
     ),
-    "optimisers": ("Objective", "Optimiser", "objective", "problems"),
+    "method.optimisers": ("Objective", "Optimiser", "objective", "problems"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),
     "tasks.task": ("Provenance", "Start", "Task", "parse_task"),
-    "trajectories": ("Trajectory", "trajectory"),
+    "pictures.trajectories": ("Trajectory", "trajectory"),
 }
 HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
 """Module of each name of the API."""

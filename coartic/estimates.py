@@ -21,8 +21,9 @@ from typing import Annotated, Any
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
-from coartic.internal.arguments import checked_arguments
+from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import real_array
 from coartic.robot import Array
 
@@ -32,7 +33,7 @@ TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
 """The quantiles that such an interval lies between."""
 LEVEL = 0.05
 """Level of a test."""
-Resamples = Annotated[int, 1, 10_000_000]
+Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
 """Number of resamples."""
 RESAMPLES = 9_999
 """With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
@@ -91,21 +92,19 @@ def slices(count: int, most: int) -> Iterator[slice]:
         yield slice(start, min(start + most, count))
 
 
-@checked_arguments
 def varies(values: Array) -> Array:
     """Return whether values differ along the first axis by more than rounding (:data:`NEGLIGIBLE`),
     a bool for each entry of the other axes."""
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 
-@checked_arguments
 def centred(values: Array) -> Array:
     """Return values less their mean over the first axis; 0 where they do not differ."""
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
 
 @checked_arguments
-def mean(values: ArrayLike, *, resamples: Resamples = RESAMPLES) -> Estimate:
+def mean(values: Numbers, *, resamples: Resamples = RESAMPLES) -> Estimate:
     """Return the mean of a sample ``(n,)`` with its interval, as :func:`mean_of_means` makes it.
     Raises ValueError for a sample that is empty or not finite."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
@@ -118,14 +117,13 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
 
 @checked_arguments
 def difference_of_means(
-    first: ArrayLike, second: ArrayLike, *, resamples: Resamples = RESAMPLES
+    first: Numbers, second: Numbers, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples, with its
     interval, as :func:`mean` does."""
     return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
 
 
-@checked_arguments
 def mean_of_means(
     samples: Sequence[Array], weights: Sequence[float], resamples: Resamples = RESAMPLES
 ) -> Estimate:
@@ -191,7 +189,6 @@ def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.
     return [*drawn(sizes, resamples)]
 
 
-@checked_arguments
 def standard_deviation(values: Array) -> float:
     """Return the SD of values ``(n,)``, with n - 1 degrees of freedom; 0 without spread, NaN for
     fewer than two values."""

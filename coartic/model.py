@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 
 MODEL_VERSION = 1
@@ -41,14 +40,12 @@ class MotionModel(NamedTuple):
     max_iterations: int = 20_000
     """Corrective iterations after which a trial has failed (our bound)."""
 
-    @checked_arguments
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
         """Return a copy of the model for goals of ``radius``, length unit: a tolerance of None (of
         arrival or of correction) becomes a tenth of ``radius``."""
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
 
-    @checked_arguments
     def tolerances(self, radius: float) -> tuple[float, float]:
         """Return the tolerances of arrival and of correction, length unit, for goals of ``radius``,
         length unit: a tolerance of None is a tenth of ``radius``."""

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from coartic import __version__, film, load_task
+from coartic import __version__, load_task
 from coartic.analysis.report import build
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
@@ -20,6 +20,7 @@ from coartic.benchmarks.runner import Progress
 from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
+from coartic.pictures import film
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python

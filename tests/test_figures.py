@@ -7,12 +7,13 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from coartic import CoarticError, drawing, load_task
+from coartic import CoarticError, load_task
 from coartic.analysis import load
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.sections.ranking import name_in_figure
+from coartic.pictures import drawing
 from tests.support.figures import misplaced
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, ROOT

@@ -194,7 +194,7 @@ def test_verdicts_of_planted_means(monkeypatch):
         assert judge({"": ("", "", finding)}).verdict.tolist() == [verdict]
     with pytest.raises(CoarticError, match="one finding at least"):
         all_of(*[])
-    with pytest.raises(CoarticError, match="unknown side"):
+    with pytest.raises(CoarticError, match="side is .larger"):
         mean_beyond("{}", above, 1.0, "larger")
 
 

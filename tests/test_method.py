@@ -7,8 +7,8 @@ import pytest
 
 from coartic import Movement, corrective_trial, load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
+from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.motion.solution import movements_of
-from coartic.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import make_trials, sample
 
 BLIND = frozenset({Information.REWARD_BY_TRIAL})

@@ -26,7 +26,7 @@ from coartic import (
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session, run_method
-from coartic.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
+from coartic.method.optimisers import FAILED, OPTIMISER_INFORMATION, Objective
 from tests.support.processes import ROOT
 from tests.support.strategies import shipped_optima, tiny_task
 
@@ -93,14 +93,14 @@ def with_width(half_width):
     [
         (COST, np.zeros(5), r"x has shape \(5,\); needed is \(18,\) or \(18, N\)"),
         (COST, np.zeros((18, 18)), r"use many\(x\) for rows, many\(x.T\) for columns"),
-        *((COST, wrong, "needed are real numbers")
+        *((COST, wrong, "it should be real numbers")
           for wrong in ("abc", ["1.0"] * 18, COST.x0 + 1j, np.zeros(18, bool))),
         (COST.many, COST.x0, "needed is"),
         (COST.many, [[1, 2], [3]], "in rows of one length"),
         (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
          "point 0: of goal 2 some entries are NaN"),
         (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
-        *((call, wrong, "has masked entries; needed are numbers without a mask")
+        *((call, wrong, "it should have no masked entries")
           for call, wrong in ((COST, MASKED), (COST.many, [MASKED]), (COST.movements, MASKED),
                               (COST.evaluations_to, MASKED))),
         (COST.movements, COST.x0[1:], "needed is"),

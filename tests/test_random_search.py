@@ -7,7 +7,7 @@ from coartic import CoarticError, MotionModel, load_task
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.benchmarks.planning import plan_suite
 from coartic.method import MethodError, Session
-from coartic.optimisers import OPTIMISER_INFORMATION, explored_joints
+from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
 from coartic.runs.method_info import same_run
 from coartic.runs.shipped import open_shipped
 from tests.support.strategies import solve

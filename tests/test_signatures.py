@@ -108,7 +108,7 @@ def test_more_than_another_by_brute_force():
 
 def test_drawn_tests_count_what_was_seen():
     """No resample comes near: p is that of the one that was seen, both tails where it has two."""
-    near = rng(9).standard_normal((2, 30, 2))
+    near = [*rng(9).standard_normal((2, 30, 2))]
     far = near[0], near[1] + 100.0
     assert permutation_p(*far, rng(), resamples=9) == 0.1
     assert context_tests.beyond_p(far, near, rng(), resamples=19) == 2 / 20

@@ -85,7 +85,7 @@ def test_a_saved_task_is_read_as_it_was(task, tmp_path):
         ({"q0": [0, 0, 0, 0, 0, 0, 30, 40, 20, 0]}, "Did you mean 40° = 0.698?"),
         ({"start": {"right": "x"}}, "start.right is 'x'; it should be a list of numbers"),
         ({"q0": [0] * 3}, "Task: q0 has shape (3,); it must be (10,)"),
-        ({"q0": {"base": [0, 0]}}, "Task: q0 is {'base': [0, 0]}; needed are real numbers"),
+        ({"q0": {"base": [0, 0]}}, "Task: q0 is {'base': [0, 0]}; it should be real numbers"),
         ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "give one of them"),
     ],
 )

@@ -4,7 +4,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from coartic import CoarticError, Movement, Task, corrective_trial, movements_of, trajectory
-from coartic.film import set_stage
+from coartic.pictures.film import set_stage
 from tests.support.strategies import tiny_task
 
 TASK = Task(goals=[(3.0, 2.0), (4.5, 2.0)], q0=[0, 0, 2, -0.5, 0, 0, 1, 0.5, 0, 0])

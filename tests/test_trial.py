@@ -18,10 +18,10 @@ from coartic import (
     trajectory,
 )
 from coartic.method import Session
+from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
 from coartic.motion.batch import SLOTS
 from coartic.motion.solution import execute_many
 from coartic.motion.trial import compiled_task
-from coartic.optimisers import OPTIMISER_INFORMATION, explored_joints
 from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import make_trials, sample, uneven_task

@@ -11,7 +11,7 @@ from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.hill_climbing import HillClimbing
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import MethodError, Session
-from coartic.optimisers import OPTIMISER_INFORMATION
+from coartic.method.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import failing_task, solve, tiny_task
 
 METHODS = (HillClimbing, CMAES, GoalByGoal)

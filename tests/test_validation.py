@@ -15,8 +15,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
-from typing_extensions import TypeAliasType
 
 import coartic
 from coartic import (
@@ -41,7 +39,7 @@ from coartic import (
 )
 from coartic.analysis import ecdf, interval, judge, mean, mean_beyond, means, other_tasks
 from coartic.analysis.sections import FIGURES, TABLES
-from coartic.analysis.signatures import measures, two_contexts
+from coartic.analysis.signatures import measures
 from coartic.analysis.signatures.context_tests import posture_difference_below
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import (
@@ -52,12 +50,10 @@ from coartic.analysis.statistics.hypotheses import (
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import RENAMED, did_you_mean
-from coartic.method import Information, Session, outline_of
+from coartic.method import Information, Session
 from coartic.motion.trial import reach_goals
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
-from coartic.tasks.optima import essence
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import make_trials
@@ -331,7 +327,7 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
 
 Trials = coartic.Optimiser.Parameters
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
-UNMASKED = "has masked entries; needed are numbers without a mask"
+UNMASKED = "it should have no masked entries"
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
@@ -406,9 +402,7 @@ CALLS = (
         Robot, ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, ROBOT.arm,
         ROBOT.joints, ROBOT.reach, ROBOT.joint_positions, ROBOT.linearised, PATH.hand_path,
         measures.arm, measures.as_in_isolation, measures.gain_at_next, measures.hand,
-        measures.other_arm, measures.ticks_slower, two_contexts.movable,
-        two_contexts.motor_equivalence, PAPER.for_radius, gym.column, instance_names, essence,
-        outline_of, SESSION.trial,
+        measures.other_arm, measures.ticks_slower, instance_names, SESSION.trial,
     )),
     with_arguments(Task, goals=[(3.0, 2.0)], locked_base=["y"], **RIGHT),
     with_arguments(plan_suite, suite="quick", tasks=["ascending"], methods=["EC1"], runs=1,
@@ -418,8 +412,6 @@ CALLS = (
     with_arguments(holm, family=2),
     with_arguments(bootstrap_test, first=[1.0, 2.0], second=0.0),
     with_arguments(share_test, alternative="greater"),
-    with_arguments(measures.isolated_reaches, q=np.tile(TASK.q0, (3, 1)), goals=[1, 2, 3],
-                   hands=[1, 1, 1]),
     with_arguments(reach_goals, q=[TASK.q0], hands=[1], goals=[(3.0, 2.0)], targets=None,
                    checks=True, locked_base=(), model=PAPER),
     with_arguments(SESSION.correct, goal=1),
@@ -455,10 +447,10 @@ def test_no_wrong_argument_gets_an_error_of_python(call, usual):
         ours, words = refused_by_us(partial(call, **usual | {name: value}))
         assert ours, (name, value, words)
         if value is MASKED and name in hints:
-            is_array = re.search("Array|Config|Sequence.float", str(hints[name].annotation))
+            is_array = re.search("Numbers|Config|Sequence.float", str(hints[name].annotation))
             assert words or not is_array, name
         if name == "hand":
-            assert re.search("left'?(,| and| or) '?right|needed is Hand", words), (value, words)
+            assert re.search("left'?(,| and| or) '?right", words), (value, words)
 
 
 TAKE_A_TASK = [each for name, each in getmembers(coartic, isfunction)
@@ -492,9 +484,6 @@ def as_lists(value):
     ("call", "usual"),
     [
         *CALLS,
-        *((function, {"values": np.array([1.0, 2.0])}) for function in (
-            estimates.centred, estimates.standard_deviation, estimates.varies)),
-        (estimates.mean_of_means, {"samples": [np.arange(3.0)], "weights": [1.0]}),
         (other_tasks, {"scores": {"a": [np.array([1.0, 2.0])] * 3}}),
         (gym.compare, {"rewards": {"a": np.array([[-2.0]])}, "best": np.array([[-1.0]])}),
     ],
@@ -524,19 +513,22 @@ def test_no_wrong_question_to_a_study_gets_an_error_of_python(name, traced):
 
 @pytest.mark.parametrize("wrong", [1, None, FOUND.evidence])
 def test_only_findings_are_joined(wrong):
-    with pytest.raises(CoarticError, match="needed is Finding"):
+    with pytest.raises(CoarticError, match="instance of Finding"):
         analysis.all_of(wrong)
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: mean([1.0, 2.0], resamples=-1), "resamples is -1; it must be a whole number"),
-        (lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)), "goal has True; needed are real"),
+        (lambda: mean([1.0, 2.0], resamples=-1), "resamples is -1; it should be at least 1"),
+        (
+            lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)),
+            "goal is .*; it .* without True",
+        ),
         (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
         (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
-        (lambda: Movement(1, "right", "planned", MASKED), f"target {UNMASKED}"),
-        (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints {UNMASKED}"),
+        (lambda: Movement(1, "right", "planned", MASKED), f"target is .*{UNMASKED}"),
+        (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints is .*{UNMASKED}"),
         (lambda: make_trials(TASK, "RRR", [[MASKED] * 3]), UNMASKED),
         (lambda: other_tasks({"family": [MASKED]}), UNMASKED),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
@@ -544,7 +536,7 @@ def test_only_findings_are_joined(wrong):
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
         (lambda: Robot(*[(1.0,)] * 9), "Robot: .*; it takes 5 arguments"),
         (lambda: Task(goals=[(3.0, 2.0)], q0=TASK.q0 * np.nan), "Task: q0 is .*; needed are fin"),
-        (lambda: judge(), "judge: missing a required argument: 'claims'"),
+        (lambda: judge(), "judge: claims is missing"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
         (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),
         (lambda: movements_of("RR", "x"), "targets"),
@@ -565,23 +557,6 @@ def test_only_findings_are_joined(wrong):
 def test_what_was_taken_silently_or_badly_has_a_sentence(call, words):
     with pytest.raises((CoarticError, ValueError, TypeError), match=words):
         call()
-
-
-@pytest.mark.parametrize(
-    ("values", "words"), [("x", "needed are real numbers"), (MASKED, "masked")]
-)
-@pytest.mark.parametrize("hint", [ArrayLike, NDArray[np.float64]])
-def test_a_hint_by_an_alias_is_read(hint, values, words):
-    """From Python 3.12 on NumPy's hints of arrays are aliases; other hints are as before."""
-    namespace = {"alias": TypeAliasType("alias", hint)}
-    exec(
-        "def called(values: 'alias', text: 'alias | None' = None, more: 'dict' = {}): pass",
-        namespace,
-    )
-    call = checked_arguments(namespace["called"])
-    call([1.0], more={"a": 1})
-    with pytest.raises(CoarticError, match=words):
-        call(values)
 
 
 @pytest.mark.parametrize("field", ["goal", "hand", "kind", "target", "waypoints"])

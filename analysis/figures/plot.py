@@ -24,7 +24,6 @@ from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import errors_in_words
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
@@ -122,7 +121,6 @@ def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 
-@checked_arguments
 def picture(drawing: Figure, ending: str) -> bytes:
     """Return a figure as the bytes of a file with this ending, one of :data:`FORMATS`.
 

@@ -24,7 +24,6 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
-from coartic.internal.arguments import checked_arguments
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -104,7 +103,6 @@ def is_narrow() -> bool:
     return (_width.get() or TWO) < 5
 
 
-@checked_arguments
 def panels(
     shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
@@ -228,7 +226,6 @@ def log_axis(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-@checked_arguments
 def letters(panels: Iterable[Axes]) -> None:
     """Name panels a, b, ... z before their titles; panels after the 26th stay as they are."""
     for letter, axes in zip(ascii_lowercase, panels, strict=False):

@@ -32,8 +32,8 @@ from coartic.analysis.statistics.hypotheses import exchange_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
 from coartic.analysis.words import number
-from coartic.drawing import MARKERS
 from coartic.estimates import LEVEL, difference_of_means, mean
+from coartic.pictures.drawing import MARKERS
 from coartic.robot import HANDS
 
 ROUNDING = 1e-9

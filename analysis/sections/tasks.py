@@ -16,8 +16,8 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.words import marked, titled_apart
-from coartic.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
 from coartic.motion.solution import initial_reward
+from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
 
 
 @table(

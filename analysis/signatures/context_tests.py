@@ -15,14 +15,14 @@ import numpy as np
 
 from coartic.analysis.statistics.hypotheses import drawn_rows
 from coartic.estimates import RESAMPLES, Resamples, centred, slices
-from coartic.internal.arguments import checked_arguments
+from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.robot import Array
 
 IN_MEMORY = 500
 """Most permutations or resamples of runs in memory at once."""
 
 
-def _groups(*groups: Array) -> list[Array]:
+def _groups(*groups: Numbers) -> list[Array]:
     """Return groups of runs. Raises ValueError where not all are of shape ``(runs, dof)``."""
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
@@ -30,7 +30,6 @@ def _groups(*groups: Array) -> list[Array]:
     return [np.asarray(group, np.float64) for group in groups]
 
 
-@checked_arguments
 def distance_of_means(first: Array, second: Array) -> float:
     """Return ‖mean(first) − mean(second)‖, the distance of mean configurations of two contexts.
 
@@ -40,7 +39,6 @@ def distance_of_means(first: Array, second: Array) -> float:
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
 
 
-@checked_arguments
 def standardised_posture_difference(first: Array, second: Array) -> float:
     """Return :func:`distance_of_means` in pooled standard deviations within contexts, 0 to ∞.
 
@@ -60,8 +58,8 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
 
 @checked_arguments
 def posture_difference_below(
-    first: Array,
-    second: Array,
+    first: Numbers,
+    second: Numbers,
     bound: float,
     rng: np.random.Generator,
     *,
@@ -76,22 +74,21 @@ def posture_difference_below(
     sample counts, too. Noise adds to distances, so that p is rather too large. NaN if a context has
     a single run.
     """
-    first, second = _groups(first, second)
-    if min(len(first), len(second)) < 2:
+    groups = _groups(first, second)
+    if min(map(len, groups)) < 2:
         return math.nan
     means, squares = [], np.zeros(resamples)
-    for group in (first, second):
+    for group in groups:
         means.append(np.empty((resamples, group.shape[1])))
         for rows in slices(resamples, IN_MEMORY):
             drawn = group[rng.integers(len(group), size=(rows.stop - rows.start, len(group)))]
             means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
-    pooled = np.sqrt(squares / (len(first) + len(second) - 2)) if standardised else 1.0
+    pooled = np.sqrt(squares / (sum(map(len, groups)) - 2)) if standardised else 1.0
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
     return float(1 + reached.sum()) / (resamples + 1)
 
 
-@checked_arguments
 def permutation_p(
     first: Array, second: Array, rng: np.random.Generator, *, resamples: Resamples = RESAMPLES
 ) -> float:
@@ -129,8 +126,8 @@ def smallest_p(first: int, second: int, resamples: Resamples = RESAMPLES) -> flo
 
 @checked_arguments
 def beyond_p(
-    method: Sequence[Array],
-    other: Sequence[Array],
+    method: Sequence[Numbers],
+    other: Sequence[Numbers],
     rng: np.random.Generator,
     *,
     resamples: Resamples = RESAMPLES,
@@ -168,10 +165,9 @@ def beyond_p(
     if len(method) != 2 or len(other) != 2:
         raise ValueError("needed are the runs of each method in two contexts")
     groups = _groups(*method, *other)
-    method, other = groups[:2], groups[2:]
-    if min(map(len, (*method, *other))) < 2:
+    if min(map(len, groups)) < 2:
         return math.nan
-    pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]
+    pools = [np.concatenate(runs) for runs in zip(groups[:2], groups[2:], strict=True)]
 
     def distance(means: Sequence[Array]) -> Array:
         first, second = means
@@ -180,12 +176,14 @@ def beyond_p(
     null = np.empty(resamples)
     for rows in slices(resamples, IN_MEMORY):
         of_method, of_other = [], []
-        for pool, runs in zip(pools, method, strict=True):
+        for pool, runs in zip(pools, groups[:2], strict=True):
             ours = len(runs)
             chosen = drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
             total = pool[chosen].sum(axis=1)
             of_method.append(total / ours)
             of_other.append((pool.sum(axis=0) - total) / (len(pool) - ours))
         null[rows] = distance(of_method) - distance(of_other)
-    observed, theirs = (distance([q.mean(axis=0) for q in runs]) for runs in (method, other))
+    observed, theirs = (
+        distance([q.mean(axis=0) for q in runs]) for runs in (groups[:2], groups[2:])
+    )
     return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))

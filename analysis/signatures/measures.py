@@ -30,7 +30,6 @@ def _other(hand: Hand) -> Hand:
     return "right" if hand == "left" else "left"
 
 
-@checked_arguments
 def isolated_reaches(
     task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
 ) -> tuple[Array, Array]:
@@ -232,7 +231,6 @@ SIGNATURES = {
 the run."""
 
 
-@checked_arguments
 def signature_named(name: str) -> Signature:
     """Return a signature by its name. Raises CoarticError for an unknown name."""
     if name not in SIGNATURES:

@@ -26,7 +26,6 @@ from coartic.analysis.signatures.context_tests import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.estimates import SEED
-from coartic.internal.arguments import checked_arguments
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import KEPT
 
@@ -35,7 +34,6 @@ SAME = 0.01
 step."""
 
 
-@checked_arguments
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
     shared first goals have a following goal in both tasks. Pairs with n = 0, and with different
@@ -50,14 +48,12 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     return [pair for pair in pairs if pair[2]]
 
 
-@checked_arguments
 def movable(task: Task, hand: Hand) -> Array:
     """Return the indices in a configuration that move a hand: free base coordinates and its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
-@checked_arguments
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
     """Return the motor-equivalent part and the other part of a difference of configurations Δq.
 
@@ -164,7 +160,6 @@ class TwoContexts:
         rng = self._rng("sameness")
         return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
 
-    @checked_arguments
     def p_beyond(self, other: TwoContexts) -> float:
         """Return the p-value of the test that the posture difference exceeds that of ``other``,
         another method at the same goal (:func:`.beyond_p`); NaN if a context has a single run."""

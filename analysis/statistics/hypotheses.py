@@ -20,7 +20,8 @@ from typing import Annotated, Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from pydantic import Field
 
 from coartic.estimates import (
     FEWEST,
@@ -34,19 +35,19 @@ from coartic.estimates import (
     slices,
     vector,
 )
-from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import MOST_RUNS, real_array
+from coartic.internal.arguments import Numbers, checked_arguments
+from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
 _MOST_PLACES = 2_000_000  # places in resamples that are kept at once
-_Count = Annotated[int, 0, MOST_RUNS]
-_Share = Annotated[float, 0.0, 1.0]
+_Count = Annotated[int, Field(ge=0, le=MOST_RUNS)]
+_Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 @checked_arguments
 def bootstrap_test(
-    values: ArrayLike,
+    values: Numbers,
     bound: float,
     alternative: Alternative = "greater",
     *,
@@ -90,8 +91,8 @@ def bootstrap_test(
 
 @checked_arguments
 def exchange_test(
-    first: ArrayLike,
-    second: ArrayLike,
+    first: Numbers,
+    second: Numbers,
     alternative: Alternative = "greater",
     *,
     resamples: Resamples = RESAMPLES,
@@ -212,14 +213,14 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
 
 
 @checked_arguments
-def holm(p_values: ArrayLike, family: int | None = None) -> list[float]:
+def holm(p_values: Numbers, family: int | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
     Rejecting adjusted p-values at or below α has a family-wise error rate of α at most, whatever
     the dependence. NaN, a missing test, stays NaN and does not count, unless ``family`` says the
     number of planned tests: then missing tests count as p = 1.
     """
-    p = real_array("p_values", p_values).reshape(-1)
+    p = np.reshape(p_values, -1)
     planned = int((~np.isnan(p)).sum()) if family is None else family
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))

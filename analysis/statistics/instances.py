@@ -21,14 +21,12 @@ from numpy.typing import ArrayLike
 
 from coartic import estimates
 from coartic.estimates import FEWER_RESAMPLES, Estimate
-from coartic.internal.arguments import checked_arguments
-from coartic.robot import Array
+from coartic.internal.arguments import Numbers, checked_arguments
 
-Scores = Mapping[str, Sequence[Array]]
+Scores = Mapping[str, Sequence[Numbers]]
 """Scores of the runs on each instance, shape ``(n,)``, by family."""
 
 
-@checked_arguments
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     """Return the mean over tasks of the mean over runs, with its stratified BCa interval, for
     ``values`` of shape ``(runs,)`` on each task. Raises ValueError for no task or an empty one."""
@@ -73,17 +71,17 @@ def other_tasks(scores: Scores) -> Estimate:
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
-    scores = {family: [*map(estimates.vector, instances)] for family, instances in scores.items()}
+    samples = {family: [*map(estimates.vector, instances)] for family, instances in scores.items()}
     values = {
         family: np.array([runs.mean() for runs in instances])
-        for family, instances in scores.items()
+        for family, instances in samples.items()
     }
     mean = float(np.mean([instances.mean() for instances in values.values()]))
     n = tuple(map(len, values.values()))
     if min(n) < estimates.FEWEST:
         return Estimate(mean, n=n)
     deviations = np.zeros(FEWER_RESAMPLES)
-    for place, (family, instances) in enumerate(scores.items()):
+    for place, (family, instances) in enumerate(samples.items()):
         rng = np.random.default_rng([estimates.SEED, place])
         count = len(instances)
         which = rng.integers(count, size=(FEWER_RESAMPLES, count))
@@ -98,7 +96,7 @@ def other_tasks(scores: Scores) -> Estimate:
     if np.abs(deviations).max() <= estimates.NEGLIGIBLE * abs(mean):
         return Estimate(mean, mean, mean, n=n)
     low, high = mean + np.quantile(deviations / len(values), estimates.TAILS)
-    families = scores.values()
+    families = samples.values()
     least = np.mean([min(runs.min() for runs in family) for family in families])
     most = np.mean([max(runs.max() for runs in family) for family in families])
     return Estimate(mean, max(float(low), float(least)), min(float(high), float(most)), n=n)

@@ -88,7 +88,7 @@ def _film(
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
-    from coartic.film import check_film, write_film
+    from coartic.pictures.film import check_film, write_film
 
     check_film(out, replace=replace)
     if len(run_ids) + initial > 2:

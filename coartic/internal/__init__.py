@@ -1,1 +1,2 @@
-"""Parts that the packages share and that are no public interface: limits, files, texts, workers."""
+"""Parts that the packages share and users do not see: limits, sentences, files, processes. They
+know no task, no robot and no method."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
@@ -26,3 +27,9 @@ def import_lazily(
         return sorted({*homes, *(name for name in vars(module) if name.endswith("__"))})
 
     return find, names
+
+
+def moved(old: str, new: str) -> None:
+    """Put module ``new`` in the place of module ``old``, its name up to the version before."""
+    warnings.warn(f"{old} is {new} now", DeprecationWarning, stacklevel=3)
+    sys.modules[old] = import_module(new)

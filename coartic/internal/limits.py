@@ -43,39 +43,45 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
+    """Return real numbers as :func:`real_numbers` does; the ValueError calls the value ``name``."""
+    try:
+        return real_numbers(value)
+    except ValueError as error:
+        raise ValueError(f"{name} is {brief_value(value)}; it {error}") from None
+
+
+def real_numbers(value: Any) -> NDArray[np.float64]:
     """Return real numbers as an array of float64 of their shape; NaN and infinity pass. An array of
-    float64 is returned itself, not a copy. Raises ValueError, which calls the value ``name``, for
-    anything else: text, complex numbers, True and False, rows of unequal length, masked entries."""
+    float64 is returned itself, not a copy. Raises ValueError for anything else: text, complex
+    numbers, True and False, rows of unequal length, masked entries."""
     import numpy as np  # which the command line's help does without
 
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
-    refuse_entries(name, value)
+    _refuse_entries(value)
     try:
         array = np.asarray(value)
     except ValueError:
-        raise ValueError(
-            f"{name} is {brief_value(value)}; needed are real numbers, in rows of one length"
-        ) from None
+        raise ValueError("should be real numbers, in rows of one length") from None
     if array.dtype == object and all(isinstance(each, numbers.Real) for each in array.flat):
         array = array.astype(np.float64)  # a nullable column of pandas
     if array.dtype.kind not in "uif":
-        raise ValueError(f"{name} is {brief_value(value)}; needed are real numbers")
+        raise ValueError("should be real numbers")
     return array.astype(np.float64, copy=False)
 
 
-def refuse_entries(name: str, value: Any) -> None:
-    """Raise ValueError, which calls the value ``name``, if it is an array with masked entries, or a
-    list or tuple that contains such an array, True or False at any depth."""
+def _refuse_entries(value: Any) -> None:
+    """Raise ValueError for an array with masked entries, or a list or tuple that contains such an
+    array, True or False at any depth."""
     import numpy as np
 
     if isinstance(value, list | tuple):
         for each in value:
             if isinstance(each, bool):
-                raise ValueError(f"{name} has {each}; needed are real numbers")
-            refuse_entries(name, each)
+                raise ValueError(f"should be real numbers, without {each}")
+            _refuse_entries(each)
     elif isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise ValueError(f"{name} has masked entries; needed are numbers without a mask")
+        raise ValueError("should have no masked entries")
 
 
 def brief_value(value: object) -> str:

@@ -99,7 +99,7 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
     ``keys`` are the keys that the file may have in any of its tables.
     """
-    sentences, more = _explain_first(error, list(keys))
+    sentences, more = _explain_first(error.errors(include_url=False), list(keys))
     lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
     if more:
         lines.append(f"{plain(source)}: has {counted(more, 'more problem')}")
@@ -109,13 +109,27 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
     """Return a sentence for each of the first 20 problems of an object's arguments, joined by
     semicolons. ``keys`` are the names of the arguments that it takes, in their order."""
-    return "; ".join(_explain_first(error, keys)[0])
+    return "; ".join(_explain_first(error.errors(include_url=False), keys)[0])
 
 
-def _explain_first(error: ValidationError, keys: Sequence[str]) -> tuple[list[str], int]:
+def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | str, Any]) -> str:
+    """Return sentences as :func:`explain_inline` does, but one alone for an argument that is of
+    none of several kinds. ``given`` are the arguments, by place from 0 or by name."""
+    problems: dict[tuple[int | str, ...], ErrorDetails] = {}
+    for detail in error.errors(include_url=False):
+        place = detail["loc"]
+        if detail["input"] is given.get(place[0]):
+            place = place[:1]  # what follows is the name of a kind
+        if place in problems:
+            problems[place]["msg"] += f" or {detail['msg'].removeprefix('Input should be ')}"
+        else:
+            problems[place] = {**detail, "loc": place}
+    return "; ".join(_explain_first([*problems.values()], keys)[0])
+
+
+def _explain_first(details: list[ErrorDetails], keys: Sequence[str]) -> tuple[list[str], int]:
     """Return a list of sentences on the first 20 problems, each sentence once, and the number of
     further problems. ``keys``: known keys (:func:`_explain_problem`)."""
-    details = error.errors(include_url=False)
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
     sentences = (plain(_explain_problem(detail, keys)) for detail in details[:_SHOWN])
@@ -143,7 +157,7 @@ def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
             return message.removeprefix("Value error, ")
         case "unexpected_positional_argument":
             return f"it takes {len(keys)} arguments"
-        case "missing":
+        case "missing" | "missing_argument" | "missing_keyword_only_argument":
             return f"{key} is missing"
         case "extra_forbidden" | "unexpected_keyword_argument":
             name, table = str(detail["loc"][-1]), str(detail["loc"][0])

@@ -1,1 +1,1 @@
-"""The dual-process learner."""
+"""The dual-process learner. It knows motion and the base of methods, and no other method."""

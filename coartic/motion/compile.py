@@ -41,8 +41,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 def _hash_of_sources() -> str:
     """Return the version of the model's code: the first 16 hex digits of a hash (SHA-256) of the
     source files of this package that compute results."""
-    single = (PACKAGE / name for name in ("robot.py", "model.py", "method.py", "tasks/task.py"))
-    folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner"))
+    single = (PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py"))
+    folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner", "method"))
     files = sorted([*single, *(path for folder in folders for path in folder)])
     texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]

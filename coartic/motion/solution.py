@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.limits import brief_value, real_array, refuse_entries
+from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import width_of
@@ -76,10 +76,9 @@ class Movement:
     to ``waypoints[-1]``, length unit (base) and rad (joints); None for the other kinds."""
 
     def __post_init__(self) -> None:
-        if type(self.target) is not np.ndarray:
-            refuse_entries("target", self.target)
-        if self.waypoints is not None:
-            refuse_entries("waypoints", self.waypoints)
+        for name, given in (("target", self.target), ("waypoints", self.waypoints)):
+            if given is not None:
+                real_array(name, given)
 
     def __repr__(self) -> str:
         named = ("goal", "hand", "kind", "target", "ticks", "waypoints")

@@ -11,7 +11,7 @@ A goal has five phases. A run, one of many side by side,
 
 (paper, sections *Generating Movement for Each Goal* and *The Corrective Process*). Three loops are
 made of these phases: :func:`reach_kernel` moves to given targets, :mod:`coartic.learner.kernel`
-explores around learned targets, and :mod:`coartic.gym_kernel` does what actions say. The result of
+explores around learned targets, and :mod:`coartic.gym.kernel` does what actions say. The result of
 a run depends neither on the others nor on their number.
 """
 
@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
-from coartic.internal.arguments import checked_arguments
+from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.internal.threads import in_parts
@@ -418,14 +418,14 @@ class Reached(NamedTuple):
 @checked_arguments
 def reach_goals(
     robot: Robot,
-    q: Configs,
-    hands: Hands,
-    goals: Points,
+    q: Numbers,
+    hands: Numbers,
+    goals: Numbers,
     radius: float,
-    targets: Configs | None = None,
+    targets: Numbers | None = None,
     *,
     checks: bool = True,
-    locked_base: Collection[str] = (),
+    locked_base: Sequence[str] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
     """Let N arms reach for a goal each, side by side, from where they are.
@@ -448,7 +448,7 @@ def reach_goals(
     checks : bool
         Whether the hand of an arm without a target may be in its goal already; else the corrective
         process begins at once.
-    locked_base : collection of {"x", "y"}
+    locked_base : sequence of {"x", "y"}
         Coordinates of the base that the corrective process leaves as they are.
     model : MotionModel
         The constants of movement and of the corrective process.

@@ -319,7 +319,7 @@ function execute(problem, movements) {
   return trial;
 }
 
-/* coartic/trajectories.py: the configuration at every tick, and the row in which each goal is hit. */
+/* coartic/pictures/trajectories.py: the configuration at every tick, and the row in which each goal is hit. */
 function trajectory(problem, trial) {
   const { step } = problem.model;
   const rows = [];

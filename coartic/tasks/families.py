@@ -242,7 +242,6 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
     return [*(zip(levels, places, strict=True) if vertical else zip(places, levels, strict=True))]
 
 
-@checked_arguments
 def broken_rule(family: Family, task: Task) -> str | None:
     """Return the name of the first rule of the family that a draft, a task drawn for it, breaks;
     None if it breaks no rule.
@@ -330,7 +329,6 @@ def instance_of(family: Family, address: Address) -> Task:
     return parse_task(content, name)
 
 
-@checked_arguments
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
     """Return an instance of a shipped family, a task, by its name, such as ``two-armed/v1/i017``;
@@ -344,7 +342,6 @@ def instance(name: str) -> Task:
     return instance_of(load_family(address.family), address)
 
 
-@checked_arguments
 def named_by(text: str) -> list[str]:
     """List the names of the instances of a range such as ``two-armed/v1/i000..i039``, both ends
     included; for a text that is no range, such as a task's name or a path, list this text alone,
@@ -375,7 +372,6 @@ def shipped_families() -> dict[str, Family]:
     return {family.name: family for family in families}
 
 
-@checked_arguments
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     """Return the families read from files, by name. Raises TaskError for a file that cannot be
     used, and for a name that another of the files or a shipped family has.
@@ -389,7 +385,6 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     return families
 
 
-@checked_arguments
 def load_family(name: str) -> Family:
     """Return a shipped family by its name with version, such as ``two-armed/v1``. Raises TaskError
     for an unknown name."""

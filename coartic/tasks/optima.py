@@ -15,7 +15,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from coartic.internal.arguments import checked_arguments
 from coartic.tasks.task import Task
 
 BASE = "task"
@@ -46,7 +45,6 @@ class KnownOptimum:
         return self.bound == self.reward
 
 
-@checked_arguments
 def essence(task: Task) -> str:
     """Return a hash, 16 hex digits, of what defines a task: start, goals, radius, hands, locked
     base, robot; not its name and initial hands."""
@@ -55,7 +53,6 @@ def essence(task: Task) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-@checked_arguments
 def best_shipped(task: Task) -> KnownOptimum | None:
     """Return the best reward known of a task, from the shipped files, whatever the task's name.
 

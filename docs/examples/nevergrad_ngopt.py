@@ -4,7 +4,7 @@ import nevergrad
 import numpy as np
 
 from coartic import Optimiser
-from coartic.optimisers import OptimiserParameters
+from coartic.method.optimisers import OptimiserParameters
 
 
 class NevergradParameters(OptimiserParameters):

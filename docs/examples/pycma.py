@@ -3,7 +3,7 @@
 import cma
 
 from coartic import Optimiser
-from coartic.optimisers import OptimiserParameters
+from coartic.method.optimisers import OptimiserParameters
 
 
 class PyCMAParameters(OptimiserParameters):

@@ -1,7 +1,7 @@
 """REINFORCE: a Gaussian policy over target configurations, improved along the likelihood ratio."""
 
 from coartic import Optimiser
-from coartic.optimisers import OptimiserParameters
+from coartic.method.optimisers import OptimiserParameters
 
 
 class ReinforceParameters(OptimiserParameters):

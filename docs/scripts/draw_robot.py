@@ -10,7 +10,7 @@ from matplotlib.patches import Arc, Circle
 
 from coartic import load_task
 from coartic.analysis.figures import GREY, TWO, panels, picture, styled
-from coartic.drawing import draw_robot
+from coartic.pictures.drawing import draw_robot
 from coartic.robot import Array
 
 Q = np.array([0, 0, 2.5, -0.8, 0.6, 0.5, 0.5, 0.6, -0.8, 0.5])

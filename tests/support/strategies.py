@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from coartic import PAPER, Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
 from coartic.method import Session
-from coartic.optimisers import OPTIMISER_INFORMATION
+from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.optima import entries
 

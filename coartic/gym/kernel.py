@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.method.optimisers import FAILED
 from coartic.motion.batch import SLOTS, Batch, batch_for, robot_parameters
 from coartic.motion.compile import entry, fill_row, inlined, inner
 from coartic.motion.trial import (
@@ -21,7 +22,6 @@ from coartic.motion.trial import (
     move,
     set_off,
 )
-from coartic.optimisers import FAILED
 from coartic.robot import Array, Configs, Hands, Points, Robot
 
 Numbers = NDArray[np.int64]

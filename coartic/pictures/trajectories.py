@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from coartic.errors import SolutionError
 from coartic.internal.arguments import checked_arguments
@@ -111,7 +112,7 @@ class Trajectory:
         hand that hits."""
         from matplotlib.figure import Figure
 
-        from coartic.drawing import box, circle_goals, draw_robot, number_goals
+        from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
 
         figure = Figure(figsize=(6, 4.5), layout="constrained")
         low, high = box(self.task, self.configurations)
@@ -130,7 +131,11 @@ class Trajectory:
 
     @checked_arguments
     def animate(
-        self, path: str | Path, *, width: Annotated[int, 200, 3840] = 560, replace: bool = False
+        self,
+        path: str | Path,
+        *,
+        width: Annotated[int, Field(ge=200, le=3840)] = 560,
+        replace: bool = False,
     ) -> None:
         """Write a film of the movement.
 
@@ -148,7 +153,7 @@ class Trajectory:
         CoarticError
             The file cannot be written, or is there and ``replace`` is False.
         """
-        from coartic.film import write_film
+        from coartic.pictures.film import write_film
 
         title = f"{self.task.name}, {self.execution.hands}"
         write_film([(title, self)], Path(path), width=width, replace=replace)

@@ -1,0 +1,153 @@
+"""One robot that makes one trial after another, and what environments are known by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import VectorWrapper
+from numpy.typing import ArrayLike, NDArray
+
+from coartic.errors import CoarticError
+from coartic.gym.vector import Recorded, TaskVectorEnv, check_no_options, whole_seed
+from coartic.internal.limits import brief_value, real_array
+from coartic.internal.text import unknown
+from coartic.tasks.task import Task
+
+if TYPE_CHECKING:
+    from coartic.gym.stable_baselines import RobotEnvs
+
+IDS: dict[str, dict[str, Any]] = {
+    "coartic/Ascending-v2": {"task": "ascending"},
+    "coartic/Descending-v2": {"task": "descending"},
+    "coartic/TwoArmed1-v2": {"task": "two-armed-1"},
+    "coartic/TwoArmed2-v2": {"task": "two-armed-2"},
+    "coartic/Task-v2": {},
+}
+"""Options of the registered environments, by id."""
+ADDED = ("OrderEnforcing", "PassiveEnvChecker", "Monitor", "VecMonitor")
+"""Wrappers that the libraries add by themselves; they change neither observations nor actions."""
+
+
+class TaskEnv(Recorded, gymnasium.Env):
+    """Environment of one robot: options, observations, actions and rewards of
+    :class:`TaskVectorEnv`, whose trials begin with a reset only; ``render_mode`` may be
+    ``"rgb_array"``."""
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+    def __init__(
+        self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode is {brief_value(render_mode)}; it must be 'rgb_array' or None. "
+                "gymnasium.make knows others, such as 'human' for a window"
+            )
+        self.robots = TaskVectorEnv(1, task, **options)
+        self.action_space = self.robots.single_action_space
+        self.observation_space = self.robots.single_observation_space
+        self.render_mode = render_mode
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin a trial, of the task or of a random instance of the family; return observation
+        ``(O,)`` and info. With ``seed`` None the generator goes on. Raises ValueError for any
+        option, and for a seed that is no whole number from 0."""
+        super().reset(seed=whole_seed(seed))
+        check_no_options(options)
+        self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
+        return self.robots.state.seen[0].copy(), self._info()
+
+    def step(
+        self, action: ArrayLike
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Reach for the next goal by an action ``(A,)``; return observation ``(O,)``, reward (ticks
+        below 0), whether the trial has ended, False (no trial is truncated) and info. Raises
+        ResetNeeded if the trial had ended before or no trial was begun."""
+        state = self.robots.state
+        if not state.going[0]:
+            raise ResetNeeded("no trial goes on: reset first")
+        self.robots._move(real_array("action", action)[None])
+        return state.seen[0].copy(), state.rewards.item(), not state.going[0], False, self._info()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture of the robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
+        so far are filled; None if the environment was made without ``render_mode``."""
+        if self.render_mode is None:
+            return None
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals
+
+        robots, state = self.robots, self.robots.state
+        task = robots.task_at(state.task.item())
+        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+        figure = Figure(figsize=(6, 4))
+        canvas: Any = FigureCanvasAgg(figure)
+        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        draw_robot(axes, task, state.q[0, robots._places_of(task.robot)], weight=1.5)
+        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+    def _info(self) -> dict[str, Any]:
+        state, number = self.robots.state, self.robots.state.task.item()
+        is_success = state.goal.item() == state.counts.item(number)
+        return {"task": self.robots.names[number], "is_success": is_success}
+
+
+def options_of(env: Any) -> dict[str, Any]:
+    """Return the options ``task``, ``ahead`` and ``model`` of an environment of this package, or
+    the options with which an id is registered, as a dictionary, not a copy: do not change it.
+    Raises ValueError for an unknown id, and TypeError for anything else and for an environment
+    in a wrapper that is not among :data:`ADDED`."""
+    if isinstance(env, str):
+        if env not in IDS:
+            raise ValueError(unknown("environment", env, IDS))
+        return IDS[env]
+    if not isinstance(getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
+        raise TypeError(
+            f"env is {brief_value(env)}; it must be an environment of coartic or its id"
+        )
+    env = without_wrappers(env, "env")
+    options: dict[str, Any] = (env.robots if isinstance(env, TaskEnv) else env).options
+    return options
+
+
+def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
+    """Return the environment inside its wrappers: those that Gymnasium and Stable-Baselines3 add by
+    themselves (:data:`ADDED`), and the wrapper ``known``, the object itself, if given. Raises
+    TypeError for any other wrapper, whose changes would be left out; the message calls the
+    environment ``name``."""
+    while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
+        if env is not known and type(env).__name__ not in ADDED:
+            raise TypeError(
+                f"{name} is wrapped in {type(env).__name__}, which score would leave out: give the "
+                "environment without wrappers (env.unwrapped), and a policy that does to "
+                "observations and actions what they do"
+            )
+        env = env.venv if hasattr(env, "venv") else env.env
+    return env
+
+
+def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
+    """Make ``num_envs`` robots side by side a ``VecEnv`` of Stable-Baselines3.
+
+    ``env`` is an id, such as ``"coartic/TwoArmed1-v2"``; ``options`` are options of
+    :class:`TaskVectorEnv`. Trials start again by themselves, actions are clipped, and rewards are
+    minus the ticks, as shares of what the corrective process takes for the whole trial. Raises
+    ValueError or TypeError for an id of another package and for a wrong option, and CoarticError
+    if Stable-Baselines3 is not installed.
+    """
+    try:
+        from coartic.gym.stable_baselines import RobotEnvs
+    except ImportError:
+        raise CoarticError("coartic.gym.sb3 needs: pip install 'coartic[rl]'") from None
+
+    return RobotEnvs(TaskVectorEnv(num_envs, **options_of(env) | options))

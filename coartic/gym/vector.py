@@ -1,0 +1,303 @@
+"""N robots that act side by side, each in a trial of its own, as a vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.error import ResetNeeded
+from gymnasium.spaces import Box
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from coartic.gym.kernel import VectorState, observe, step_robots
+from coartic.internal.limits import MOST_RUN_SEED, brief_value, check_limits, real_array
+from coartic.internal.text import counted
+from coartic.model import PAPER, MotionModel, check_model
+from coartic.motion.batch import robot_parameters
+from coartic.motion.trial import count_trials
+from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
+from coartic.tasks.catalogue import as_task
+from coartic.tasks.families import LOCKED, instance_names, shipped_families
+from coartic.tasks.task import MOST_GOALS, Split, Task, parse_task
+
+REACH = 0.5
+"""Half the width of the box of targets, length unit (base) and rad (angles)."""
+RowIndex = NDArray[np.int64] | slice
+
+
+class Recorded:
+    """An environment whose specification is plain data for JSON, as recorders of episodes need."""
+
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Specification of the environment, in which ``task`` and ``model`` are kept as plain data:
+        a name, a path or a dictionary; None if none was set."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        plain = dict(spec.kwargs) if spec else {}
+        if isinstance(task := plain.get("task"), Task | Path):
+            plain["task"] = str(task) if isinstance(task, Path) else task.model_dump(mode="json")
+        if isinstance(model := plain.get("model"), MotionModel):
+            plain["model"] = model._asdict()
+        self._spec = spec and replace(spec, kwargs=plain)
+
+
+class TaskVectorEnv(Recorded, VectorEnv):
+    """Let N robots act side by side, in a fraction of the time of N :class:`TaskEnv`.
+
+    An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
+    process fails, which costs ``coartic.method.optimisers.FAILED``. A trial that has ended starts
+    again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info``
+    are what it ended with. Nothing is random but which instance of a family is drawn.
+
+    Parameters
+    ----------
+    num_envs : int
+        Number of robots.
+    task : Task, str or Path
+        The task; or a family, ``"two-armed/v1"``: each trial has an instance of the family.
+    split : {"development", "test", "fresh"}, optional
+        Instances to train on (by default), to report on, or those of a ``year``. They never mix.
+    count : int, optional
+        How many instances of the split, from its first; by default 1,000 of the development split
+        and 10 of the others.
+    year : int, optional
+        Of fresh instances.
+    ahead : int
+        Goals in view beyond the next one.
+    model : MotionModel
+        Constants of movement.
+
+    Raises
+    ------
+    ValueError, TypeError, TaskError
+        An option is wrong, or there is no such task or family.
+
+    Notes
+    -----
+    Joints are the coordinates of the base (length unit) and the angles of the arms (rad) that can
+    move, in the order of a configuration; in a family, of arms with the most links.
+
+    An observation has an entry for the next goal and for each of those ahead, 1 where there is
+    one; x and y of each from the base, length unit, 0 without a goal; and the joints. In a
+    family whose robots differ in links an entry for each joint follows, 1 where the robot can move
+    it.
+
+    An action has an entry for the hand, where the robot has two, and one for each joint. The box is
+    from -1 to 1; what is beyond is clipped. Up to 0.5 the hand is the one that the corrective
+    process brings to the goal by the shorter path in joint space, above 0.5 the other one. The
+    target is where the corrective process would bring it, plus :data:`REACH` times the entries of
+    the joints: zeros do what the corrective process does. Where it would fail, the present posture
+    takes the place of its result. Entries of joints that a robot does not have do nothing.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}
+
+    def __init__(
+        self,
+        num_envs: int,
+        task: Task | str | Path,
+        *,
+        split: Split | None = None,
+        count: int | None = None,
+        year: int | None = None,
+        ahead: int = 1,
+        model: MotionModel = PAPER,
+    ) -> None:
+        check_limits("num_envs", num_envs, 1, 1_000_000)
+        check_limits("ahead", ahead, 0, MOST_GOALS)
+        # As a specification has them.
+        task = parse_task(task, "task") if isinstance(task, dict) else task
+        model = MotionModel(**model) if isinstance(model, dict) else model
+        self.num_envs, self.model = num_envs, check_model(model)
+        self.options = {"task": task, "ahead": ahead, "model": model}
+        self.tasks: list[Task | str]  # or names of instances
+        if isinstance(task, str) and task in shipped_families():
+            family = shipped_families()[task]
+            self.tasks = [*instance_names(task, split or "development", count, year)]
+            locked = set.intersection(*({*LOCKED[base]} for base in family.base))
+            (fewest, links), hands, goals = family.links, family.hands, family.goals[1]
+        elif (split, count, year) != (None, None, None):
+            raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
+        else:
+            only = as_task(task)
+            self.tasks, locked = [only], {*only.locked_base}
+            fewest = links = only.robot.most_links
+            hands, goals = only.hands, len(only.goals)
+        self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
+        # All robots are taken for the widest, some of whose links have no length.
+        self._widest = Robot((1.0,) * links, (1.0,) * links)
+        self._starts = np.zeros((len(self.tasks), self._widest.dof))
+        self._kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
+        base = [place for place, axis in enumerate("xy") if axis not in locked]
+        arms = [np.arange(self._widest.dof)[self._widest.joints(hand)] for hand in hands]
+        joints, view = np.concatenate([base, *arms]).astype(np.int64), ahead + 1
+        sizes = [view, 2 * view + len(joints), len(joints) * (fewest < links)]
+        high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
+        self.state = VectorState.empty(
+            self._widest,
+            (num_envs, len(self.tasks), goals),
+            joints,
+            np.array([HANDS.index(hand) for hand in hands]),
+            len(high),
+            ahead,
+            REACH,
+        )
+        self.single_action_space = Box(-1.0, 1.0, self.state.actions.shape[1:], np.float32)
+        self.single_observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._rngs: list[Any] = [None] * num_envs
+
+    def task_at(self, number: int) -> Task:
+        """Return task ``number``, from 0, of ``tasks``; the first call loads the task into the
+        state of the robots. Raises ValueError for another number."""
+        check_limits("number", number, 0, len(self.tasks) - 1)
+        task, state = as_task(self.tasks[number]), self.state
+        if state.kinds[number] < 0:
+            check_model(self.model, radius=task.radius)
+            self.tasks[number], places = task, self._places_of(task.robot)
+            self._starts[number, places] = task.q0
+            locked = ["xy".index(axis) for axis in task.locked_base]
+            state.movable[number] = np.isin(state.joints, np.setdiff1d(places, locked))
+            state.goals[number, : len(task.goals)] = task.goal_array
+            state.counts[number] = len(task.goals)
+            kind = task.robot, float(task.radius), task.locked_base
+            if kind not in self._kind_of:
+                self._kind_of[kind] = len(state.parameters)
+                parameters = robot_parameters(
+                    self._widest, task.radius, locked_base=task.locked_base, model=self.model
+                ).copy()
+                for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
+                    _, links, arm["shoulder_x"], arm["shoulder_y"] = task.robot.arm(hand)
+                    arm["links"] = np.pad(links, (0, len(arm["links"]) - len(links)))
+                known = np.concatenate([state.parameters, parameters])
+                self.state = state._replace(parameters=known)
+            state.kinds[number] = self._kind_of[kind]
+        return task
+
+    def _places_of(self, robot: Robot) -> NDArray[np.int64]:
+        """Return the index, in a configuration of the robot with the most links, of each entry of a
+        configuration of ``robot``, shape ``(dof,)``."""
+        left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
+        return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self._widest.most_links + right])
+
+    def _begin(self, rows: RowIndex, numbers: ArrayLike) -> None:
+        """Put each of the robots ``rows`` at the start of the task of its number (from 0) in
+        ``numbers``; fill in the observations of all robots."""
+        state = self.state
+        state.task[rows], state.goal[rows], state.going[rows] = numbers, 0, True
+        for number in {*state.task[rows].tolist()}:
+            self.task_at(number)
+        state.q[rows] = self._starts[state.task[rows]]
+        observe(*self.state)
+
+    def _move(self, actions: Array, rows: RowIndex = slice(None)) -> None:
+        """Let all robots whose trial goes on reach for their next goal; the results go into the
+        state, in place. ``actions`` ``(N, A)`` are of robots ``rows``; others keep their actions.
+
+        Raises ValueError for actions of another shape, or that are not finite.
+        """
+        shape = self.state.actions[rows].shape
+        if actions.shape != shape:
+            raise ValueError(f"actions have shape {actions.shape}; it must be {shape}")
+        self.state.actions[rows] = actions
+        begun = step_robots(*self.state)
+        if begun < 0:
+            which = f" of robot {-1 - begun}" if self.num_envs > 1 else ""
+            raise ValueError(f"the action{which} is not finite; it must be numbers")
+        count_trials(begun)
+
+    def infos(self) -> dict[str, Any]:
+        """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
+        and ``is_success``, True where the robot has hit all goals of its trial. After :meth:`step`
+        a trial that ended has started again: what it ended with is in the step's ``final_info``."""
+        task = self.state.task
+        return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin a trial of each of the N robots; return observations ``(N, O)`` and the dictionary
+        of infos. ``seed``: a list of a seed for each robot, or one number, with which robot i (from
+        0) has ``seed + i``; a robot with None keeps its random generator, which draws the tasks.
+        Raises ValueError for any option, and for seeds that are not whole numbers from 0.
+        """
+        check_no_options(options)
+        if isinstance(seed, Iterable):
+            seeds = [*map(whole_seed, seed)]
+        else:
+            first = whole_seed(seed)
+            seeds = [None if first is None else first + row for row in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            there = counted(self.num_envs, "environment")
+            raise ValueError(f"{counted(len(seeds), 'seed')} for {there}")
+        for row, each in enumerate(seeds):
+            if each is not None or self._rngs[row] is None:
+                self._rngs[row] = seeding.np_random(each)[0]
+        self._begin_anew(np.ones(self.num_envs, np.bool_))
+        return self.state.seen.copy(), self._masked_infos()
+
+    def step(
+        self, actions: ArrayLike
+    ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Let each robot reach for its next goal by its row of ``actions``, shape ``(N, A)``.
+
+        Returns observations ``(N, O)``, rewards ``(N,)``, ticks below 0, True where the trial has
+        ended, ``(N,)``, False for each (none is truncated), ``(N,)``, and a dictionary of infos. A
+        trial that has ended starts again in this step: its observation is the first of the next
+        trial; ``final_obs`` of the infos has its last. Raises ResetNeeded before the first reset,
+        and ValueError for actions of another shape or that are not finite.
+        """
+        state = self.state
+        if not state.going.all():
+            raise ResetNeeded("no trial goes on: reset first")
+        self._move(real_array("actions", actions))
+        final, ended = {}, ~state.going
+        if ended.any():
+            last = np.full(self.num_envs, None, dtype=object)
+            for row in np.flatnonzero(ended).tolist():
+                last[row] = state.seen[row].copy()
+            final = {"final_obs": last, "final_info": self._masked_infos(ended)}
+            final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
+            self._begin_anew(ended)
+        infos = self._masked_infos() | final
+        return state.seen.copy(), state.rewards.copy(), ended, np.zeros_like(ended), infos
+
+    def _begin_anew(self, ended: NDArray[np.bool_]) -> None:
+        number, rows = len(self.tasks), np.flatnonzero(ended)
+        drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
+        self._begin(rows, drawn)
+
+    def _masked_infos(self, there: NDArray[np.bool_] | bool = True) -> dict[str, Any]:
+        infos = self.infos()
+        return infos | {f"_{name}": np.full(self.num_envs, there) for name in infos}
+
+
+def check_no_options(options: Mapping[str, Any] | None) -> None:
+    """Raise ValueError if a reset has options; None and an empty mapping pass."""
+    if options is not None and not (isinstance(options, Mapping) and not options):
+        raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
+
+
+def whole_seed(seed: Any) -> int | None:
+    """Return a seed, a whole number from 0, as an int, or None for None. Raises ValueError for
+    anything else."""
+    if seed is None:
+        return None
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    return int(seed)

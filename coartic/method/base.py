@@ -1,0 +1,165 @@
+"""The base of methods: what a method declares, and how it is run."""
+
+from __future__ import annotations
+
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any, ClassVar, NamedTuple
+
+from pydantic import BaseModel, ConfigDict
+
+from coartic.internal.limits import MOST_RUN_SEED, check_limits
+from coartic.internal.validation import in_sentences
+from coartic.method.session import Information, MethodError, Session
+from coartic.model import PAPER, MotionModel
+from coartic.motion.solution import Movement
+from coartic.motion.trial import too_many_sequences
+from coartic.robot import Hand
+from coartic.tasks.catalogue import TaskLike, as_task
+from coartic.tasks.task import INITIAL_POLICIES, Task
+
+
+@in_sentences
+class Parameters(BaseModel):
+    """Base of every method's parameters: typed, validated, immutable, plain data."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A solution, with what else a method returns."""
+
+    solution: tuple[Movement, ...]
+    details: dict[str, Any] = field(default_factory=dict)
+    """Plain data to be stored with the solution. Never its score."""
+    initial: tuple[Movement, ...] = ()
+    """Movements of a learner's first trial; empty if it failed, and for other methods."""
+    replay: tuple[Movement, ...] = ()
+    """Movements of a learner's noiseless greedy trial after learning; empty likewise."""
+
+
+class Outline(NamedTuple):
+    """The properties of a task by which a method says whether it applies."""
+
+    name: str
+    """Name of the task, for the sentence."""
+    goals_count: int
+    dof: int
+    hands: tuple[Hand, ...]
+    """Hands the robot has."""
+    initial_hands: str
+    """Hand sequence, or policy, that the task names for a first solution."""
+
+    @property
+    def initial_is_policy(self) -> bool:
+        """True if ``initial_hands`` names a policy that finds the hands, not a hand sequence."""
+        return self.initial_hands in INITIAL_POLICIES
+
+    @property
+    def too_many_sequences(self) -> str | None:
+        """A sentence that the task has more than 4096 hand sequences, too many to try one by one;
+        None if it has not."""
+        return too_many_sequences(self.name, self.goals_count, len(self.hands))
+
+
+def outline_of(task: Task) -> Outline:
+    """Return the properties of a task by which a method says whether it applies to the task."""
+    return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
+
+
+class Method(ABC):
+    """Base of every method. A subclass declares itself in its class attributes."""
+
+    name: ClassVar[str]
+    """Id, such as ``"dual-process"``; another form of it adds ``/form``."""
+    title: ClassVar[str]
+    citation: ClassVar[str]
+    information: ClassVar[frozenset[Information]]
+    secondary: ClassVar[tuple[str, ...]] = ()
+    """Its secondary objectives, in words."""
+    stochastic: ClassVar[bool] = True
+    """True if the seed matters; other methods are run once."""
+    Parameters: ClassVar[type[Parameters]] = Parameters
+    version: ClassVar[int] = 1
+    """Raised by whoever changes what its runs give, by a default as well: no run of an earlier
+    version goes with later ones."""
+    later: ClassVar[frozenset[str]] = frozenset()
+    """Parameters that it got after runs of it were out. While one has its default, it is left out
+    of what a run is known by, so that earlier runs stay runs of the same method."""
+    files: ClassVar[tuple[str, ...]] = ()
+    """Data files in the folder of the method's file. They count as its code."""
+    quick: ClassVar[Mapping[str, Any]] = {}
+    """Parameters for a check in seconds, where the defaults take longer than that."""
+
+    def __init__(self, parameters: Any = None) -> None:
+        self.parameters: Any = self.Parameters() if parameters is None else parameters
+
+    def why_not(self, task: Outline) -> str | None:
+        """Return a sentence on why the method does not apply to a task; None if it applies, which
+        every method does whose class does not override this."""
+        return None
+
+    @abstractmethod
+    def solve(self, session: Session) -> Result:
+        """Find a solution of the session's task; return the movements and details. Raises
+        MethodError if no solution is found."""
+
+    def most_together(self) -> int:
+        """Return the largest number of sessions for one call of :meth:`solve_together`; methods
+        that are not this project's own are given one session, whatever they return."""
+        return 1
+
+    def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
+        """Solve in several sessions that differ in their seeds alone; return for each, in order,
+        the result of :meth:`solve`, or the MethodError that it raises, as an object.
+        """
+        results: list[Result | MethodError] = []
+        for session in sessions:
+            try:
+                results.append(self.solve(session))
+            except MethodError as error:
+                results.append(error)
+        return results
+
+
+MODULES = (
+    "coartic.learner.method",
+    "coartic.baselines.corrective_alone",
+    "coartic.baselines.random_search",
+    "coartic.baselines.hill_climbing",
+    "coartic.baselines.cma_es",
+    "coartic.baselines.nullspace_qp",
+    "coartic.baselines.posture_qp",
+    "coartic.baselines.posture_based",
+    "coartic.baselines.trajectory_optimisation",
+    "coartic.baselines.receding_horizon",
+    "coartic.baselines.optimum",
+)
+"""Modules of the built-in methods, each with a list ``METHODS``."""
+
+
+def run_method(
+    method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
+) -> tuple[Result, Session]:
+    """Let a method solve a task, as it does in a suite.
+
+    Methods of this project are trusted to count by themselves; any other method gets the
+    information that it declares. ``task`` is a task, its name or its file; ``seed`` is the seed of
+    the method's random numbers. There is no budget of trials, and the solution is not executed.
+
+    Returns the solution with its details, and the session in which it was found, with its counts
+    and rewards. Raises MethodError if the method finds no solution, UndeclaredError if it uses
+    information that it does not declare, NotApplicableError if it does not apply to the task, and
+    ValueError for a seed that is no whole number from 0.
+    """
+    built_in = [getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES]
+    is_ours = type(method) in chain.from_iterable(built_in)
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    session = Session(as_task(task), int(seed), method.information, model=model, trusted=is_ours)
+    result = method.solve(session)
+    session.check_solution(result.solution)
+    return result, session

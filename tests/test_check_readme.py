@@ -1,0 +1,50 @@
+"""The table of README beside a folder: what differs is named."""
+
+import check_readme
+import pandas as pd
+import pytest
+
+TEXT = """
+| method | information | gap | share |
+| --- | --- | ---: | ---: |
+| CMA-ES: an optimiser | each trial's total | 1.0 % [0.8, 1.4] | 94 % [92, 96] |
+| **learner** of the paper | each trial's total | **7.9 %** [7.7, 8.1] | 49 % [47, 50] |
+| corrective process | none | 21.9 % | −44.1 % |
+"""
+NAN = float("nan")
+RANKING = pd.DataFrame(
+    [
+        [0.0100, 0.0076, 0.0138, 0.9447, 0.9249, 0.9576],
+        [0.0787, 0.0766, 0.0807, 0.4853, 0.4727, 0.4974],
+        [0.2186, NAN, NAN, -0.4414, NAN, NAN],
+    ],
+    ["CMA-ES", "learner (EC1, EC4)", "corrective process"],
+    ["gap", "gap_low", "gap_high", "share", "share_low", "share_high"],
+)
+
+
+def test_equal_numbers_are_equal():
+    assert check_readme.differences(TEXT, RANKING) == (3, [])
+    assert len(check_readme.rows_of(check_readme.README.read_text("utf-8"))) == 10
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "value"),
+    [
+        ("CMA-ES", "gap", 0.0106),
+        ("CMA-ES", "gap_high", 0.0146),
+        ("learner (EC1, EC4)", "share_low", 0.4649),
+        ("learner (EC1, EC4)", "gap_low", NAN),
+        ("corrective process", "share", 0.4414),
+    ],
+)
+def test_each_number_counts(row, column, value):
+    changed = RANKING.copy()
+    changed.loc[row, column] = value
+    count, (line,) = check_readme.differences(TEXT, changed)
+    assert count == 3
+    assert line.startswith(f"{row.partition(' (')[0]}: gap ")
+
+
+def test_a_row_that_the_folder_lacks_is_named():
+    assert check_readme.differences(TEXT, RANKING[1:])[1] == ["CMA-ES: not in this folder"]
