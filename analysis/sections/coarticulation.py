@@ -27,7 +27,7 @@ from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
-from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
+from coartic.analysis.signatures.two_contexts import SAME, TwoContexts, context_pairs
 from coartic.analysis.statistics.hypotheses import exchange_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
@@ -36,7 +36,7 @@ from coartic.estimates import LEVEL, difference_of_means, mean
 from coartic.pictures.drawing import MARKERS
 from coartic.robot import HANDS
 
-SAME = 1e-9
+ROUNDING = 1e-9
 """Largest posture difference that counts as rounding, length unit and rad mixed."""
 
 
@@ -157,8 +157,10 @@ def verdict_of(
 ) -> str:
     """Return in words whether the posture at a shared goal depends on the next goal.
 
-    For stochastic methods by the permutation test; methods that select their solution from trials
-    are compared with random search, too. ``control`` is the result of :func:`_beside_control` for
+    Of stochastic methods, the permutation test distinguishes postures, and the 90 % interval of the
+    difference, below :data:`.SAME`, shows that they are the same; of others the difference itself
+    does both. Methods that select their solution from trials are compared with random search, too.
+    ``control`` is the result of :func:`_beside_control` for
     ``shared``; None: computed here. ``p`` is the p-value corrected for all shared goals of the
     method; NaN: that of ``shared`` alone.
     """
@@ -166,9 +168,15 @@ def verdict_of(
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
     if method.stochastic and not can_tell:
         return "too few runs"
-    if not method.stochastic and shared.posture_difference <= SAME:
-        return "the same posture"
-    if method.stochastic and not (shared.p if math.isnan(p) else p) < LEVEL:
+    if method.stochastic:
+        differs = (shared.p if math.isnan(p) else p) < LEVEL
+        is_same = shared.p_same < LEVEL
+    else:
+        differs = shared.posture_difference > ROUNDING
+        is_same = shared.posture_difference < SAME
+    if is_same:
+        return "different, negligible" if differs else "the same posture"
+    if not differs:
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"

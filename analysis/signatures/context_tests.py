@@ -63,14 +63,16 @@ def posture_difference_below(
     bound: float,
     rng: np.random.Generator,
     *,
+    standardised: bool = True,
     resamples: Resamples = RESAMPLES,
 ) -> float:
-    """Test that the standardised posture difference is below a bound, by the bootstrap.
+    """Test that the posture difference is below a bound, by the bootstrap.
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, the share of bootstrap samples,
     with runs drawn within each context, whose :func:`standardised_posture_difference` is at least
-    ``bound`` (in SDs); the observed sample counts, too. Noise adds to distances, so that p is
-    rather too large. NaN if a context has a single run.
+    ``bound`` (in SDs), or if not ``standardised`` whose :func:`distance_of_means` is; the observed
+    sample counts, too. Noise adds to distances, so that p is rather too large. NaN if a context has
+    a single run.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -82,7 +84,7 @@ def posture_difference_below(
             drawn = group[rng.integers(len(group), size=(rows.stop - rows.start, len(group)))]
             means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
-    pooled = np.sqrt(squares / (sum(map(len, groups)) - 2))
+    pooled = np.sqrt(squares / (sum(map(len, groups)) - 2)) if standardised else 1.0
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
     return float(1 + reached.sum()) / (resamples + 1)
 

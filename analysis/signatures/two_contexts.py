@@ -21,12 +21,17 @@ from coartic.analysis.signatures.context_tests import (
     beyond_p,
     distance_of_means,
     permutation_p,
+    posture_difference_below,
     standardised_posture_difference,
 )
 from coartic.analysis.solutions import Solutions
 from coartic.estimates import SEED
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import KEPT
+
+SAME = 0.01
+"""Posture difference, length unit and rad mixed, below which postures are the same: the robot's
+step."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -147,6 +152,13 @@ class TwoContexts:
     def p(self) -> float:
         """P-value of the permutation test of runs; NaN if a context has a single run."""
         return permutation_p(*self.configurations, self._rng("context dependence"))
+
+    @cached_property
+    def p_same(self) -> float:
+        """P-value of the test that the posture difference is below :data:`SAME`, by the bootstrap:
+        below 5 % if its 90 % interval is. NaN if a context has a single run."""
+        rng = self._rng("sameness")
+        return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
 
     def p_beyond(self, other: TwoContexts) -> float:
         """Return the p-value of the test that the posture difference exceeds that of ``other``,
