@@ -80,7 +80,7 @@ def checked(
 
 
 def inline(name: object) -> str:
-    """Return the name of a column as one printable line, cut if it is long (:func:`.plain`)."""
+    """Return the name of a column as one printable line, cut to 2,000 characters."""
     return plain(str(name))
 
 
@@ -139,8 +139,8 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
     number of the task, from 0, in the order of names. ``more``: names of other columns of numbers
-    to keep. Raises CoarticError as :func:`checked` and :func:`_with_gaps` do, and for a task with
-    several best known rewards.
+    to keep. Raises CoarticError for a missing column, wrong values, rewards above 0 or above the
+    best known reward, and a task with several best known rewards.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
@@ -209,7 +209,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        As :func:`gaps` does, and for a ``corrective_best`` above the best known reward.
+        A column is missing or a reward is wrong (:func:`gaps`), or ``corrective_best`` is above the
+        best known reward.
 
     Examples
     --------
@@ -280,7 +281,8 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     frame : DataFrame
-        As :func:`ranking` takes it.
+        With columns ``method``, ``task``, ``reward`` and ``best_known`` (negative ticks), and
+        perhaps ``setting`` and ``corrective_best`` (:func:`ranking`).
 
     Returns
     -------
@@ -292,7 +294,7 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`ranking` does.
+        A column is missing, a name is missing, or a reward is wrong (:func:`ranking`).
 
     Examples
     --------
@@ -336,8 +338,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`gaps` does; also for missing names, and for a task with several best known
-        rewards.
+        A column is missing or a reward is wrong (:func:`gaps`), a name is missing, or a task has
+        several best known rewards.
 
     Examples
     --------
@@ -399,8 +401,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`ranking` does; also for trials below 1, targets that are no gaps, and a frame
-        without best known rewards.
+        A column is missing or a reward is wrong (:func:`ranking`), trials are below 1, targets are
+        no gaps, or the frame has no best known reward.
 
     Examples
     --------
@@ -456,12 +458,14 @@ def solutions_of(
         ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the posture, a column for each of
         ``task.robot.joint_names``, length unit and rad. It is checked in the same way.
     implausible : {"refuse", "drop"}
-        What becomes of hits that the person cannot have made (:func:`.read_hits`).
+        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
+        out.
 
     Returns
     -------
     Solutions
-        A run for each trial in which all goals are hit, by subject and trial, as ``run_ids`` says.
+        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial, ``P1
+        3``.
 
     Raises
     ------

@@ -36,6 +36,7 @@ class Finding:
     holds: bool | None
     """True if the runs show the claim; None if the runs are too few."""
     evidence: str
+    """Sentence with the means and their intervals, or why the claim cannot be judged."""
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
@@ -75,8 +76,9 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
 
 
 def _tests_over_tasks(values: Numbers, bound: float) -> tuple[Estimate, Estimate]:
-    """Test that the mean of values, one for each task, exceeds a bound: with all values, and
-    without the largest value."""
+    """Return two one-tailed bootstrap tests that the mean of values, one for each task, exceeds a
+    bound: with all values, and without the largest value. Two values are needed at least; p is NaN
+    for a test of a single value."""
     every = np.asarray(values, dtype=np.float64)
     return (
         bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
@@ -105,13 +107,14 @@ def mean_beyond(
     -------
     Finding
         ``holds``: the mean lies on this side; None with fewer than three tasks. ``evidence``: the
-        sentence. Tests of the claim, of the claim without the task that favours it most, and of
-        its opposite.
+        sentence. ``tests`` has a test of the claim, ``without`` a test without the task that
+        favours it most, ``against`` a test of its opposite, also without the task that favours the
+        opposite most.
 
     Raises
     ------
     CoarticError
-        For another side.
+        ``side`` is neither ``"greater"`` nor ``"less"``, or an argument has another type.
 
     Examples
     --------

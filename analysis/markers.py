@@ -67,21 +67,23 @@ def hits_from_markers(
     ticks_per_unit : float
         Ticks in a second.
     implausible : {"refuse", "drop"}
-        What becomes of hits that the person cannot have made (:func:`.read_hits`).
+        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
+        out.
 
     Returns
     -------
     DataFrame
-        Hits as :func:`.read_hits` returns them. Trials in which a goal is never reached have none;
-        ``attrs["unfinished"]`` is their number. :func:`pandas.concat` loses it: fit each person.
+        A row for each hit, with the columns of :func:`.read_hits`. Trials in which a goal is never
+        reached have no hits; ``attrs["unfinished"]`` is the number of such trials, which
+        :func:`pandas.concat` loses: fit each person.
 
     Raises
     ------
     CoarticError
         The recording is no such table or of several people, the median length of a link differs
         from the task's by more than 10 %, a marker has a longer gap, a link's length jumps by more
-        than 10 % (markers swap), two shoulders contradict each other, or hits are wrong as
-        :func:`.read_hits` says.
+        than 10 % (markers swap), two shoulders contradict each other, or :func:`.read_hits` would
+        refuse the hits.
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")

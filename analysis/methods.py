@@ -55,7 +55,8 @@ _WORDS = {
 
 def title_of(method: str, setting: str = "") -> str:
     """Return the name of a method, given by id, with its setting in words: ``learner EC4``, ``hill
-    climbing``, ``CMA-ES (other arm still)``. The name of a method from a file is its id."""
+    climbing``, ``CMA-ES (other arm still)``. ``setting`` has the form ``other_arm=still,
+    sigma=0.1``. The name of a method from a file is its id."""
     name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else one_line(method)
     if not setting:
         return name

@@ -43,7 +43,8 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method of :func:`compared` on some tasks. Raises KeyError for others.
+    """Return the runs of a method on some tasks, failed ones too. Raises KeyError for a label that
+    :func:`compared` does not have.
 
     No rows if the method has no run on one of the tasks, or if it is a row of
     :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.
@@ -63,8 +64,8 @@ def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
 def common_tasks(study: Study) -> tuple[str, ...]:
     """Return the names of the tasks over which algorithms are compared, in the order of the study.
 
-    The tasks of that method for which the number of its tasks, times the number of algorithms that
-    ran on all of them, is largest. Empty if no method is compared.
+    They are the tasks of one method: the method for which the number of its tasks, times the number
+    of algorithms that ran on all these tasks, is largest. Empty if no method is compared.
     """
     every = compared(study).items()
     sets = [(study.methods.algorithm[method], {*runs.task}) for method, runs in every]
@@ -94,7 +95,7 @@ def common_runs(study: Study) -> pd.DataFrame:
 @cached
 def board(study: Study) -> pd.DataFrame:
     """Return a row for each method with a gap, by label, the smallest gap first, with the columns
-    of :func:`.ranking` and of :attr:`.Study.methods`.
+    of :func:`.ranking` (``gap``, ``share``, ...) and of :attr:`.Study.methods` (``title``, ...).
 
     Methods that solved every run on :func:`common_tasks` are ranked over these tasks, other methods
     from files over the tasks on which they solved every run; other built-in methods have no row.

@@ -115,8 +115,9 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
 def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
-    """Yield the infos of a module's methods, with their code. Raises CoarticError for no method, a
-    wrong declaration (:func:`_check_declaration`), and a file that cannot be read."""
+    """Yield the infos of ``methods``, the classes that ``module`` defines, with their code;
+    ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
+    declaration (of another type, or without a name), and a file that cannot be read."""
     for method in methods:
         _check_declaration(method, origin)
         try:

@@ -71,13 +71,14 @@ _BEGUN, _SAID = "begun", "said"  # files among the answers of a process
 
 
 class Local:
-    """An executor: processes on this machine, ``jobs`` at once, by default one a core.
+    """Executor that performs jobs in processes on this machine, ``jobs`` at once, by default one a
+    core.
 
-    A job is ended after its limit of CPU time (a day without a limit), and in any case after three
-    times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
-    time is repeated once. Then its runs end as crashed, and a suite does not keep them, so that the
-    next command performs them again. The time in which coartic's kernels are compiled does not
-    count. ``verbose`` shows what methods print and log, and their tracebacks.
+    A job is ended after its limit of CPU time (a day without a limit), and in any case after a wall
+    time of three times this limit plus ``timeout_s``. A job that has waited until then without
+    using its CPU time is repeated once. Then its runs end as crashed, and a suite does not keep
+    them, so that the next command performs them again. The time in which coartic's kernels are
+    compiled does not count. ``verbose`` shows prints, logs and tracebacks of methods.
     """
 
     @checked_arguments
@@ -87,8 +88,9 @@ class Local:
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish; a job whose process
-        ends has ``timeout`` or ``crashed``. One process performs jobs of one method in order.
+        """Yield each job with its outcomes, in the order in which jobs finish; the outcomes of a
+        job whose process ends are ``timeout`` or ``crashed``. A process performs jobs of one method
+        in order.
 
         Raises CoarticError if process after process ends before its first job, and if answers
         cannot be written.
@@ -113,7 +115,8 @@ class Workers:
         self.folder.cleanup()
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield each job with its outcomes, as :meth:`Local.perform` does."""
+        """Yield each job with its outcomes, in the order in which jobs finish. Raises CoarticError
+        if process after process ends before its first job, and if answers cannot be written."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.cell.method.key].append(job)
@@ -196,11 +199,11 @@ class Worker:
 
     def __init__(self, folder: str, method: tuple[str, str, str], local: Local) -> None:
         self.method = method
-        """:attr:`MethodInfo.key` of the method."""
+        """Module or file, id and code of the method (:attr:`MethodInfo.key`)."""
         self.jobs = deque[Job]()
         """Jobs without an answer."""
         self.since_s = math.inf
-        """Clock at the beginning of the first of these jobs, s."""
+        """Clock at the beginning of the first of ``jobs``, s; infinite before."""
         self._timeout_s = local.timeout_s
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
@@ -257,7 +260,7 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """Words on how the process ended, and the last lines that it wrote."""
+        """Words on how the process ended, and the last three lines that it wrote."""
         text, code = b"", self.exit_code or 0
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
@@ -333,8 +336,9 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
 
 
 def _answer_to(job: Job, folder: Path) -> bytes:
-    """Perform a job, and return its outcomes as JSON, crashed ones if JSON cannot hold them; the
-    system ends this process at the job's limit of CPU time. Empties the log in ``folder`` first."""
+    """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
+    cannot hold them; the system ends this process at the job's limit of CPU time. Empties the log
+    in ``folder`` first."""
     with contextlib.suppress(OSError):  # the file is missing
         os.truncate(folder / _SAID, 0)
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
@@ -388,9 +392,9 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 
 
 def start_process(process: Any) -> None:
-    """Start a process of :data:`CONTEXT` that computes as workers do
-    (:func:`coartic.internal.threads.worker_variables`), without running the main program again in
-    it. Raises OSError or EOFError if the process does not start."""
+    """Start a process of :data:`CONTEXT` with the environment variables of a worker (one thread,
+    the same instructions everywhere), without running the main program again in the process. Raises
+    OSError or EOFError if the process does not start."""
     try:
         os.getcwd()
     except FileNotFoundError:

@@ -53,8 +53,8 @@ class Progress:
     present: int = 0
     """Runs of the plan that the folder had before."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Runs that the folder has from another version or code of their method (:meth:`Store.stale`).
-    They are kept, and no report shows them."""
+    """Runs that the folder has from another version or code of their method, by the method, that
+    version and the present one. They are kept, and no report shows them."""
     done: int = 0
     """Runs performed by this call."""
     failed: int = 0
@@ -148,11 +148,13 @@ def run_suite(
     ----------
     suite : str, Path or Suite
         A shipped suite by name, or a suite file (``.toml``).
-    folder, executor, watch
-        As in :func:`perform`.
+    folder : str or Path
+        Results folder, which is made if it is missing.
+    executor, watch
+        Place where methods run, and function called after each run (:func:`perform`).
     options
-        As in :func:`plan_suite`, such as ``tasks``, ``methods``, ``runs`` per cell and ``trials``
-        per run.
+        Fields of :class:`~coartic.benchmarks.planning.Request`, such as ``tasks``, ``methods``,
+        ``runs`` per cell and ``trials`` per run.
 
     Returns
     -------
@@ -162,7 +164,8 @@ def run_suite(
     Raises
     ------
     CoarticError
-        As :func:`plan_suite` and :func:`perform` do.
+        A name or a number is refused (:func:`plan_suite`), or the folder cannot be used
+        (:func:`perform`).
 
     Examples
     --------
@@ -257,7 +260,7 @@ def perform(
 
 def _has_waited(run: Run) -> bool:
     """Return whether a run waited, without using its CPU time, until its limit of wall time ended
-    it. That is no result: the run is not stored, and a warning says to repeat the command."""
+    it; if so, warn that the run is not kept and the command is to be repeated."""
     times = run.outcome.times
     if run.outcome.status != "crashed" or times.wall_s is None or times.cpu_s is not None:
         return False
@@ -267,7 +270,8 @@ def _has_waited(run: Run) -> bool:
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan, a job for each cell; count others in ``progress``.
+    """Return the missing runs of the plan, a job for each cell; count the runs of the plan that
+    ``store`` has in ``progress``.
 
     A run that crashed is performed again, and so is a run that timed out under a lower time limit,
     unless the code of the method is not here. Raises CoarticError if runs are missing whose method

@@ -252,8 +252,9 @@ class Robot:
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """Return the positions of a hand, ``(..., 2)``, and their Jacobians, ``(..., 2, dof)``, for
-        configurations ``(..., dof)``: :meth:`forward_kinematics` and :meth:`jacobian` at once."""
+        """Return the positions of a hand, ``(..., 2)``, length unit, and their Jacobians, ``(...,
+        2, dof)``, for configurations ``(..., dof)``: :meth:`forward_kinematics` and
+        :meth:`jacobian` at once. Raises ValueError if ``q`` or ``hand`` does not fit the robot."""
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1
@@ -345,7 +346,8 @@ class Robot:
 
 
 def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
-    """Return two lists, x and y of shoulder, joints and hand of an arm in ``q`` (:func:`chain`)."""
+    """Return two lists, x and y, length unit, of shoulder, joints and hand of an arm with n links
+    in ``q``, n + 1 entries each; ``cos`` and ``sin`` fit the type of ``q``."""
     xs: list[Any] = [None] * (len(arm.links) + 1)
     ys = [*xs]
     chain(q, arm, xs, ys, cos, sin)

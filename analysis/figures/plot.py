@@ -152,13 +152,13 @@ def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
 
 
 def for_page(plot: Plot) -> str:
-    """A figure as one ``<svg>`` element of the page.
+    """Return a figure as one ``<svg>`` element for a page of HTML.
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
     one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
-    :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a page.
-    Looks that several elements have are classes, named by their hashes.
+    :func:`~.style.tip` show its text. Ids begin with the plot's id, so that several figures can
+    share a page. Every ``style`` attribute becomes a class, named by a hash of the style.
     """
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point

@@ -90,7 +90,8 @@ def grid(panels: int) -> tuple[int, int]:
 
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
-    """Within this block, let :func:`panels` make figures of a width, inches; None: as they ask."""
+    """Let :func:`panels` make figures of a width, inches, in the block of this context; with None,
+    figures have the width that is asked of :func:`panels`."""
     before = _width.set(width)
     try:
         yield
@@ -99,7 +100,8 @@ def drawn_at(width: float | None) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Return whether figures are now drawn at less than five inches (:func:`drawn_at`)."""
+    """Return whether the width chosen by :func:`drawn_at` is below five inches; False without a
+    chosen width."""
     return (_width.get() or TWO) < 5
 
 
@@ -117,7 +119,8 @@ def panels(
         Width and height, inches: ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
-        Number of panels used, the first ones; the others stay empty. By default all.
+        Number of panels used, the first ones, by default all. Further panels stay empty; in a block
+        of :func:`drawn_at` only those are there that fill the last row.
     **subplots
         Arguments of Matplotlib's ``Figure.subplots``, such as ``sharey=True``.
 

@@ -208,7 +208,7 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
 
 
 def _describe_family(family: Family) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: description and instances of a family."""
+    """Yield pairs of word and text: description, names of instances, command that draws some."""
     yield "Family", f"{family.name}: {family.description}"
     yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
     yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
@@ -273,7 +273,8 @@ def check(
 
 
 def _show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print the findings and return the number of broken laws."""
+    """Print the finding of each law of ``name``, a method or a task file, and how many hold; return
+    the number of broken laws."""
     for law in laws:
         first, *more = law.finding.splitlines() or [""]
         say(

@@ -21,7 +21,8 @@ _ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\u202f": " ", "\xa0": 
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    """Return characters of ASCII for what a terminal lacks: - for a minus sign, ? for others."""
+    """Return ASCII for the characters that a terminal lacks, ``-`` for a minus sign, ``?`` for one
+    without a counterpart, and the place after them, as an error handler of ``codecs`` does."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lacking = error.object[error.start : error.end]
@@ -32,8 +33,8 @@ codecs.register_error("replaced", _replaced)
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print lines; characters that do not print, such as line breaks in names, are replaced, and
-    those that the terminal lacks (:func:`_replaced`)."""
+    """Print lines of text. Line breaks within a line become `` | ``, characters that do not print
+    become escapes, and characters that the terminal lacks ASCII, such as ``-`` for a minus sign."""
     stream = stream or sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
     text = "\n".join(map(one_line, lines)).encode(encoding, "replaced").decode(encoding)
@@ -61,8 +62,8 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text below their headings, the first column to the left; nothing without
-    rows."""
+    """Print rows of text below their headings, the first column to the left, other columns to the
+    right; nothing without rows."""
     if rows:
         widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
         for first, *others in (headings, *rows):
@@ -100,8 +101,8 @@ class Display:
         print(end=self._end, file=sys.stderr, flush=True)
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress and the last run; before the first run (``cell`` None) what the folder
-        holds already."""
+        """Show the progress and the cell of the last run; before the first run (``cell`` None) show
+        which runs the folder has already."""
         from coartic.analysis.methods import title_of
         from coartic.runs.record import late_import
 

@@ -54,7 +54,8 @@ class Recorded:
 
 
 class TaskVectorEnv(Recorded, VectorEnv):
-    """Let N robots act side by side, in a fraction of the time of N :class:`TaskEnv`.
+    """Vector environment: N robots act side by side, in a fraction of the time of N
+    :class:`TaskEnv`.
 
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
     process fails, which costs ``coartic.method.optimisers.FAILED``. A trial that has ended starts
@@ -68,12 +69,13 @@ class TaskVectorEnv(Recorded, VectorEnv):
     task : Task, str or Path
         The task; or a family, ``"two-armed/v1"``: each trial has an instance of the family.
     split : {"development", "test", "fresh"}, optional
-        Instances to train on (by default), to report on, or those of a ``year``. They never mix.
+        Instances of the family: to train on (``"development"``, the default), to report on
+        (``"test"``), or of a ``year`` (``"fresh"``). They never mix.
     count : int, optional
-        How many instances of the split, from its first; by default 1,000 of the development split
-        and 10 of the others.
+        How many instances of the split, from its first; by default 1,000 of the development split,
+        10 of the test and fresh splits.
     year : int, optional
-        Of fresh instances.
+        Year of fresh instances, such as 2027.
     ahead : int
         Goals in view beyond the next one.
     model : MotionModel
@@ -95,11 +97,11 @@ class TaskVectorEnv(Recorded, VectorEnv):
     it.
 
     An action has an entry for the hand, where the robot has two, and one for each joint. The box is
-    from -1 to 1; what is beyond is clipped. Up to 0.5 the hand is the one that the corrective
-    process brings to the goal by the shorter path in joint space, above 0.5 the other one. The
-    target is where the corrective process would bring it, plus :data:`REACH` times the entries of
-    the joints: zeros do what the corrective process does. Where it would fail, the present posture
-    takes the place of its result. Entries of joints that a robot does not have do nothing.
+    from -1 to 1; entries beyond are clipped. With an entry up to 0.5 the hand is the one that the
+    corrective process brings to the goal by the shorter path in joint space, above 0.5 the other
+    hand. The target is the posture that the corrective process finds for this hand, or, where the
+    process fails, the present posture, plus :data:`REACH` times the entries of the joints: zeros do
+    what the corrective process does. Entries of joints that a robot does not have do nothing.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}

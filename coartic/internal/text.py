@@ -50,7 +50,8 @@ def one_line(text: str) -> str:
 
 
 def prints(c: str) -> bool:
-    """Return whether a character is printable; every kind of blank counts as printable."""
+    """Return whether a character is printable, or a space of any width (Unicode category Zs); tabs
+    and line ends are not printable."""
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
@@ -145,8 +146,8 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
-    ``names``, or, if none is near, with all names, or the first 12; for a file of another program
-    return the sentence of :func:`foreign_file`."""
+    ``names``, or, if none is near, with all names, or the first 12 of more than 13; for a file of
+    another program return a sentence that coartic does not read it."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)

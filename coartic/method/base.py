@@ -39,7 +39,8 @@ class Result:
     initial: tuple[Movement, ...] = ()
     """Movements of a learner's first trial; empty if it failed, and for other methods."""
     replay: tuple[Movement, ...] = ()
-    """Movements of a learner's noiseless greedy trial after learning; empty likewise."""
+    """Movements of a learner's noiseless greedy trial after learning; empty if that trial failed,
+    and for other methods."""
 
 
 class Outline(NamedTuple):
@@ -80,18 +81,18 @@ class Method(ABC):
     citation: ClassVar[str]
     information: ClassVar[frozenset[Information]]
     secondary: ClassVar[tuple[str, ...]] = ()
-    """Its secondary objectives, in words."""
+    """Objectives beyond hitting the goals, such as smoothness, in words."""
     stochastic: ClassVar[bool] = True
     """True if the seed matters; other methods are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
     version: ClassVar[int] = 1
-    """Raised by whoever changes what its runs give, by a default as well: no run of an earlier
-    version goes with later ones."""
+    """Version of the method's results, raised with every change of them, a default's as well: runs
+    of two versions are not compared."""
     later: ClassVar[frozenset[str]] = frozenset()
-    """Parameters that it got after runs of it were out. While one has its default, it is left out
-    of what a run is known by, so that earlier runs stay runs of the same method."""
+    """Names of parameters that the method got after runs of it were published. While such a
+    parameter has its default, the identity of a run leaves it out: earlier runs stay valid."""
     files: ClassVar[tuple[str, ...]] = ()
-    """Data files in the folder of the method's file. They count as its code."""
+    """Names of data files in the folder of the method's file. They count as its code."""
     quick: ClassVar[Mapping[str, Any]] = {}
     """Parameters for a check in seconds, where the defaults take longer than that."""
 

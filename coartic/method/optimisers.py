@@ -192,7 +192,8 @@ class Objective:
 
     @property
     def task(self) -> Task:
-        """The task. Raises UndeclaredError in a method, which cannot see it."""
+        """The task. Raises UndeclaredError if the objective was made without ``task``, as it is in
+        a method: a method cannot see its task."""
         if self._task is None:
             raise UndeclaredError("a method cannot see its task, nor what is known of the task")
         return self._task
@@ -205,7 +206,7 @@ class Objective:
     @property
     def best_known(self) -> int | None:
         """Lowest cost known of the task, ticks: of any hand sequence, also with goals that are hit
-        without a movement. Raises UndeclaredError in a method, which cannot see its task.
+        without a movement. Raises UndeclaredError in a method, as :attr:`task` does.
 
         None where no cost is shipped: for a task of your own, for instances of a family except the
         first 40 of its test split, and for another model than the paper's.
@@ -215,7 +216,8 @@ class Objective:
 
     @property
     def proven(self) -> bool:
-        """True if it is proven that no solution costs less than ``best_known``; False without."""
+        """True if it is proven that no solution costs less than ``best_known``; False without such
+        a proof. Raises UndeclaredError in a method, as :attr:`task` does."""
         known = self._known
         return known is not None and known.proven
 
@@ -276,10 +278,10 @@ class Objective:
         takes as many ticks as the point costs. No trial is counted.
 
         ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
-        default ``hands`` of this problem. A movement has a target of all joints (a joint that has
+        default :attr:`hands` of this objective. A movement has a target of all joints (one that has
         no entry in the point has the value at which it keeps still), or none where the entries of
         its goal are NaN. Goals that are missed are corrected by ``execute``. Raises UndeclaredError
-        in a method, which has :attr:`solution`, and ValueError if point or hands do not fit.
+        in a method, which can use :attr:`solution`, and ValueError if point or hands do not fit.
         """
         task, point = self.task, real_array("x", x)
         if point.shape != (self.dim,):
@@ -312,7 +314,8 @@ class Objective:
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
         columns as scipy has them. Raises ValueError for shape ``(dim, dim)``, in which points may
-        be rows: :meth:`many` takes rows. Other errors are those of :meth:`many`."""
+        be rows (:meth:`many` takes rows), for other shapes, infinite entries, a goal that is NaN in
+        part and hands that do not fit; BudgetError if fewer trials are left than points."""
         point = real_array("x", x)
         if point.ndim == 2 and len(point) == self.dim:
             if point.shape[1] == self.dim:
@@ -345,7 +348,7 @@ class Objective:
         Entries are finite, or NaN for all joints of a goal (the corrective process alone); an entry
         beyond 100,000 makes the trial fail. Joints that have no entry in a point keep still.
         ``hands`` is one hand sequence for all points (``"RRLR"``), or a sequence for each point; by
-        default ``hands`` of this problem.
+        default :attr:`hands` of this objective.
 
         Raises BudgetError if fewer trials are left than there are points: the trials that are left
         are made, for the first points. Raises ValueError for another shape, for infinite entries,
@@ -367,8 +370,9 @@ class Objective:
         return costs
 
     def _evaluate(self, points: Array, codes: Hands, costs: Array) -> None:
-        """Make a trial for each point ``(N, dim)`` with hands ``codes`` ``(N, G)``; write costs,
-        ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and note each new best."""
+        """Make a trial for each point ``(N, dim)`` with hands ``codes``, 0 left or 1 right, ``(N,
+        G)``; write costs, ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and keep
+        each point that is better than all before it."""
         made = self._session._make_trials(codes, self._targets_of(points))
         np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self.best_cost:
@@ -381,8 +385,9 @@ class Objective:
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
-        """Note a point as the best so far, evaluated as number ``evaluations`` (from 1): ``trial``
-        (from 0) is the row of its trial in ``codes`` and in ``made``."""
+        """Keep a point ``(dim,)`` of cost ``cost``, ticks, as the best so far, evaluated as number
+        ``evaluations`` (from 1): ``trial`` (from 0) is the row of its trial in ``codes``, the hands
+        ``(N, G)``, and in ``made``, the accounts of N trials."""
         self.best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
         self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
@@ -394,8 +399,8 @@ class Objective:
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
-        """Return the targets ``(N, G, dof)`` of points ``(N, dim)``; NaN for joints without an
-        entry."""
+        """Return the targets ``(N, G, dof)``, length unit and rad, of points ``(N, dim)``; NaN for
+        joints that have no entry in a point."""
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
         return targets
@@ -470,7 +475,7 @@ def objective(
     TypeError
         The model is no MotionModel, or the task is neither a Task nor a text nor a path.
     MethodError
-        The corrective process completes no sequence, or there are too many to try.
+        The corrective process completes no sequence, or there are more than 4096 to try.
     """
     chosen = as_task(task)
     if budget is not None:
@@ -522,7 +527,10 @@ def problems(
     TaskError
         There is no such family.
     ValueError
-        The split or the count is another one.
+        The split is neither of these, the count is not from 1 to 10,000, or :func:`objective`
+        refuses an option.
+    MethodError
+        The corrective process completes no sequence of an instance, or there are more than 4096.
     """
     if not isinstance(split, str) or split not in ("test", "development"):
         raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
@@ -536,8 +544,8 @@ class OptimiserParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Trials of a run, those of the corrective process alone among them."""
     hands: str | None = None
-    """Hand sequence; by default the one with which the corrective process alone does best, or the
-    task's own where there are too many to try."""
+    """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
+    alone gets the highest reward, or the task's initial one where more than 4096 exist."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Half the width of the bounds, length unit (base) and rad (joints)."""
 

@@ -75,7 +75,7 @@ class Trajectory:
 
     def subtask(self, goal: int) -> Array:
         """Return the rows of ``configurations`` from the hit of the goal before, or the start, to
-        the hit of a goal, both included.
+        the hit of a goal, both included, shape ``(rows, dof)``.
 
         ``goal`` is a number from 1. Raises ValueError if there is no such goal.
         """
@@ -109,7 +109,7 @@ class Trajectory:
 
     def plot(self) -> Figure:
         """Return a figure of the robot at the start (pale) and at each hit, with the path of the
-        hand that hits."""
+        hand that hits each goal."""
         from matplotlib.figure import Figure
 
         from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals

@@ -28,8 +28,8 @@ from coartic.tasks.task import Task
 Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
 """Status of a run."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
-"""Prefixes of columns by the part of a run that they score: the solution, the first trial of a
-learner, and one noiseless greedy trial after learning."""
+"""Prefixes of columns by the part of a run that the columns score: ``solution``, ``initial`` (the
+first trial of a learner) and ``replay`` (one noiseless greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
 LATE = "late_imports"
 """Entry of the details of a run: files of the user's that a run of its process first loaded, too
@@ -42,9 +42,11 @@ have some thousands."""
 
 
 class Score(NamedTuple):
-    """The score of a part of a run (:data:`PARTS`), from its execution; None where blank."""
+    """Score of a part of a run (solution, initial or replay), from its execution; None where
+    blank."""
 
     reward: int | None = None
+    """Total reward, minus the ticks."""
     hands: str | None = None
     """Hand of each goal, such as ``LRLR``."""
     movements: tuple[Movement, ...] = ()
@@ -87,7 +89,7 @@ class Outcome:
     reason: str = ""
     """The reason why the run is not ok; empty if the run is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
-    """Movements by part (:data:`PARTS`), still to be executed and scored."""
+    """Movements by part (``solution``, ``initial``, ``replay``), not yet executed and scored."""
     details: dict[str, Any] = field(default_factory=dict)
     """Further data that the method keeps, such as corrective movements by trial."""
     used: tuple[str, ...] = ()
@@ -98,8 +100,8 @@ class Outcome:
     """Reward of each trial; None if the trial failed or its reward is not kept."""
     times: Times = Times()
     environment: dict[str, Any] | None = None
-    """Versions, platform, processor, variables, arithmetic and commit, or those of them that are
-    not as in the process that scores the run."""
+    """Versions, platform, processor, variables, arithmetic and commit, by name, or only the entries
+    that differ from the environment of the process that scores the run."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ class Run:
     outcome: Outcome
     """The outcome, without ``parts``: the scores have their movements."""
     scores: dict[str, Score]
-    """Scores by part (:data:`PARTS`); empty if the run is not ok."""
+    """Scores by part (``solution``, ``initial``, ``replay``); empty if the run is not ok."""
     date: str
     """Date and time at the end of the run, UTC."""
 
@@ -127,7 +129,7 @@ class Run:
 
     @cached_property
     def id(self) -> str:
-        """Id of the run (:meth:`Job.run_id`)."""
+        """Id of the run: 16 hex digits, a hyphen, and the version or code of the method."""
         return self.job.run_id(self.number)
 
     @property
@@ -142,17 +144,20 @@ class Run:
 
     @property
     def initial(self) -> Score:
-        """Score of a learner's first trial; blank if it or the run failed, or for other methods."""
+        """Score of a learner's first trial; blank if the trial or the run failed, or for other
+        methods."""
         return self.scores.get("initial", Score())
 
     @property
     def replay(self) -> Score:
-        """Score of the greedy trial after learning; blank as for :attr:`initial`."""
+        """Score of a learner's greedy trial after learning; blank if the trial or the run failed,
+        or for other methods."""
         return self.scores.get("replay", Score())
 
     @property
     def counts(self) -> Any:
-        """The meter; a meter of blanks if the worker died."""
+        """Counts of the run (:class:`~coartic.method.Meter`); each count is None if the worker
+        died."""
         return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
 
     @property
@@ -169,7 +174,8 @@ class Run:
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials; None for other methods."""
+        """Corrective movements in the last tenth of a learner's trials; None for other methods and
+        failed runs."""
         return self._corrections(-1)
 
     def _corrections(self, place: int) -> int | None:
@@ -180,7 +186,7 @@ class Run:
 
     @property
     def is_downsampled(self) -> bool:
-        """True if rewards of some trials are not kept (:meth:`downsample`)."""
+        """True if more rewards of trials are None than trials failed: some rewards are not kept."""
         meter = self.outcome.meter
         return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
 
@@ -196,7 +202,7 @@ class Run:
 
     @cached_property
     def result(self) -> str:
-        """Hash of status, every joint of every movement, and rewards of all trials.
+        """Hash, 16 hex digits, of status, every joint of every movement, and rewards of all trials.
 
         Two runs with the same outcome have the same hash, whatever time and evaluations they took.
         """
@@ -205,12 +211,13 @@ class Run:
         return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
 
     def movement_data(self, part: str) -> list[list[Any]]:
-        """Return the movements of a part (:data:`PARTS`), each as a list of goal, hand, kind, ticks
-        and path (:func:`movement_data`); an empty list if the run lacks the part."""
+        """Return the movements of a part (``solution``, ``initial`` or ``replay``), each as a list
+        of goal, hand, kind, ticks and path; an empty list if the run lacks the part."""
         return [movement_data(each) for each in self.scores.get(part, Score()).movements]
 
     def to_row(self) -> dict[str, Any]:
-        """Return the columns of the run in table ``results``, without the ids of other rows."""
+        """Return the columns of the run in table ``results`` by name, without ``cell`` and
+        ``environment``, the ids of rows of other tables."""
         row = {name: attrgetter(source)(self) for name, _, source, _ in COLUMNS if source}
         details = json.dumps(self.outcome.details)
         used = ", ".join(self.outcome.used)
@@ -335,8 +342,8 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
     """Execute solutions of a task side by side under the paper's model; scores come from here.
 
-    Returns for each solution its execution, or the error of a solution that breaks the rules of
-    the task or is too long (:func:`too_long`).
+    Returns for each solution, in order, its execution, or, as an object, the error of a solution
+    that breaks the rules of the task, or has more than 10,000 movements or 1,000,000 steps.
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
