@@ -92,8 +92,9 @@ def control_of(study: Study, task: str, label: str, hands: str, *, own: bool = F
 
 
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
-    """Return whether a method, if it is the learner by its condition, gives noise to an arm that is
-    not to hit; True for other methods, and on tasks for one arm, where there is none."""
+    """Return whether a method gives noise to the arm that is not to hit: the learner by its
+    condition, random search by its parameter ``idle_arm``. True for other methods, and on tasks for
+    one arm."""
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True

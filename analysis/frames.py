@@ -328,7 +328,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
         runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
         (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
-        that it solved in every run, of ``missing`` tasks (the others with a best known reward), of
+        that it solved in every run, of ``missing`` tasks (other tasks with a best known reward), of
         ``runs`` and of ``failed`` runs on all tasks. A method with missing tasks has no gap and is
         last. The paper's learner over tasks for one arm and for two has a row of its own,
         ``"dual-process (EC1, EC4)"``. With ``corrective_best`` also the ``share`` of the possible
@@ -385,8 +385,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     ----------
     frame : DataFrame
         With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end.
-        Settings as in :func:`ranking`.
+        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end. With a
+        column ``setting``, a method with several settings is several methods.
     targets : sequence of float
         Gaps to the best known reward, such as ``[0.1, 0.05, 0.01]``.
 
@@ -454,9 +454,9 @@ def solutions_of(
     task : Task
         The task of the trials.
     hits : DataFrame
-        A row for each hit, as :func:`coartic.analysis.read_hits` returns it: ``subject``,
-        ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the posture, a column for each of
-        ``task.robot.joint_names``, length unit and rad. It is checked in the same way.
+        A row for each hit: ``subject``, ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the
+        posture, a column for each of ``task.robot.joint_names``, length unit and rad. The frame is
+        checked like a file of :func:`coartic.analysis.read_hits`.
     implausible : {"refuse", "drop"}
         Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
         out.
@@ -464,8 +464,8 @@ def solutions_of(
     Returns
     -------
     Solutions
-        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial, ``P1
-        3``.
+        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial, such as
+        ``P1 3``.
 
     Raises
     ------

@@ -252,8 +252,8 @@ def checked_hits(
     implausible: Implausible = "refuse",
     ticks_per_unit: float | None = None,
 ) -> pd.DataFrame:
-    """Return a new frame of recorded hits, checked, unwrapped and sorted, with the columns of
-    :func:`read_hits`.
+    """Return a new frame of recorded hits, checked, unwrapped and sorted, a row for each hit:
+    ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints (:func:`read_hits`).
 
     ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
     ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole. Raises CoarticError
@@ -408,9 +408,9 @@ def _implausible(
     whether the hand is more than two radii from its goal in the median hit: then places are not
     checked.
 
-    Warns of such a median hit, of ticks that rise from goal to goal in every trial, and of an arm
-    that is faster or slower than people's. Raises CoarticError if the median hit contradicts the
-    base that the task locks, or takes a number of ticks that no arm of the task could take;
+    Warns of a median hit so far off, of ticks that rise from goal to goal in every trial, and of an
+    arm that is faster or slower than people's. Raises CoarticError if the median hit contradicts
+    the base that the task locks, or takes a number of ticks that no arm of the task could take;
     ``unit``: ticks in a unit of time.
     """
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
@@ -496,8 +496,8 @@ def _implausible(
 
 
 def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
-    """Warn if three trials or more, in all different from each other, are each equal to another
-    trial in all numbers, of the same subject or another one."""
+    """Warn if at least three different trials are there twice or more, equal in all numbers, of one
+    subject or of several."""
     hits = pd.util.hash_pandas_object(frame.drop(columns=["subject", "trial"]), index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
     copies = trials[trials.duplicated(keep=False)]

@@ -40,7 +40,8 @@ class Finding:
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
-    """Tests of the claim's opposite, one of which refutes it."""
+    """Tests of the opposite of the claim; any test below 5 %, after correction, refutes the
+    claim."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
@@ -107,9 +108,9 @@ def mean_beyond(
     -------
     Finding
         ``holds``: the mean lies on this side; None with fewer than three tasks. ``evidence``: the
-        sentence. ``tests`` has a test of the claim, ``without`` a test without the task that
-        favours it most, ``against`` a test of its opposite, also without the task that favours the
-        opposite most.
+        sentence. ``tests`` has a test of the claim; ``without`` a test of the claim without the
+        task that favours it most; ``against`` a test of the opposite, with all tasks or without the
+        task that favours the opposite most, whichever has the larger p.
 
     Raises
     ------

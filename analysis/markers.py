@@ -262,9 +262,10 @@ def _bridge(place: Array, time: Array, begin: NDArray[np.intp], step: float) -> 
 
 
 def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int, float, Array]]:
-    """Return the hits of a trial in the order of the goals, up to the first goal that is missed:
-    sample, place of the hand in ``tips``, ``(hands, n, 2)``, time in s and posture, both where the
-    tip enters the goal."""
+    """Return the hits of a trial in the order of the goals, up to the first goal that is missed,
+    each as index of the sample, index of the hand in ``tips``, time, s, and posture ``(dof,)``,
+    the last two where the tip enters the goal. ``tips`` are places of hands, ``(hands, n, 2)``,
+    ``time`` and ``q`` times ``(n,)`` and postures ``(n, dof)`` of the samples."""
     found: list[tuple[int, int, float, Array]] = []
     ways = np.diff(tips, axis=1, prepend=tips[:, :1])  # to each sample from the one before
     for goal in task.goal_array:

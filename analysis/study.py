@@ -178,7 +178,7 @@ class Study:
         Returns
         -------
         Study
-            A new study. Gaps are as in this study: best known rewards are of all its methods.
+            A new study. Its gaps are the same as here: best known rewards are of all methods here.
 
         Raises
         ------
@@ -361,12 +361,12 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Names as in :attr:`runs`; a setting follows its method: ``"random-search
-            sigma=0.1"``. Conditions of the learner may go by their own names, ``"EC4"``.
+            Name of the task, and label of the method, its id with its setting:
+            ``"random-search sigma=0.1"``; for conditions of the learner also ``"EC4"``.
         replay : bool
             Execute the noiseless trial after learning in place of the solution, for runs that have
-            such a trial. The solution of a learner is its best trial; the replay shows what was
-            learned without this selection.
+            a replay. The solution of a learner is its best trial; the replay shows what was learned
+            without this selection.
 
         Returns
         -------
@@ -405,7 +405,7 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Name of the task, and method with its setting, as in :attr:`runs`; also ``"EC4"``.
+            Name of the task, and label of the method, its id with its setting; also ``"EC4"``.
         replay : bool
             Take the noiseless trial after learning in place of the solution.
 

@@ -49,7 +49,7 @@ class Law(NamedTuple):
     passed: bool
     """True if the law holds."""
     finding: str
-    """What was found, in words; of a broken law its first problem."""
+    """Words on what was checked; for a broken law its first problem."""
 
 
 def _law(name: str, problems: Iterable[str], finding: str) -> Law:
@@ -220,8 +220,8 @@ def _hopeless_task(like: Task) -> Task:
 
 def check_task_file(path: Path, registered: Registry) -> list[Law]:
     """Check every law of a task file, and return the laws in order: ``valid``, ``name``, ``distinct
-    goals``, ``solvable``, ``methods``; for an invalid file the first alone. ``registered``: the
-    methods of which at least one has to apply."""
+    goals``, ``solvable``, ``methods``; for an invalid file the first alone. ``registered``: known
+    methods; at least one has to apply to the task."""
     try:
         task = load_task(path)
     except TaskError as error:

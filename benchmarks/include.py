@@ -117,8 +117,8 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of sources with runs in their plan that the joined plan ``jobs`` lacks, and with cells
-    of stochastic methods, not ``asked`` for, of which it has fewer runs than are asked for of some
+    """Warn of a source whose plan has runs that the joined plan ``jobs`` lacks, and of a source
+    that has fewer runs of a stochastic method's cell, not ``asked`` for, than are asked for of some
     cell. ``asked`` (numbers of runs) and ``jobs`` are by digest, ``plans`` by name of source."""
     most = max(asked.values())
     for name, part in plans.items():

@@ -142,7 +142,7 @@ def _methods_of_module(
 def _check_declaration(method: type[Method], origin: str) -> None:
     """Check that a method declares its name, title and citation, texts of one line, and its
     information; ``origin`` is the name of its file in messages. Raises CoarticError for a missing
-    or wrong one. What else an id must be, the registry checks."""
+    or wrong declaration. The registry checks the form of ids (:func:`~.registry.check_id`)."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)

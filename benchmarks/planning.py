@@ -75,7 +75,7 @@ class Request(FileData):
     A method that the suite does not have is run on every task of the suite that it applies to."""
     method_files: _Files = ()
     """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
-    all methods of the file run, together with the others."""
+    all methods of the file run, together with the methods named."""
     family_files: _Files = ()
     """Files with your own families."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
@@ -173,8 +173,8 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
-    """Return the ids of all methods of the user's files of which neither the suite nor the request
-    names a method."""
+    """Return the ids of all methods in the user's files, without files with a method that the suite
+    or the request names."""
     files = {
         registered[method].where
         for names in (request.methods, *(block.methods for block in suite.blocks))
@@ -288,9 +288,9 @@ def _extra_jobs(
     methods: Sequence[MethodInfo],
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: those of ``methods``
-    that are new to the suite on the tasks of the suite, and all ``methods`` on ``own``, the tasks
-    that the request brings, where they apply. ``job`` makes a job of task and method."""
+    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: ``methods`` new to the
+    suite on the tasks of the suite, and all ``methods`` on ``own``, the tasks that the request
+    brings, where they apply. ``job`` makes a job of task and method."""
     of_suite = {each.cell.method.name for each in jobs}
     there = {(each.cell.task.name, each.cell.label) for each in jobs}
     new = [method for method in methods if method.name not in of_suite]

@@ -187,7 +187,7 @@ def perform(
     """Perform the runs of a plan that a results folder lacks.
 
     The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
-    that fail are stored and counted, and raise nothing; those that crashed, or timed out under a
+    that fail are stored and counted, and raise nothing; runs that crashed, or timed out under a
     lower limit, are performed again by the next call. An interruption keeps finished runs. Runs
     that waited without computing are not kept; a warning names them. For each method of a file, a
     run is made again after a run with another seed; a warning says if the results differ, or if

@@ -127,10 +127,10 @@ _TAKEN_BY = {
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of the thing that is named: ``suite`` or ``shipped family`` for a shipped
-    one, ``method file`` for a file ``.py``, ``suite``, ``family`` or ``task`` for a file ``.toml``,
-    by its keys, or ``results folder``; empty for anything else. Raises CoarticError for a ``.toml``
-    that cannot be read."""
+    """Return the kind of the thing that is named: ``suite`` or ``shipped family`` for the name of a
+    shipped one; ``method file`` for a name that ends in ``.py``; ``suite``, ``family`` or ``task``
+    for a file ``.toml``, by its keys; ``results folder``; or an empty text for anything else.
+    Raises CoarticError for a ``.toml`` that cannot be read."""
     if name in suites():
         return "suite"
     if {name, f"{name}/v1"} & {*shipped_families()}:

@@ -87,8 +87,8 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     """Return the derivatives of x and of y of point ``tip`` of an arm by the angle of ``joint``.
 
     In length unit per rad: a column of the geometric Jacobian. ``tip`` and ``joint`` are indices
-    in ``xs`` and ``ys``, as :func:`chain` fills them; 0 is the shoulder. A rotation about a joint
-    moves the tip at right angles to the line between them.
+    in ``xs`` and ``ys``, x and y of shoulder (0), joints and hand (:func:`chain`). A rotation about
+    a joint moves the tip at right angles to the line between them.
     """
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
@@ -103,9 +103,9 @@ class Robot:
     gives the published initial rewards of the one-armed tasks (docs/model.md).
 
     A configuration ``q`` has shape ``(dof,)``: the base's x and y (length unit), the joint angles
-    of the left arm and those of the right one (rad, each from the link before). Methods take one or
-    many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another shape or that is not
-    finite, and for a hand that is neither ``"left"`` nor ``"right"``.
+    of the left arm and the joint angles of the right arm (rad, each from the link before). Methods
+    take one or many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another shape or
+    that is not finite, and for a hand that is neither ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)

@@ -64,9 +64,9 @@ Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 DrawsFigure = Callable[..., Plot | None]
 """A figure of the report, as a function of a study; None if the folder has no runs for it.
 
-Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks`` as
-:meth:`.Study.only` takes them; ``style``: settings of Matplotlib that count more than the
-project's, as ``matplotlib.style.use`` takes them.
+Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks``, labels and
+names of the only ones to draw (:meth:`.Study.only`); ``style``: settings of Matplotlib that count
+more than the project's, in a form of ``matplotlib.style.use``.
 """
 
 

@@ -108,8 +108,8 @@ def is_narrow() -> bool:
 def panels(
     shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure with panels; in a block of :func:`drawn_at`, of the width chosen there, with
-    fewer panels side by side, and taller, where they would be too narrow.
+    """Return a figure with panels. In a block of :func:`drawn_at` the figure has the width chosen
+    there, and, if panels would be too narrow, fewer panels side by side and a larger height.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def panels(
         journal.
     used : int, optional
         Number of panels used, the first ones, by default all. Further panels stay empty; in a block
-        of :func:`drawn_at` only those are there that fill the last row.
+        of :func:`drawn_at` there are none, except empty ones that fill the last row.
     **subplots
         Arguments of Matplotlib's ``Figure.subplots``, such as ``sharey=True``.
 
@@ -177,8 +177,8 @@ def means(
     axes : matplotlib.axes.Axes
         Axes to draw on.
     frame : DataFrame
-        A row for each mean, as :func:`coartic.analysis.means` returns it: columns ``x`` and ``y``,
-        and for intervals the columns of ``y`` with ``_low`` and ``_high``.
+        A row for each mean, such as the table of :func:`coartic.analysis.means`: columns ``x`` and
+        ``y``, and for intervals the columns of ``y`` with ``_low`` and ``_high``.
     x, y : str
         Columns of the places and of the means.
     by : str

@@ -49,10 +49,10 @@ _EARLY = 1_000
 def list_against_learner(study: Study) -> Rows:
     """List the mean rewards of every method and of the learner (EC1, EC4 on two arms), by task.
 
-    For methods that solved every run; p is corrected over the tasks of a method (Holm). The reward
-    of a deterministic method counts as exact. The test takes samples as independent, though runs
-    have the same seeds: with 100 runs of the learner and 20 of the other method, pairs would leave
-    out 80.
+    For methods that solved every run; p is two-sided, of the exchange test, or, for a deterministic
+    method, whose reward counts as exact, of the bootstrap test, and is corrected over the tasks of
+    a method (Holm). The exchange test takes samples as independent, though runs have the same
+    seeds: with 100 runs of the learner and 20 of the other method, pairs would leave out 80.
     """
     for label, method in study.methods[~study.methods.is_search].iterrows():
         cells, tests = [], []
@@ -79,8 +79,9 @@ def list_against_learner(study: Study) -> Rows:
 
 
 def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
-    """Return a copy of runs with the best ``reward`` of the first ``trials`` trials of each, NaN if
-    none succeeded; runs without trials keep their reward. Column ``gap`` stays as it is."""
+    """Return a copy of runs whose ``reward`` is the best of their first ``trials`` trials, NaN if
+    none of these succeeded; runs without trials keep their reward. Column ``gap`` stays as it
+    is."""
     learned, best = improvements(study), list[float]()
     rewards = runs.reward.to_numpy(np.float64, na_value=math.nan)
     for run_id, reward in zip(runs.run_id, rewards, strict=True):
@@ -100,9 +101,9 @@ def list_ranking(study: Study) -> Rows:
     """List gaps and shares over all tasks, and gaps on each, methods from files first, settings
     after their method.
 
-    ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
-    them, over the ``tasks`` that it solved. Also the gap after a thousand trials, and means of what
-    a run costs.
+    ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that did not solve
+    all of them, over the ``tasks`` that it solved. ``gap_early`` is the gap after a thousand
+    trials, ``forward_kinematics`` and ``cpu_s`` are means over runs.
     """
     tested, runs = list_against_learner(study), common_runs(study)
     scores = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
@@ -134,8 +135,8 @@ def _ranked(study: Study) -> list[str]:
     """Return the labels of the methods of the ranking: methods from files, then built-in ones.
 
     In both groups the smallest mean gap is first, and methods without a gap follow in the
-    order of :attr:`.Study.methods`. But a setting or an ablation stands after its method, if
-    that method is in the list.
+    order of :attr:`.Study.methods`; but a setting or an ablation stands after its own method, if
+    its own method is in the list.
     """
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
@@ -162,7 +163,7 @@ def list_differences(study: Study) -> Rows:
     """List for each method from a file the built-in methods with the same use of the reward, with
     their gaps less its gap, on the tasks on which it solved every run; the smallest gap first.
 
-    Built-in methods are those that solved every run there, without settings and ablations.
+    Only built-in methods that solved every run there are listed, without settings and ablations.
     Intervals are for other runs on the same tasks.
     """
     methods = study.methods
@@ -180,8 +181,8 @@ def list_differences(study: Study) -> Rows:
 
 
 def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
-    """Return the mean gap of the ``first`` method less that of the ``second``, each a mean over
-    ``tasks``.
+    """Return the mean gap of the ``first`` method (a label) less the mean gap of the ``second``,
+    each a mean over ``tasks``.
 
     Tasks are not matched. Gaps of deterministic methods are taken as exact. The interval is for
     other runs on these tasks; two exact gaps have no interval.
@@ -269,9 +270,9 @@ def draw_ranking(study: Study) -> Parts | None:
 
 
 def name_in_figure(study: Study, line: Any) -> str:
-    """Return the name left of a line of the ranking, with ``…`` for its middle beyond 44 letters
-    (22 in a narrow figure). ``line`` is a heading (a text, its own name), or the dict of a row,
-    whose label ``method`` the study gives a name (:func:`.shown_name`)."""
+    """Return the name left of a line of the ranking; of a name with more than 44 letters (22 in a
+    narrow figure) the middle becomes ``…``. ``line`` is a heading, a text that is its own name, or
+    the dictionary of a row, whose ``method`` is a label; the name is then the method's title."""
     name = line if isinstance(line, str) else shown_name(study, line["method"])
     longest = _LONGEST_NAME // 2 if style.is_narrow() else _LONGEST_NAME
     if len(name) > longest:  # its end may say on how many tasks

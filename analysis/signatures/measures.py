@@ -126,7 +126,7 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     start); and d_initial(g) is the distance of the same hand to the same goal at the hit of goal g
     in ``initial``, a completed run of the corrective process alone with the task's initial hands.
     NaN if the idle hand hits no later goal (always under exploration condition 1), or d_initial(g)
-    is 0. 0 if the idle arm keeps still, whatever the base does (always under condition 3).
+    is 0; else 0 if the idle arm keeps still, whatever the base does (always under condition 3).
     """
     now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
@@ -150,11 +150,12 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
 @dataclass(frozen=True)
 class Signature:
-    """A signature of coarticulation, and what it measures, in ``words``."""
+    """A signature of coarticulation."""
 
     each: Callable[[Solutions], Array]
     """Function that returns the signature of each run, shape ``(n,)``, NaN for runs without it."""
     words: str
+    """The quantity that the signature measures, in words with its unit."""
 
 
 @checked_arguments

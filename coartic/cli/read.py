@@ -62,10 +62,10 @@ def report(
 def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     """Print a table, then pairs of a word and a text.
 
-    The table has at most ten methods of the ranking, without settings and ablations: those
-    with the smallest gaps and, wherever they rank, the learner and random search. The pairs
-    are the findings on coarticulation and on cost, numbers of runs and trials that are not
-    those of the paper, the failed runs, and ``more``.
+    The table has at most ten methods of the ranking, without settings and ablations: methods
+    with the smallest gaps and, wherever they rank, the learner and random search. The pairs are the
+    findings on coarticulation and on cost, numbers of runs and trials that differ from the paper's,
+    the failed runs, and ``more``.
     """
     from coartic.analysis.report.about import RUNS, finding, leading, limits
     from coartic.analysis.sections import SECTIONS, TABLES

@@ -1,4 +1,4 @@
-"""Commands that run suites, list what there is, and begin your own method."""
+"""Commands that run suites, list tasks, suites and methods, and begin your own method."""
 
 from __future__ import annotations
 

@@ -72,7 +72,8 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def say_part(name: str) -> None:
-    """Show on a terminal what is being made, in one line that changes; an empty name ends it."""
+    """Show the name of the part that is being made on a terminal, in one line that changes; an
+    empty name ends the line."""
     if sys.stderr.isatty():
         width = shutil.get_terminal_size().columns - 1
         print("\r", end="", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""One robot that makes one trial after another, and what environments are known by."""
+"""An environment of one robot that makes one trial after another, and ids of environments."""
 
 from __future__ import annotations
 
@@ -123,8 +123,8 @@ def options_of(env: Any) -> dict[str, Any]:
 
 
 def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
-    """Return the environment inside its wrappers: those that Gymnasium and Stable-Baselines3 add by
-    themselves (:data:`ADDED`), and the wrapper ``known``, the object itself, if given. Raises
+    """Return the environment inside its wrappers: wrappers that Gymnasium and Stable-Baselines3 add
+    by themselves (:data:`ADDED`), and ``known``, a wrapper, the object itself, if given. Raises
     TypeError for any other wrapper, whose changes would be left out; the message calls the
     environment ``name``."""
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):

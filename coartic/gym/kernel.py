@@ -68,9 +68,9 @@ class VectorState(NamedTuple):
     at: NDArray[np.void]
     """Rows of the slots of these robots (:class:`Batch`)."""
     corrected: Array
-    """The rows that a correction needs, as in :class:`Batch`."""
+    """The rows in ``at`` that a correction needs, shape ``(rows, SLOTS)``."""
     moved: Array
-    """The rows that a movement needs, as in :class:`Batch`."""
+    """The rows in ``at`` that a movement needs, shape ``(rows, SLOTS)``."""
     accounts: NDArray[np.void]
     """Accounts of the goals of the robots of a lot, shape ``(SLOTS,)``."""
     indices: Numbers

@@ -60,7 +60,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
     process fails, which costs ``coartic.method.optimisers.FAILED``. A trial that has ended starts
     again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info``
-    are what it ended with. Nothing is random but which instance of a family is drawn.
+    have its last observation and infos. Only the draw of an instance of a family is random.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     def infos(self) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
         and ``is_success``, True where the robot has hit all goals of its trial. After :meth:`step`
-        a trial that ended has started again: what it ended with is in the step's ``final_info``."""
+        a trial that ended has started again: its last infos are in ``final_info`` of the step."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 

@@ -143,9 +143,9 @@ def sentence_error(text: str) -> PydanticCustomError:
 
 
 def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
-    """Return one sentence about a problem, with its key. ``keys``: the known keys, of which the
-    sentence names the nearest to an unknown key; argument k (from 0) without a name is called
-    ``keys[k]``."""
+    """Return one sentence about a problem, with its key. ``keys``: the known keys, in the order of
+    arguments; the sentence names the known key nearest to an unknown key, and calls argument k
+    (from 0) without a name ``keys[k]``."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and part < len(keys):

@@ -434,8 +434,9 @@ def _find_returns(trial: Any, learner: Any, returns: Any) -> None:
 
 @inlined
 def _copy_accounts(source: Any, destination: Any) -> None:
-    """Copy the accounts of the goals of a trial over those in ``destination``, in place, word by
-    word: LLVM copies records byte by byte, which takes long to compile."""
+    """Copy the accounts of the goals of a trial, ``source``, shape ``(G,)``, over the accounts in
+    ``destination``, in place, word by word: LLVM copies records byte by byte, which takes long to
+    compile."""
     words, given = destination.view(np.int64), source.view(np.int64)
     for k in range(len(given)):
         words[k] = given[k]

@@ -77,8 +77,8 @@ class LearningRun:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """True for the trials that hit every goal, bool, shape ``(trials,)``. The others failed:
-        they changed neither ``values`` nor ``targets``.
+        """True for the trials that hit every goal, bool, shape ``(trials,)``. Other trials failed,
+        and changed neither ``values`` nor ``targets``.
         """
         return ~np.ma.getmaskarray(self.rewards)
 

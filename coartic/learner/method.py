@@ -44,7 +44,8 @@ class DualProcessParameters(Parameters):
 
 
 class CustomParameters(DualProcessParameters):
-    """Any exploration condition: one of the paper's, and the fields in which it differs from it."""
+    """Any exploration condition: a condition of the paper, ``base``, with other values of some
+    fields."""
 
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
     """The paper's condition that is changed."""

@@ -31,7 +31,7 @@ class Parameters(BaseModel):
 
 @dataclass(frozen=True)
 class Result:
-    """A solution, with what else a method returns."""
+    """A solution, with further data that a method returns."""
 
     solution: tuple[Movement, ...]
     details: dict[str, Any] = field(default_factory=dict)

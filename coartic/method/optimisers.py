@@ -108,8 +108,8 @@ class Objective:
 
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
     hand sequence; the best sequence is kept. A point has these hands, unless others are given
-    with it: the lowest cost is that of the best solution with these hands, which other hands may
-    better.
+    with it: the lowest cost of points is the cost of the best solution with these hands; solutions
+    with other hands may cost less.
 
     Threads can share an objective, which makes their trials one after the other. A copy is refused,
     in another process as well: it would not count for the budget.
@@ -163,7 +163,7 @@ class Objective:
         self.evaluations = 0
         """Number of points evaluated; the first trials are not among them."""
         self.best_cost = float(-alone.rewards[best])
-        """Cost of the best trial so far, ticks; at first that of the corrective process alone."""
+        """Cost of the best trial so far, ticks; at first of the corrective process alone."""
         self.best_hands = self.hands
         """Hand sequence of the best trial so far."""
         self._best_x: Array = np.full(self.dim, np.nan)
@@ -542,7 +542,7 @@ class OptimiserParameters(Parameters):
     """Parameters of every :class:`Optimiser`."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, those of the corrective process alone among them."""
+    """Trials of a run, with trials of the corrective process alone."""
     hands: str | None = None
     """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
     alone gets the highest reward, or the task's initial one where more than 4096 exist."""

@@ -386,8 +386,8 @@ class Session:
         trial made. With ``until``, rewards of shape ``(N,)``, trials end after the first whose
         reward exceeds its entry of ``until``; no later trial is counted or returned.
 
-        Rewards and counts are those of single trials, except that a single trial spends one or two
-        more evaluations of forward kinematics per goal. Where the corrective process is not
+        Rewards and counts are the same as of single trials, except that a single trial spends one
+        or two more evaluations of forward kinematics per goal. Where the corrective process is not
         declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
         Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError where no trial
         is left, ValueError for arrays that do not fit the task.

@@ -35,7 +35,8 @@ GOING = 0.0
 
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which the kernels of a robot are compiled: 4 or 8 if
-    no arm has more, else those of the longer arm. So robots of a family share machine code."""
+    no arm has more, else the number of the arm with more links. So robots of a family share machine
+    code."""
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
@@ -117,7 +118,8 @@ class Batch(NamedTuple):
     """The rows in ``at`` that a correction needs, in the same memory, shape ``(rows, SLOTS)``. Only
     to be copied: some rows are integers."""
     moved: Any
-    """The rows in ``at`` that a movement needs, likewise."""
+    """The rows in ``at`` that a movement needs, in the same memory, shape ``(rows, SLOTS)``. Only
+    to be copied: some rows are integers."""
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:

@@ -570,10 +570,10 @@ def explain_failure(
     """Return why the corrective process may have failed from ``q``, as the end of a sentence that
     begins with a colon; empty if there is no cause that users can mend.
 
-    One cause is a hand whose joints all lie on the line to the goal: none of them moves the hand
-    nearer. The others are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``,
-    with the singular values σ of the Jacobian J; so the descent is stable while gain × |J|² is
-    below 2, for the largest σ, which is that of the stretched arm, and slow where that is small.
+    One cause is a hand whose joints all lie on the line to the goal: no joint moves the hand
+    nearer. Other causes are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``,
+    with the singular values σ of the Jacobian J. So the descent is stable while gain × |J|² is
+    below 2 for the largest σ, the singular value of the stretched arm, and slow where it is small.
     """
     free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
     arm = robot.joints(hand)

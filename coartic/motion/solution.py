@@ -64,7 +64,7 @@ class Movement:
     are straight in joint space and end on a hit or on arrival; a path follows its waypoints and
     ends on a hit or at the last of them; a corrective movement ends only on a hit and is made
     only if the goal is not hit. The first movement for a goal, unless corrective, is always made;
-    the others only while the goal is not hit."""
+    further movements are made only while the goal is not hit."""
     target: Array | None = None
     """Target configuration q^t, shape ``(dof,)``, length unit (base) and rad (joints); the last
     waypoint of a path. None in a corrective movement has the corrective process find it when the
@@ -407,7 +407,7 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     """Check a solution, and return a list of the movements for each goal, in the order of goals;
-    a path has its last waypoint as target, and locked base coordinates are those of the start.
+    a path has its last waypoint as target, and locked base coordinates are as at the start.
     Raises SolutionError for a solution that breaks the task's rules."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
@@ -469,7 +469,7 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 
 def _check_point(task: Task, point: Any) -> Array:
     """Return a configuration as an array ``(dof,)``: the array given, or a copy in which locked
-    base coordinates are those of the start. Raises ValueError if it is no configuration of the
+    base coordinates are as at the start. Raises ValueError if ``point`` is no configuration of the
     robot, or moves a locked base coordinate by more than 1e-6."""
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
@@ -483,7 +483,7 @@ def _check_point(task: Task, point: Any) -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Set locked base coordinates of points, ``(..., dof)``, to those of the start, in the
+    """Set locked base coordinates of points, ``(..., dof)``, to their values at the start, in the
     array itself, and return the array. Raises ValueError where a coordinate differs from the start
     by more than :data:`HELD`, 1e-6 length units; NaN stays."""
     for coordinate in task.locked_base:
@@ -499,8 +499,8 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Return a copy of targets, shape ``(N, G, dof)``, in which locked base coordinates are those
-    of the start; NaN passes. Raises ValueError for another shape, for infinite entries and for
+    """Return a copy of targets, shape ``(N, G, dof)``, in which locked base coordinates are as at
+    the start; NaN passes. Raises ValueError for another shape, for infinite entries and for
     targets that move a locked base by more than 1e-6."""
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
@@ -628,9 +628,9 @@ def initial_hands(
 ) -> str:
     """Return the hand sequence of a task's first trial.
 
-    A sequence that the task names stands as it is. Of a policy it is the sequence with which the
-    corrective process alone gets the highest reward: among sequences of one hand
-    (``"best-single-hand"``), or among all (``"best-of-all"``).
+    If the task names a sequence, it is this sequence. If the task names a policy, it is the
+    sequence with which the corrective process alone gets the highest reward: among sequences of one
+    hand (``"best-single-hand"``), or among all (``"best-of-all"``).
 
     Parameters
     ----------

@@ -157,8 +157,8 @@ def correct(count: int, robot: Any, batch: Any) -> None:
 
 @inlined
 def make_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Move those of the first ``count`` runs for which **A** converged, in place, to the
-    configurations that **A** found, their ``target``."""
+    """Move each of the first ``count`` runs for which **A** converged, in place, to the
+    configuration that **A** found, its ``target``."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -192,8 +192,9 @@ def count_goal(goal: Any, counts: Any) -> None:
 
 @shared
 def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
-    """Move those of the first ``count`` runs whose ``acting`` is True to their targets, in place;
-    a movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near it."""
+    """Move each of the first ``count`` runs whose ``acting`` is True to its target, in place; a
+    movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near the place
+    to which the target brings it."""
     at, slot = batch.at[0], 0
     for i in range(count):
         if batch.runs[i].acting:
@@ -344,8 +345,8 @@ def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any
     """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
     ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`.
 
-    ``others`` are the entries of :class:`Requests` and then those of a batch: a tuple with names
-    takes Numba half a microsecond.
+    ``others`` are the entries of :class:`Requests` and then the entries of a batch, one by one: a
+    tuple with names takes Numba half a microsecond.
     """
     arms, batch = Requests(*others[:5]), Batch(*others[5:])
     count, room = len(arms.targets), len(batch.runs)

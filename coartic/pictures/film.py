@@ -53,7 +53,8 @@ def write_film(
     ``movements`` are pairs of a title and a trajectory. Returns the number of frames that differ,
     and the ticks that are shown in a second.
 
-    ``width`` of the picture is in pixels. A movement that ends before the others stands still.
+    ``width`` of the picture is in pixels. A movement that ends before the last one then stands
+    still.
     Without ``replace`` no file is written over. Raises CoarticError for movements without a tick,
     for an ending other than .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be
     written.

@@ -164,8 +164,8 @@ def trajectory(
 ) -> Trajectory:
     """Execute a solution and keep every control tick.
 
-    The number of ticks and the configurations at the hits are those of :func:`coartic.execute`,
-    bit for bit.
+    The number of ticks and the configurations at the hits are the same as in
+    :func:`coartic.execute`, bit for bit.
 
     Parameters
     ----------

@@ -74,8 +74,9 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """Return a preset (:func:`preset_of`) of two tasks with one first goal: ``ascending``, and as
-    ``others`` the later goals of ``descending``; ``optimum`` is None."""
+    """Return a preset (:func:`preset_of`) for two tasks with the same first goal: ``task`` is
+    ``ascending``, ``others`` are the later goals of ``descending``, and ``optimum`` has no
+    value."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 

@@ -96,8 +96,8 @@ class MethodInfo:
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
-        """Import the method and return an instance with these parameters, and defaults for the
-        others. Raises ValueError for wrong parameters."""
+        """Import the method and return an instance with these parameters, and defaults for all
+        other parameters. Raises ValueError for wrong parameters."""
         method = self.load()
         return method(method.Parameters(**parameters))
 

@@ -94,7 +94,7 @@ class Job:
 
     def run_seed(self, number: int) -> int:
         """Return the seed of the random numbers of run ``number``, from the seed of the suite and
-        the task's name; all methods have the same."""
+        the task's name: the same for all methods."""
         return run_seed(self.seed, self.cell.task.name, number)
 
 

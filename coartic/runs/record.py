@@ -156,7 +156,7 @@ class Run:
 
     @property
     def counts(self) -> Any:
-        """Counts of the run (:class:`~coartic.method.Meter`); each count is None if the worker
+        """Counts of the run (:class:`~coartic.method.Meter`), without values (None) if the worker
         died."""
         return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
 
@@ -186,7 +186,7 @@ class Run:
 
     @property
     def is_downsampled(self) -> bool:
-        """True if more rewards of trials are None than trials failed: some rewards are not kept."""
+        """True if rewards of some trials that did not fail are not kept: None in their place."""
         meter = self.outcome.meter
         return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
 
@@ -302,9 +302,9 @@ def movement_data(movement: Movement) -> list[Any]:
     """Return a movement as a list of goal, hand, kind, ticks and path: the form in which workers
     send, hashes count and folders store movements.
 
-    The path is JSON: the target, or the waypoints of a movement of kind ``path``; ticks or a target
-    that are missing are None. Adding 0.0 drops the sign of -0.0. Raises TypeError, ValueError or
-    AttributeError for a movement that has no such form.
+    The path is JSON: the target, or the waypoints of a movement of kind ``path``; None stands for
+    missing ticks and a missing target. Adding 0.0 drops the sign of -0.0. Raises TypeError,
+    ValueError or AttributeError for a movement that has no such form.
     """
     m, place = movement, movement.target
     if m.waypoints is not None:
@@ -329,9 +329,9 @@ def movement_from(data: Sequence[Any]) -> Movement:
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     """Return the rewards of trials as bytes, four a number; the caller packs them.
 
-    The numbers are the best reward, signed (0 if all are None), then for each trial by how much it
-    is worse, plus 1; 0 stands for None. All lowest bytes of the numbers come first, then all next
-    bytes: so they pack best.
+    The first number is the best reward, signed (0 without any reward). Then each trial has the
+    number of ticks by which it is worse, plus 1, or 0 if its reward is None. All lowest bytes of
+    the numbers come first, then all next bytes: so they pack best.
     """
     values = np.array(rewards, np.float64)  # None becomes NaN
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)

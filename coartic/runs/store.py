@@ -367,8 +367,8 @@ class Store:
     # Rows.
 
     def _suite(self) -> Any:
-        """Return the row of the last suite, with its environment. Raises CoarticError if there is
-        none."""
+        """Return the row of the last suite, with its environment. Raises CoarticError if no suite
+        is stored."""
         row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
         if row is None:
             raise CoarticError("it is not finished; repeat the `coartic run` command")

@@ -156,7 +156,8 @@ class Task(FileData):
     robot: Robot = Robot()
     """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
-    """Source and status of the figures, by key. The task's author chose those that are not here."""
+    """Source and status of the figures, by key. The task's author chose figures without an
+    entry."""
 
     @cached_property
     def q0(self) -> Array:
@@ -192,7 +193,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family, with its version, if the task's name is that of an instance; else
+        """Name of the family, with its version, if the task's name is the name of an instance; else
         None."""
         address = address_of(self.name)
         return address and address.family
