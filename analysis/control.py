@@ -180,10 +180,10 @@ def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS
     """Return a suite of random search, the control of signatures, where the study lacks it.
 
     For each method that may select its solution by rewards (:func:`selects`), the suite has random
-    search with as many trials as the method, with noise on the idle arm if the method has it, and
-    with each hand sequence that a tenth or more of the method's solved runs have, unless the study
-    has this random search. Write the suite to a file
-    and run it with the results of the study: ``coartic run control.toml --include FOLDER``.
+    search with as many trials as the method, with noise on the idle arm if the method has such
+    noise, and with each hand sequence that a tenth or more of the method's solved runs have, unless
+    the study has this random search. Write the suite to a file and run it with the results of the
+    study: ``coartic run control.toml --include FOLDER``.
 
     Parameters
     ----------

@@ -57,8 +57,9 @@ class Finding:
         its opposite, corrected or not.
 
         A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
-        that does not hold is not supported if ``opposite_p`` is below 5 %, or without tests. Other
-        claims, and claims with too few runs, are undecided."""
+        that does not hold is not supported if ``opposite_p`` is below 5 %, if the claim has no
+        test, or if values without spread contradict it. Other claims, and claims with too few runs,
+        are undecided."""
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -147,8 +148,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Holds if all findings hold. It has the tests of all, and the tests in ``against`` of all. If
-        findings have too few runs, the first of these is returned.
+        Holds if all findings hold. It has ``tests``, ``against`` and ``without`` of all findings.
+        If findings have too few runs, the first of these is returned.
 
     Raises
     ------

@@ -126,8 +126,9 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
 
 
 def shown_name(study: Study, method: str) -> str:
-    """Return the title of a method, for a method from a file that did not solve every run on
-    :func:`common_tasks` with the number of tasks that it solved of all: ``mine (3 of 8 tasks)``."""
+    """Return the title of a method; of a method from a file that did not solve every run on
+    :func:`common_tasks` the title with the number of tasks that it solved: ``mine (3 of 8
+    tasks)``."""
     row, on = study.methods.loc[method], {*solved_tasks(study, method)}
     if row.built_in or {*common_tasks(study)} <= on:
         return str(row.title)

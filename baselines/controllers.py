@@ -186,8 +186,8 @@ class Control(Method):
     """Goals after the current one that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has too many hand sequences to simulate; None if it has
-        not."""
+        """Return a sentence that a task has more than 4096 hand sequences, too many to simulate;
+        None for fewer."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:

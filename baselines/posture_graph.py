@@ -116,7 +116,8 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
 def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain]:
     """Return the cheapest chain of nodes of each hand sequence that has a chain, in alphabetical
     order: the hands, and a configuration for each goal. At each goal the ``most`` cheapest
-    beginnings of sequences are kept (None: all); with no more sequences than that none is lost."""
+    beginnings of sequences are kept (None: all); if there are at most so many sequences, no chain
+    is lost."""
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
     kept = [Beginning((), start, np.zeros((1, 1)), ())]
     for _ in range(len(task.goals)):

@@ -63,9 +63,9 @@ def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
     """Check every law of a method by runs on tasks, and return the laws in order, kept and broken.
-    ``tasks`` are the shipped tasks by default; those to which the method does not apply are left
-    out: without any task left, law ``solution`` is broken, the last one. ``verbose`` shows what the
-    method prints and logs, and the tracebacks of its crashes."""
+    ``tasks`` are the shipped tasks by default; tasks to which the method does not apply are left
+    out, and without any task left the last law, ``solution``, is broken. ``verbose`` shows prints
+    and logs of the method, and the tracebacks of its crashes."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 

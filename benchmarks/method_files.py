@@ -117,7 +117,7 @@ def _methods_of_module(
 ) -> Iterator[MethodInfo]:
     """Yield the infos of ``methods``, the classes that ``module`` defines, with their code;
     ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
-    declaration (of another type, or without a name), and a file that cannot be read."""
+    declaration of name, title, citation or information, and a file that cannot be read."""
     for method in methods:
         _check_declaration(method, origin)
         try:

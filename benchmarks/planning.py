@@ -214,7 +214,7 @@ def _asked_tasks(
     """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
     a function that gives a task by its name.
 
-    A request brings task files, tasks and instances, those that the suite does not have. Raises
+    A request brings the task files, tasks and instances that the suite does not have. Raises
     CoarticError for a task whose name belongs to another task.
     """
     for path in request.family_files:

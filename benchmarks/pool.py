@@ -187,8 +187,8 @@ class Workers:
         return Worker(self.folder.name, method, self.local)
 
     def check_room(self) -> None:
-        """Check that the folder of answers is there and has room: its loss can be the reason why a
-        process ended. Raises OSError."""
+        """Raise OSError unless the folder of answers is there and has room: its loss can be the
+        reason why a process ended."""
         place = Path(self.folder.name, "room")
         place.write_bytes(bytes(_ROOM))
         place.unlink()
@@ -244,7 +244,7 @@ class Worker:
     @property
     def wall_limit_s(self) -> float:
         """Limit of wall time for the current job, which must exist, s: three times its limit of CPU
-        time, a day without one, and ``timeout_s``."""
+        time (a day without a limit), plus ``timeout_s``."""
         return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:

@@ -83,7 +83,8 @@ def look_of(names: tuple[str, str], bold: bool) -> Look:
 
 
 def grid(panels: int) -> tuple[int, int]:
-    """Return the numbers of rows and columns for some panels, with three columns at most."""
+    """Return the numbers of rows and columns for a number of panels: two columns for up to six
+    panels, three for more; one for a single panel."""
     columns = min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
 
@@ -188,7 +189,7 @@ def means(
     shift : float
         Distance by which each line is moved to the right of the line before, in units of ``x``.
     bars : float, optional
-        Line width of the intervals, points; None is Matplotlib's line width and hides nothing.
+        Line width of the intervals, points; None for Matplotlib's line width.
     **line
         Look of the line and its marks: arguments of Matplotlib's ``plot``.
 

@@ -174,9 +174,10 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 
 
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return the columns of :data:`IN_LATEX` as a table in LaTeX, with booktabs and longtable.
+    """Return a table in LaTeX, with booktabs and longtable, in the columns that :data:`IN_LATEX`
+    has for its id.
 
-    ``notes`` are below the table, with the meaning of a dagger in it.
+    ``notes``, sentences, are below the table, with the meaning of a dagger in it.
     """
     frame = frame if table.id in ("contexts", "methods") else frame[~is_setting(frame)]
     columns = columns_of(table, frame)

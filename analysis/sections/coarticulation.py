@@ -125,8 +125,7 @@ def list_signatures(study: Study) -> Rows:
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
     the choice of hands (``hands`` empty). Means over runs; p is of the one-tailed exchange test and
-    uncorrected.
-    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
+    uncorrected. ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):

@@ -80,10 +80,10 @@ def times_of(
 
     ``shares`` are the targets, as shares of the distance from the corrective process alone to the
     optimum. Infinite for a target that the run did not reach; a solved run without a known cost has
-    no row. A planner reaches its targets at its end.
-    Forward-kinematics evaluations and time (:func:`solve_times`) are totals of a run, spread evenly
-    over its trials, an approximation: over the first 10 to 1000 of 10 000 trials, evaluations were
-    0.6 to 1.5 times their even share, 3.4 times for the first 10 of CMA-ES on two-armed 1.
+    no row. A planner reaches its targets at its end. Forward-kinematics evaluations and time
+    (:func:`solve_times`) are totals of a run, spread evenly over its trials, an approximation: over
+    the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times their even share, 3.4
+    times for the first 10 of CMA-ES on two-armed 1.
     """
     initial, optimum = spans(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)

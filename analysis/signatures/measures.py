@@ -198,9 +198,9 @@ def other_arm(runs: Solutions) -> Array:
 
 @checked_arguments
 def arm(runs: Solutions) -> Array:
-    """Return for each run the ticks that the postures of base and chosen arm save on the way to the
-    next goal: the mean of :func:`gain_at_next` over goals g < G; NaN if it is NaN for one of them,
-    and on a task with one goal."""
+    """Return for each run, shape ``(n,)``, the ticks that the postures of base and chosen arm save
+    on the way to the next goal: the mean of :func:`gain_at_next` over goals g < G; NaN if a gain of
+    the run is NaN, and on a task with one goal."""
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
     return np.asarray(gain_at_next(runs).mean(axis=1))

@@ -169,8 +169,9 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 
 
 def _places(size: int, resamples: int) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Yield a slice of the resamples and the places of the values that these draw, shape ``(size,
-    length of the slice)``. Equal arguments give equal places."""
+    """Yield pairs that together cover all resamples of a sample of ``size`` values: a slice of the
+    resamples, and the indices of the values that these resamples draw, shape ``(size, length of the
+    slice)``. Equal arguments give equal indices."""
     rng = np.random.default_rng(SEED)
     for part in slices(resamples, max(1, IN_CACHE // size)):
         places = rng.integers(size, size=(part.stop - part.start, size))

@@ -23,8 +23,8 @@ RunningTimes = Sequence[Array]
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the finite running times in ascending order, the weight of each, and the number of its
-    run, from 0 through all tasks.
+    """Return the finite running times in ascending order, and for each its weight and the number of
+    its run, from 0 through all tasks; shape ``(k,)`` each.
 
     The weights of all pairs of run and target, also of pairs that are not reached, sum to 1; each
     task has the same weight and needs a run.

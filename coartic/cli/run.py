@@ -180,7 +180,8 @@ def list_(
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, size, tasks, methods of a suite, by its name or file."""
+    """Yield pairs of word and text: title, description, numbers of runs and trials, tasks and
+    methods of a suite, and the command that runs it. ``name``: its name or file."""
     from coartic import builtin_tasks
     from coartic.analysis.words import number
 
@@ -215,7 +216,8 @@ def _describe_family(family: Family) -> Iterator[tuple[str, str]]:
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, declaration, parameters, tasks, source of a method."""
+    """Yield pairs of word and text: title, name, information, parameters and tasks of a method,
+    whether its runs differ by seed, and its citation."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words

@@ -207,7 +207,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def _move(self, actions: Array, rows: RowIndex = slice(None)) -> None:
         """Let all robots whose trial goes on reach for their next goal; the results go into the
-        state, in place. ``actions`` ``(N, A)`` are of robots ``rows``; others keep their actions.
+        state, in place. ``actions``, shape ``(n, A)``, are of the n robots ``rows``; other robots
+        keep their actions.
 
         Raises ValueError for actions of another shape, or that are not finite.
         """
@@ -262,8 +263,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
         Returns observations ``(N, O)``, rewards ``(N,)``, ticks below 0, True where the trial has
         ended, ``(N,)``, False for each (none is truncated), ``(N,)``, and a dictionary of infos. A
         trial that has ended starts again in this step: its observation is the first of the next
-        trial; ``final_obs`` of the infos has its last. Raises ResetNeeded before the first reset,
-        and ValueError for actions of another shape or that are not finite.
+        trial; ``final_obs`` of the infos has the last observation of the trial that ended. Raises
+        ResetNeeded before the first reset, and ValueError for actions of another shape or that are
+        not finite.
         """
         state = self.state
         if not state.going.all():

@@ -292,7 +292,8 @@ def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
     """Set the preferred posture p of a run, in place, once its hand for goal ``number`` (from 0) is
     chosen: the present posture q (*stay*), the start of the trial (*start*), or (*next goal*)
     (q + t') / 2, with the target t' stored for the next goal and the hand of highest value there
-    after this hand; q for joints that the movement to it would not explore, and if none is stored.
+    after this hand; q for joints that the movement to t' would not explore, and if no target is
+    stored. ``table``: Q and q* of the run, shape ``(G, 3, 2)``.
     """
     if run.drift == 0.0 and run.pull == 0.0:
         return

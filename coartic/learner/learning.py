@@ -115,8 +115,8 @@ def learn(
     SolutionError
         The first solution breaks the task's rules.
     ValueError
-        The seed is no whole number from 0, there is no trial, no movement can be made with the
-        model, or the task was changed so that it contradicts itself.
+        The seed is no whole number from 0, there is no trial, a constant of the model is out of
+        bounds, or the task was changed so that it contradicts itself.
 
     Notes
     -----

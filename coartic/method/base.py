@@ -51,9 +51,9 @@ class Outline(NamedTuple):
     goals_count: int
     dof: int
     hands: tuple[Hand, ...]
-    """Hands the robot has."""
+    """Hands that the robot has, of ``"left"`` and ``"right"``."""
     initial_hands: str
-    """Hand sequence, or policy, that the task names for a first solution."""
+    """Hand sequence, such as ``"RRRR"``, or policy that the task names for a first solution."""
 
     @property
     def initial_is_policy(self) -> bool:
@@ -63,7 +63,7 @@ class Outline(NamedTuple):
     @property
     def too_many_sequences(self) -> str | None:
         """A sentence that the task has more than 4096 hand sequences, too many to try one by one;
-        None if it has not."""
+        None for fewer."""
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 

@@ -451,14 +451,14 @@ def objective(
     ----------
     task : Task, str or pathlib.Path
     hands : str, optional
-        A hand sequence (``"RRLR"``), by default the one with which the corrective process alone
-        does best. The optimum can have others: in ``two-armed-2`` no point with these hands is
-        known to come within 14 % of it.
+        A hand sequence (``"RRLR"``), by default the sequence with which the corrective process
+        alone gets the highest reward. The optimum can have other hands: in ``two-armed-2`` no point
+        with these hands is known to come within 14 % of the optimum.
     half_width : float
         Half the width of the bounds around ``x0``, length unit (base) and rad (joints).
     model : MotionModel
     budget : int, optional
-        Most trials, among them those by which hands are chosen; then BudgetError is raised.
+        Most trials, with the trials by which hands are chosen; then BudgetError is raised.
 
     Returns
     -------
@@ -509,9 +509,9 @@ def problems(
     family : str
         Its name with its version, ``"two-armed/v1"``.
     split : {"test", "development"}
-        Instances to report on, or those to tune on.
+        Instances to report on (``"test"``), or to tune on (``"development"``).
     count : int
-        How many, from 1 to 10,000.
+        Number of instances, from 1 to 10,000.
     half_width : float
     model : MotionModel
     budget : int, optional

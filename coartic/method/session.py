@@ -208,7 +208,7 @@ class Session:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Hands the robot has."""
+        """Hands that the robot has, of ``"left"`` and ``"right"``."""
         return self._task.hands
 
     @property
@@ -277,8 +277,8 @@ class Session:
         """Note a use of the corrective process if a corrective movement of a solution has no
         target: the corrective process finds the target.
 
-        Raises UndeclaredError if the method does not declare it, and SolutionError if the solution
-        is no sequence. Nothing else is checked.
+        Raises UndeclaredError if the method does not declare the corrective process, and
+        SolutionError if the solution is no sequence. Nothing else is checked.
         """
         if not isinstance(solution, (tuple, list, Sequence)):  # in the order of their speed
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
@@ -560,8 +560,8 @@ class Session:
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
         """Add rewards of trials that a compiled method of this project made (None for a failed
-        trial) to :attr:`rewards`, and the time that it took, s, to ``solve_s``; no other count is
-        changed. Raises UndeclaredError for any other method."""
+        trial) to :attr:`rewards`, and ``solve_s``, the time that the method took, s, to the counter
+        of this name; no other count is changed. Raises UndeclaredError for any other method."""
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))
         self._meter.solve_s += solve_s

@@ -250,8 +250,8 @@ def compact(rows: Any, slot: int, last: int) -> None:
 
 @inner
 def padded_count(count: int) -> int:
-    """Return the number of slots to work on for ``count`` slots: 0 and 1 as they are, else rounded
-    up to whole vectors of 8 slots; the last slots may belong to no run.
+    """Return the number of slots to work on for ``count`` slots: ``count`` itself for 0 and 1, else
+    rounded up to whole vectors of 8 slots; the last slots may belong to no run.
 
     A loop over whole vectors leaves no slots over that would be worked on one by one.
     """

@@ -310,7 +310,7 @@ def move(
         Whether the movement also ends where the hand is near the place to which the target brings
         it. A corrective movement does not: it ends on hitting the goal, or at its target.
     model : MotionModel
-        The constants.
+        The constants; ``step`` and ``arrival_tolerance`` matter.
 
     Returns
     -------

@@ -181,7 +181,7 @@ def execute(
         not have a hand, a target has the wrong shape or is not finite, a locked base moves by more
         than 1e-6.
     ValueError
-        No movement can be made with the model.
+        A constant of the model is out of bounds.
 
     Notes
     -----
@@ -388,8 +388,9 @@ def _execution_of(
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
     """Return the joint travel of the idle arm, rad, summed over the goals: for each goal the
-    Euclidean distance of the joint angles of the arm that does not hit it from their values at the
-    hit before (for goal 1, at the start). It is 0 if that arm keeps still, as in EC1 and EC3.
+    Euclidean distance of the joint angles of the arm that does not hit the goal from their values
+    at the hit before (for goal 1, at the start). It is 0 if this arm keeps still, as under EC1 and
+    EC3.
 
     ``hands`` has the hand for each goal, ``reached`` the configuration at each hit, ``(G, dof)``.
     """
@@ -575,7 +576,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     TypeError
         The task is neither a Task nor a text nor a path.
     ValueError
-        The hands do not fit the task, or no movement can be made with the model.
+        The hands do not fit the task, or a constant of the model is out of bounds.
 
     Notes
     -----
@@ -655,7 +656,8 @@ def initial_hands(
     NotApplicableError
         No candidate completes the task, or there are more than 4096.
     ValueError
-        ``hands`` is empty or names a hand that the robot does not have, or the model is refused.
+        ``hands`` is empty or names a hand that the robot does not have, or a constant of the model
+        is out of bounds.
 
     Notes
     -----

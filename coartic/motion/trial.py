@@ -167,7 +167,8 @@ def make_corrections(count: int, robot: Any, batch: Any) -> None:
 @inlined
 def account(run: Any, moved: int, goal: Any) -> None:
     """Write the result of a run for its goal into the record ``goal``, in place: phase 5,
-    *account*. ``moved``: ticks of its movements to targets. A run that missed ends its trial."""
+    *account*. ``moved``: ticks of the run's movements to targets. If the run missed its goal, its
+    trial ends."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = moved + run.ticks
@@ -284,8 +285,8 @@ def row_of(rows: Any, n: int) -> Any:
 
 @inlined
 def _are_within(targets: Any) -> bool:
-    """Return whether no target ``(G, M, dof)`` of a trial has an absolute value beyond
-    :data:`LARGEST_ENTRY`; NaN, a joint that stays, has not."""
+    """Return whether no entry of the targets ``(G, M, dof)`` of a trial has an absolute value
+    beyond 1e5 (:data:`LARGEST_ENTRY`); NaN, a joint that stays, counts as within."""
     far = 0
     for g in range(targets.shape[0]):
         for m in range(targets.shape[1]):
@@ -715,7 +716,7 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
     """Return a sentence that a task, called ``task``, has more than 4096 hand sequences, too many
-    to try; None if it has not. ``goals`` and ``hands`` are numbers of goals and of hands."""
+    to try; None for fewer. ``goals`` and ``hands`` are numbers of goals and of hands."""
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None

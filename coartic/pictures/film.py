@@ -53,10 +53,9 @@ def write_film(
     ``movements`` are pairs of a title and a trajectory. Returns the number of frames that differ,
     and the ticks that are shown in a second.
 
-    ``width`` of the picture is in pixels. A movement that ends before the last one then stands
-    still.
-    Without ``replace`` no file is written over. Raises CoarticError for movements without a tick,
-    for an ending other than .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be
+    ``width`` of the picture is in pixels. A movement that ends before the longest one then stands
+    still. Without ``replace`` no file is written over. Raises CoarticError for movements without a
+    tick, for an ending other than .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be
     written.
     """
     check_film(path, replace=replace)
@@ -101,8 +100,9 @@ def check_film(path: Path, *, replace: bool = False) -> None:
 
 
 def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
-    """Draw goals, robot, traces and the counter of ticks, and return a function that updates them
-    to a row of the movement's configurations, from 0; to the last one past the end."""
+    """Draw goals, robot, traces and the counter of ticks, and return a function that updates the
+    drawing to a row of the movement's configurations, from 0; a row past the end shows the last
+    configuration."""
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
     traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}

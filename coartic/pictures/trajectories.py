@@ -188,7 +188,7 @@ def trajectory(
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError
-        No movement can be made with the model.
+        A constant of the model is out of bounds.
     """
     task = as_task(task)
     execution = execute(task, movements, model=model)

@@ -81,7 +81,8 @@ class MethodInfo:
 
     @property
     def version(self) -> str:
-        """The code, in the form in which codes are compared (:func:`version_of`)."""
+        """The code, in which ``1.1`` stands for the hashes of coartic 4.0.0: codes are compared in
+        this form."""
         return version_of(self.code)
 
     @property

@@ -499,7 +499,7 @@ class Store:
 
 
 def _as_text(value: Any) -> Any:
-    """Return a list or a table as JSON, and any other value as it is."""
+    """Return a list, a tuple or a dictionary as JSON, and any other value unchanged."""
     is_table = isinstance(value, dict | list | tuple)
     return json.dumps(value, ensure_ascii=False) if is_table else value
 
@@ -651,9 +651,9 @@ def _check_files(folder: Path) -> None:
 def _has_tables(connection: sqlite3.Connection) -> bool:
     """Return True if the file has the tables of coartic, and False if the file is empty.
 
-    What other programs add to the file (statistics, indexes, tables, views) is let be, except
-    triggers, which change what is written. Raises CoarticError for any other file, and ValueError
-    for a row that names a missing row: nothing would show its run.
+    Additions of other programs (statistics, indexes, tables, views) pass, except triggers, which
+    change data as they are written. Raises CoarticError for any other file, and ValueError for a
+    row that names a missing row: no view would show its run.
     """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
