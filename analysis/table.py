@@ -62,6 +62,7 @@ class Table:
     columns: tuple[Column, ...]
     """Columns of the CSV file in their order; ``run_ids``, of the runs behind each row, is last."""
     rows: Callable[[Study], Rows]
+    """Function of a study that yields pairs of a row's name and its values by column."""
 
     def __call__(self, study: Study) -> pd.DataFrame:
         """Return the table of a study, a row for each name; its ``attrs`` have titles and other

@@ -42,7 +42,9 @@ class Leg(NamedTuple):
     """The path from the start, or from one goal, to the next."""
 
     movement: Movement
+    """Movement of kind ``path`` to the goal."""
     ticks: int
+    """Control ticks of the movement."""
     q: Array
     """Configuration in which the goal is hit, shape ``(dof,)``."""
     memory: Any

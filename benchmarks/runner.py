@@ -75,6 +75,7 @@ class Progress:
     timed: Counter[str] = field(default_factory=Counter)
     """Number of runs with a known wall time, by method."""
     workers: int = 1
+    """Number of runs that are performed at once."""
 
     def count(self, status: str) -> None:
         """Count a run of the folder by its status."""

@@ -57,10 +57,13 @@ class Estimate:
     """A number and how sure it is. NaN where there is no interval or no test."""
 
     value: float
+    """The mean, the difference or another number that is estimated."""
     low: float = math.nan
     """Lower end of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
+    """Upper end of the interval."""
     p: float = math.nan
+    """P-value of the test of this number."""
     n: tuple[int, ...] = ()
     """Number of values in each sample; a number taken as known is no sample."""
     resamples: int = 0

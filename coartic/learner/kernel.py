@@ -88,16 +88,25 @@ class LearnerParameters(NamedTuple):
     explored: Flags
     """True where a joint is perturbed, shape ``(2, width)``, for each chosen hand."""
     exploration: int
+    """Exploration of the hand: 0 none, 1 random, 2 closest, 3 nearest posture."""
     epsilon: float
+    """ε: probability with which the hand for a goal is explored."""
     noise_sd: float
+    """Standard deviation of the noise η, length unit and rad."""
     corrects: bool
+    """True if **A** corrects a goal that a movement to a stored target misses."""
     by_subtask: bool
+    """True if a goal is credited with its own return, not with the reward of the trial."""
     discount: float
+    """γ of the return of a goal."""
     counts_earlier: bool
+    """True if earlier goals count in the return of a goal, too."""
     drifts: Array
     """Values of κ, shape ``(K,)``; of several each trial draws one."""
     pull: float
+    """β: share of the way to the preferred posture that an iteration of **A** adds."""
     direction: int
+    """Preferred posture: 0 next goal, 1 stay, 2 start."""
 
 
 class Results(NamedTuple):

@@ -34,6 +34,7 @@ class Result:
     """A solution, with further data that a method returns."""
 
     solution: tuple[Movement, ...]
+    """Movements, at least one for each goal, in the order of the goals."""
     details: dict[str, Any] = field(default_factory=dict)
     """Plain data to be stored with the solution. Never its score."""
     initial: tuple[Movement, ...] = ()
@@ -49,7 +50,9 @@ class Outline(NamedTuple):
     name: str
     """Name of the task, for the sentence."""
     goals_count: int
+    """Number of goals."""
     dof: int
+    """Number of degrees of freedom of the robot."""
     hands: tuple[Hand, ...]
     """Hands that the robot has, of ``"left"`` and ``"right"``."""
     initial_hands: str

@@ -114,6 +114,7 @@ class Meter:
     jacobians: int = 0
     """Jacobian evaluations; the corrective process makes one per iteration."""
     corrective_iterations: int = 0
+    """Iterations of the corrective process."""
     corrections: int = 0
     """Corrective movements made."""
     failed_trials: int = 0
@@ -121,7 +122,9 @@ class Meter:
     gradients: int = 0
     """Gradient evaluations of a solver."""
     hessians: int = 0
+    """Hessian evaluations of a solver."""
     solver_iterations: int = 0
+    """Iterations of a solver."""
     build_s: float = 0.0
     """Wall time of setting problems up, which is paid once."""
     solve_s: float = 0.0

@@ -50,6 +50,7 @@ class Score(NamedTuple):
     hands: str | None = None
     """Hand of each goal, such as ``LRLR``."""
     movements: tuple[Movement, ...] = ()
+    """Movements as executed, with their ticks."""
     corrections: int | None = None
     """Corrective movements that a solution needed."""
     other_arm_travel: float | None = None
@@ -86,6 +87,7 @@ class Outcome:
     """The result of a run as its method states it, in plain data, before it is scored."""
 
     status: Status
+    """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
     reason: str = ""
     """The reason why the run is not ok; empty if the run is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)

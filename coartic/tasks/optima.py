@@ -34,6 +34,7 @@ class KnownOptimum:
     """The best reward known of a task, with all joints free and under the paper's model."""
 
     reward: int
+    """Total reward, minus the ticks."""
     bound: int | None
     """Reward that no solution exceeds; None where nothing is proven."""
     hands: str = ""

@@ -79,6 +79,7 @@ class Address(NamedTuple):
     """``d`` (development), ``i`` (test) or a year as ``2027-`` (fresh); in the name the number of
     the instance follows it."""
     number: int
+    """Number of the instance, from 0."""
 
     @property
     def split(self) -> Split:
