@@ -413,7 +413,11 @@ class Study:
         -------
         ndarray, shape (runs, goals, dof)
             Configurations, length unit (base) and rad (joints); of the first 500 solved runs.
-            Raises CoarticError if the folder has no such runs.
+
+        Raises
+        ------
+        CoarticError
+            The folder has no runs of the method on the task, or they cannot be executed again.
         """
         return self.executed(task, method, replay=replay).configurations
 

@@ -345,7 +345,7 @@ def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]
 
 
 def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence if the plan was changed."""
+    """Yield a sentence if the plan is not as it was written, by its stored hash."""
     hashes = [row[0] for row in db.execute("SELECT plan_hash FROM suite")]
     rows = [[*row] for query in PLANNED for row in db.execute(query)]
     if hashes != [hash_of(rows)] and (hashes or rows):

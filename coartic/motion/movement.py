@@ -140,8 +140,8 @@ def set_off(at: Any, count: int, step: float) -> bool:
     becomes its root, and the present step is set to 0.
 
     Returns True only if all link angles are certain to stay below 1e5 rad, the range of the fast
-    cosine, by a bound: the sum of absolute joint angles. False does not say that an angle exceeds
-    it.
+    cosine, by a bound: the sum of absolute joint angles. If False, angles may exceed this range or
+    not.
     """
     far = 0
     for i in range(padded_count(count)):
