@@ -100,9 +100,8 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
-    """Return x and y of the hand of ``arm`` (slice of its joints, lengths of links, place of the
-    shoulder) for configurations in the columns of ``q``; ``on_path``: by NumPy's cosine and
-    sine."""
+    """Return x and y of the hand of ``arm`` (slice of joints, lengths of links, shoulder's place)
+    for configurations in the columns of ``q``; ``on_path``: by NumPy's cosine and sine."""
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
     angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
@@ -114,8 +113,7 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 
 def stored_task(definition: str, model: str) -> Any:
     """Return a task from its stored JSON, with its constants of movement (``model``), start
-    (``q0``), locked base coordinates and arms. Raises ValueError if the text is too long to check,
-    or the task has no goal or more than 256."""
+    (``q0``), locked base coordinates and arms. Raises ValueError for no goal, or too much text."""
     need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
@@ -252,8 +250,7 @@ def check_runs(folder: Path) -> _Report:
 
 
 def _check_all(db: sqlite3.Connection) -> _Report:
-    """Check the plan, the cells, and the runs one by one, and return the report; nothing is checked
-    if a table or view is not as coartic makes it."""
+    """Return the report on plan, cells and runs; none is checked if a table or view is foreign."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
     query = f"""SELECT sql FROM sqlite_master WHERE sql IS NOT NULL
@@ -312,8 +309,7 @@ def _check_identity(row: Any) -> None:
 def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
     """Yield a sentence for each row that refers to a missing row, contradicts itself or cannot be
     read, and for each name of two tasks in the plan. ``tasks`` gets the task of each cell by id, or
-    words on what is wrong with the cell, whose digest is a hash of task, method, parameters,
-    constants and budget."""
+    words on what is wrong; a cell's digest is a hash of task, method, parameters, model, budget."""
     for table, number, missing, _ in db.execute("PRAGMA foreign_key_check"):
         yield f"Row {number} of table {table} names a row of {missing} that is not there."
     for row in db.execute("SELECT * FROM cells"):
@@ -395,9 +391,8 @@ def _check_rewards(row: Any) -> bytes:
 
 
 def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
-    """Return the movements of a run by part, an empty list for a part without movements, and a list
-    of all movements as stored, part by part, which the result's hash covers. Raises ValueError for
-    a missing or malformed movement."""
+    """Return the movements of a run by part (empty without movements), and a list of all as stored,
+    which the result's hash covers. Raises ValueError for a missing or malformed movement."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
     stored: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
