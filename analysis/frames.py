@@ -92,7 +92,7 @@ def checked(
 
 
 def inline(name: object) -> str:
-    """Return the name of a column as one printable line, cut if it is long (:func:`.plain`)."""
+    """Return the name of a column as one printable line, cut to 2,000 characters."""
     return plain(str(name))
 
 
@@ -231,7 +231,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        As :func:`gaps` does, and for a ``corrective_best`` above the best known reward.
+        A column is missing or a reward is wrong (:func:`gaps`), or ``corrective_best`` is above the
+        best known reward.
 
     Examples
     --------
@@ -302,7 +303,8 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     frame : DataFrame
-        As :func:`ranking` takes it.
+        With columns ``method``, ``task``, ``reward`` and ``best_known`` (negative ticks), and
+        perhaps ``setting`` and ``corrective_best`` (:func:`ranking`).
 
     Returns
     -------
@@ -314,7 +316,7 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`ranking` does.
+        A column is missing, a name is missing, or a reward is wrong (:func:`ranking`).
 
     Examples
     --------
@@ -364,7 +366,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
         runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
         (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
-        that it solved in every run, of ``missing`` tasks (the others with a best known reward), of
+        that it solved in every run, of ``missing`` tasks (other tasks with a best known reward), of
         ``runs`` and of ``failed`` runs on all tasks. A method with missing tasks has no gap and is
         last. The paper's learner over tasks for one arm and for two has a row of its own,
         ``"dual-process (EC1, EC4)"``. With ``corrective_best`` also the ``share`` of the possible
@@ -374,8 +376,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`gaps` does; also for missing names, and for a task with several best known
-        rewards.
+        A column is missing or a reward is wrong (:func:`gaps`), a name is missing, or a task has
+        several best known rewards.
 
     Examples
     --------
@@ -423,8 +425,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     ----------
     frame : DataFrame
         With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end.
-        Settings as in :func:`ranking`.
+        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end. With a
+        column ``setting``, a method with several settings is several methods.
     targets : sequence of float
         Gaps to the best known reward, such as ``[0.1, 0.05, 0.01]``.
 
@@ -439,8 +441,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`ranking` does; also for trials below 1, targets that are no gaps, and a frame
-        without best known rewards.
+        A column is missing or a reward is wrong (:func:`ranking`), trials are below 1, targets are
+        no gaps, or the frame has no best known reward.
 
     Examples
     --------
@@ -499,16 +501,18 @@ def solutions_of(
     task : Task
         The task of the trials.
     hits : DataFrame
-        A row for each hit, as :func:`coartic.analysis.read_hits` returns it: ``subject``,
-        ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the posture, a column for each of
-        ``task.robot.joint_names``, length unit and rad. It is checked in the same way.
+        A row for each hit: ``subject``, ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the
+        posture, a column for each of ``task.robot.joint_names``, length unit and rad. The frame is
+        checked like a file of :func:`coartic.analysis.read_hits`.
     implausible : {"refuse", "drop"}
-        What becomes of hits that the person cannot have made (:func:`.read_hits`).
+        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
+        out.
 
     Returns
     -------
     Solutions
-        A run for each trial in which all goals are hit, by subject and trial, as ``run_ids`` says.
+        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial, such as
+        ``P1 3``.
 
     Raises
     ------

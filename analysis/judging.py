@@ -37,10 +37,12 @@ class Finding:
     holds: bool | None
     """True if the runs show the claim; None if the runs are too few."""
     evidence: str
+    """Sentence with the means and their intervals, or why the claim cannot be judged."""
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
-    """Tests of the claim's opposite, one of which refutes it."""
+    """Tests of the opposite of the claim; any test below 5 %, after correction, refutes the
+    claim."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
@@ -56,8 +58,9 @@ class Finding:
         its opposite, corrected or not.
 
         A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
-        that does not hold is not supported if ``opposite_p`` is below 5 %, or without tests. Other
-        claims, and claims with too few runs, are undecided."""
+        that does not hold is not supported if ``opposite_p`` is below 5 %, if the claim has no
+        test, or if values without spread contradict it. Other claims, and claims with too few runs,
+        are undecided."""
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -76,8 +79,9 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
 
 
 def _tests_over_tasks(values: Numbers, bound: float) -> tuple[Estimate, Estimate]:
-    """Test that the mean of values, one for each task, exceeds a bound: with all values, and
-    without the largest value."""
+    """Return two one-tailed bootstrap tests that the mean of values, one for each task, exceeds a
+    bound: with all values, and without the largest value. Two values are needed at least; p is NaN
+    for a test of a single value."""
     every = np.asarray(values, dtype=np.float64)
     return (
         bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
@@ -107,8 +111,9 @@ def mean_beyond(
     -------
     Finding
         ``holds``: the mean lies on this side; None with fewer than three tasks. ``evidence``: the
-        sentence. Tests of the claim, of the claim without the task that favours it most, and of
-        its opposite.
+        sentence. ``tests`` has a test of the claim; ``without`` a test of the claim without the
+        task that favours it most; ``against`` a test of the opposite, with all tasks or without the
+        task that favours the opposite most, whichever has the larger p.
 
     Raises
     ------
@@ -147,8 +152,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Holds if all findings hold. It has the tests of all, and the tests in ``against`` of all. If
-        findings have too few runs, the first of these is returned.
+        Holds if all findings hold. It has ``tests``, ``against`` and ``without`` of all findings.
+        If findings have too few runs, the first of these is returned.
 
     Raises
     ------

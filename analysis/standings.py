@@ -45,7 +45,8 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method of :func:`compared` on some tasks. Raises KeyError for others.
+    """Return the runs of a method on some tasks, failed ones too. Raises KeyError for a label that
+    :func:`compared` does not have.
 
     No rows if the method has no run on one of the tasks, or if it is a row of
     :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.

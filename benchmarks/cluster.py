@@ -27,14 +27,15 @@ _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """An executor: a Dask scheduler, whose workers have this version of coartic.
+    """Executor that performs jobs on the workers of a Dask scheduler, which have this version of
+    coartic.
 
     Parameters
     ----------
     address : str
         Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
     say : callable
-        Takes sentences on what it waits for.
+        Function that is called with a sentence, such as that no worker is connected.
 
     Examples
     --------

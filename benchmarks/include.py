@@ -89,7 +89,8 @@ def _join(
     """Return the plan with the cells of the sources, its own cells first. A cell has the runs that
     the plan asks for, and the runs that follow in the sources without a gap.
 
-    Raises CoarticError if sources contradict each other, or the plan about runs that no source has.
+    Raises CoarticError if sources contradict each other, or contradict the plan on a cell with runs
+    that no source has.
     """
     whole = {name: source.plan() for name, source in sources.items()}
     plans = {
@@ -128,8 +129,8 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of sources with runs in their plan that the joined plan ``jobs`` lacks, and with cells
-    of stochastic methods, not ``asked`` for, of which it has fewer runs than are asked for of some
+    """Warn of a source whose plan has runs that the joined plan ``jobs`` lacks, and of a source
+    that has fewer runs of a stochastic method's cell, not ``asked`` for, than are asked for of some
     cell. ``asked`` (numbers of runs) and ``jobs`` are by digest, ``plans`` by name of source."""
     most = max(asked.values())
     for name, part in plans.items():
@@ -155,17 +156,17 @@ def _warn_of_gaps(
 
 
 def _named(jobs: Sequence[Job]) -> str:
-    """Name the cell of the first job, and count the other cells."""
+    """Return words that name the cell of the first job, and count the other cells."""
     others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
 def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
-    """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin;
-    ``first`` stands for a part without jobs.
+    """Check that jobs agree, within a part of a plan and between parts. ``parts`` holds the jobs of
+    each part by its origin, such as a folder; ``first`` stands for a part without jobs.
 
-    Raises CoarticError if two parts say different things about the suite, a task, a method or a
-    cell.
+    Raises CoarticError if two jobs differ in suite, seed or trial budget, in the definition of a
+    task of one name, in the version or code of a method, or in a parameter of a cell.
     """
     first_said: dict[str, tuple[str, object]] = {}
 
@@ -192,8 +193,8 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
-    """Copy the runs of a source's plan that the target lacks. ``origin`` gives the folder of each
-    run of the target (:func:`.same_run`), and gets the copied runs.
+    """Copy the runs of a source's plan that the target lacks. ``origin`` has the folder of each run
+    of the target, by digits of its id and version (:func:`.same_run`); the copied runs are added.
 
     Raises CoarticError if the target has another result of a run.
     """

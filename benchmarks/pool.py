@@ -72,7 +72,8 @@ _BEGUN, _SAID = "begun", "said"  # files among the answers of a process
 
 
 class Local:
-    """An executor: processes on this machine, ``jobs`` at once, by default one a core.
+    """Executor that performs jobs in processes on this machine, ``jobs`` at once, by default one a
+    core.
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
@@ -87,8 +88,9 @@ class Local:
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish; a job whose process
-        ends has ``timeout`` or ``crashed``. One process performs jobs of one method in order.
+        """Yield each job with its outcomes, in the order in which jobs finish; the outcomes of a
+        job whose process ends are ``timeout`` or ``crashed``. A process performs jobs of one method
+        in order.
 
         Raises CoarticError if process after process ends before its first job, and if answers
         cannot be written.
@@ -113,7 +115,8 @@ class Workers:
         self.folder.cleanup()
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield each job with its outcomes, as :meth:`Local.perform` does."""
+        """Yield each job with its outcomes, in the order in which jobs finish. Raises CoarticError
+        if process after process ends before its first job, and if answers cannot be written."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.cell.method.key].append(job)
@@ -185,8 +188,8 @@ class Workers:
         return Worker(self.folder.name, method, self.local)
 
     def check_room(self) -> None:
-        """Check that the folder of answers is there and has room: its loss can be the reason why a
-        process ended. Raises OSError."""
+        """Raise OSError unless the folder of answers is there and has room: its loss can be the
+        reason why a process ended."""
         place = Path(self.folder.name, "room")
         place.write_bytes(bytes(_ROOM))
         place.unlink()
@@ -197,7 +200,7 @@ class Worker:
 
     def __init__(self, folder: str, method: tuple[str, str, str], local: Local) -> None:
         self.method = method
-        """:attr:`MethodInfo.key` of the method."""
+        """Module or file, id and code of the method (:attr:`MethodInfo.key`)."""
         self.jobs = deque[Job]()
         """Jobs without an answer."""
         self.since_s = math.inf
@@ -256,7 +259,7 @@ class Worker:
     @property
     def wall_limit_s(self) -> float:
         """Limit of wall time for the current job, which must exist, s: three times its limit of CPU
-        time, a day without one, and ``timeout_s``."""
+        time (a day without a limit), plus ``timeout_s``."""
         return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
@@ -272,7 +275,7 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """Words on how the process ended, and the last lines that it wrote."""
+        """Words on how the process ended, and the last three lines that it wrote."""
         text, code = b"", self.exit_code or 0
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
@@ -348,8 +351,9 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
 
 
 def _answer_to(job: Job, folder: Path) -> bytes:
-    """Perform a job, and return its outcomes as JSON, crashed ones if JSON cannot hold them; the
-    system ends this process at the job's limit of CPU time. Empties the log in ``folder`` first."""
+    """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
+    cannot hold them; the system ends this process at the job's limit of CPU time. Empties the log
+    in ``folder`` first."""
     with contextlib.suppress(OSError):  # the file is missing
         os.truncate(folder / _SAID, 0)
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
@@ -403,9 +407,9 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 
 
 def start_process(process: Any) -> None:
-    """Start a process of :data:`CONTEXT` that computes as workers do
-    (:func:`coartic.internal.threads.worker_variables`), without running the main program again in
-    it. Raises OSError or EOFError if the process does not start."""
+    """Start a process of :data:`CONTEXT` with the environment variables of a worker (one thread,
+    the same instructions everywhere), without running the main program again in the process. Raises
+    OSError or EOFError if the process does not start."""
     try:
         os.getcwd()
     except FileNotFoundError:

@@ -48,7 +48,7 @@ def find_run(prefix: str, folder: Path) -> Run:
 
 def trajectory_of(run: Run) -> Trajectory:
     """Return the solution of a run tick by tick. Raises CoarticError if the run has no solution, or
-    none that can be executed."""
+    if its solution cannot be executed or is too long."""
     if "solution" not in run.scores:
         why = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
@@ -96,8 +96,9 @@ def perform_runs_again(
 
 
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
-    """Return at most ``count`` runs of a folder, spread over its cells. Runs count whose methods
-    still have the version or code of the run. Raises CoarticError if there is no such run."""
+    """Return at most ``count`` runs of a folder, spread over its cells, of methods that have in
+    ``registered`` the same version or code as in the run. Raises CoarticError if there is no such
+    run."""
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
@@ -115,8 +116,8 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
 
 
 def doubts_of(run: Run) -> Iterator[str]:
-    """Yield what is doubtful about a method, in words, from one of its runs, which is made again
-    after a run with another seed, in a new process."""
+    """Yield sentences on doubts about a method, from one of its runs, which is made again after a
+    run with another seed, in a new process: angles in degrees, hidden state, no use of the seed."""
     name, task = run.cell.method.name, run.cell.task.name
     advice = f"see: coartic check {name}"
     if hint := hint_of(run.solution.movements):

@@ -52,8 +52,8 @@ class Progress:
     present: int = 0
     """Runs of the plan that the folder had before."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Runs that the folder has from another version or code of their method (:meth:`Store.stale`).
-    They are kept, and no report shows them."""
+    """Runs that the folder has from another version or code of their method, by the method, that
+    version and the present one. They are kept, and no report shows them."""
     done: int = 0
     """Runs performed by this call."""
     failed: int = 0
@@ -74,6 +74,7 @@ class Progress:
     timed: Counter[str] = field(default_factory=Counter)
     """Number of runs with a known wall time, by method."""
     workers: int = 1
+    """Number of runs that are performed at once."""
 
     def count(self, status: str) -> None:
         """Count a run of the folder by its status."""
@@ -150,11 +151,13 @@ def run_suite(
     ----------
     suite : str, Path or Suite
         A shipped suite by name, or a suite file (``.toml``).
-    folder, executor, watch
-        As in :func:`perform`.
+    folder : str or Path
+        Results folder, which is made if it is missing.
+    executor, watch
+        Place where methods run, and function called after each run (:func:`perform`).
     options
-        As in :func:`plan_suite`, such as ``tasks``, ``methods``, ``runs`` per cell and ``trials``
-        per run.
+        Fields of :class:`~coartic.benchmarks.planning.Request`, such as ``tasks``, ``methods``,
+        ``runs`` per cell and ``trials`` per run.
 
     Returns
     -------
@@ -164,7 +167,8 @@ def run_suite(
     Raises
     ------
     CoarticError
-        As :func:`plan_suite` and :func:`perform` do.
+        A name or a number is refused (:func:`plan_suite`), or the folder cannot be used
+        (:func:`perform`).
 
     Examples
     --------
@@ -273,7 +277,8 @@ def perform(
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan, a job for each cell; count others in ``progress``.
+    """Return the missing runs of the plan, a job for each cell; count the runs of the plan that
+    ``store`` has in ``progress``.
 
     A run that crashed is performed again, and so is a run that timed out under a lower time limit,
     unless the code of the method is not here. Raises CoarticError if runs are missing whose method

@@ -59,10 +59,13 @@ class Estimate:
     """A number and how sure it is. NaN where there is no interval or no test."""
 
     value: float
+    """The mean, the difference or another number that is estimated."""
     low: float = math.nan
     """Lower end of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
+    """Upper end of the interval."""
     p: float = math.nan
+    """P-value of the test of this number."""
     n: tuple[int, ...] = ()
     """Number of values in each sample; a number taken as known is no sample."""
     resamples: int = 0
@@ -107,8 +110,8 @@ def centred(values: Array) -> Array:
 
 @checked_arguments
 def mean(values: Numbers, *, resamples: Resamples = RESAMPLES) -> Estimate:
-    """Return the mean of a sample ``(n,)`` with its interval, as :func:`mean_of_means` makes it.
-    Raises ValueError for a sample that is empty or not finite."""
+    """Return the mean of a sample ``(n,)`` with its 95 % BCa bootstrap interval, which needs three
+    values (:func:`mean_of_means`). Raises ValueError for a sample that is empty or not finite."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
 
@@ -121,18 +124,19 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
 def difference_of_means(
     first: Numbers, second: Numbers, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """Return the mean of ``first`` less the mean of ``second``, two independent samples, with its
-    interval, as :func:`mean` does."""
+    """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
+    and ``(m,)``, with its 95 % BCa bootstrap interval, which needs three values in each. Raises
+    ValueError for a sample that is empty or not finite."""
     return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
 
 
 def mean_of_means(
     samples: Sequence[Array], weights: Sequence[float], resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """Return the weighted sum of the means of independent samples, with its BCa interval.
+    """Return the weighted sum of the means of independent samples, with its 95 % BCa interval.
 
-    Samples have shapes ``(n,)``, each with a weight. Each is resampled within itself. Raises
-    ValueError without a sample. The edge cases:
+    Samples have shapes ``(n,)``, each with a weight. Each sample is resampled within itself. Raises
+    ValueError without a sample, and for a sample that is empty or not finite. The edge cases:
 
     - a sample of fewer than :data:`FEWEST` values: no interval;
     - no spread in any sample: the interval is that point, which says that the samples have no

@@ -76,7 +76,8 @@ def attempt(
 
 
 def finding(study: Study, section: Section) -> list[str]:
-    """Return the lines of a section's sentence, filled in; none without sentence or rows for it."""
+    """Return the lines of a section's sentence, a template, filled in from its tables; an empty
+    list if the section has no sentence, or its first table no rows."""
     if not section.sentence or not len(frame := section.tables[0](study)):
         return []
     rows, *others = (
@@ -109,7 +110,9 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 
 @cached
 def limits(study: Study) -> dict[str, Any]:
-    """Return facts that limit conclusions from a study's runs, by name, for the page's template."""
+    """Return facts that limit conclusions from a study's runs, by name, for the page's template:
+    numbers of ``runs`` and of ``failed`` runs, their ``reasons``, ``reconstructed`` tasks, and so
+    on; an empty list or 0 for a limit that does not apply."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner

@@ -89,7 +89,8 @@ def _write_locked(
 
 
 def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
-    """Return files of a table by path: CSV, ``for_paper`` also ``IN_LATEX``; none without rows."""
+    """Return files of a table, contents by path: CSV, and ``for_paper`` LaTeX, if the table is in
+    ``IN_LATEX``; an empty dictionary for a table without rows."""
     frame = table(study)
     if not len(frame):
         return {}
@@ -103,7 +104,7 @@ def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, by
 
 
 def _files_of_figures(study: Study, section: Section) -> dict[str, bytes]:
-    """Return the files of a section's figures by path: SVG and PDF."""
+    """Return the files of a section's figures, contents by path: SVG and PDF of each."""
     files = {}
     for plot in _plots_of(study, section):
         for ending in (".svg", ".pdf"):
@@ -119,7 +120,8 @@ def _plots_of(study: Study, section: Section) -> list[Plot]:
 
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
-    """Return the values of a section for the template: finding, figures and tables.
+    """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
+    pairs of a plot and its SVG; ``shown``, a dictionary for each table with rows.
 
     Settings and ablations have rows in the ranking, in the table of contexts, whose verdicts are
     counted in a sentence, in the table of all methods, and in CSV files.

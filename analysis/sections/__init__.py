@@ -25,6 +25,7 @@ class Section:
     id: str
     title: str
     tables: tuple[Table, ...]
+    """Tables of the section, functions of a study."""
     figures: tuple[DrawsFigure, ...] = ()
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
     folds all figures but the first."""

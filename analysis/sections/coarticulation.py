@@ -56,8 +56,9 @@ def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
 
 @cached
 def shared_goal(study: Study) -> TwoContexts | None:
-    """Return the runs at the first goal that two tasks share, of the first of these methods: the
-    paper's learner, methods from files, methods that represent their algorithms, other methods.
+    """Return the runs at the first goal that two tasks share, of the first method with such runs,
+    in this order: the paper's learner, methods from files, methods that represent their algorithms,
+    other methods.
 
     None if no method has solved runs on two such tasks.
     """
@@ -120,11 +121,11 @@ def list_contexts(study: Study) -> Rows:
     ),
 )
 def list_signatures(study: Study) -> Rows:
-    """List the signatures of every method on every task, next to those of random search.
+    """List the signatures of every method on every task, next to the signatures of random search.
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
-    the choice of hands (``hands`` empty). Means over runs; p is one-tailed and uncorrected.
-    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
+    the choice of hands (``hands`` empty). Means over runs; p is of the one-tailed exchange test and
+    uncorrected. ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
@@ -189,8 +190,8 @@ def verdict_of(
 
 def _beside_control(study: Study, shared: TwoContexts) -> Row:
     """Return the posture difference of random search in the same two contexts (``control``), the
-    number of its runs (``control_runs``), and the p-value of the test that the method's difference
-    exceeds it (``p_random_search``); empty without such a control."""
+    number of its runs (``control_runs``), and the p-value of the permutation test that the method's
+    posture difference exceeds this difference (``p_random_search``); empty without such runs."""
     control = contexts_of_control(study, shared)
     if control is None:
         return {}
@@ -208,7 +209,8 @@ def _beside_control(study: Study, shared: TwoContexts) -> Row:
     "to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw postures at a goal before two different next goals, and those of random search."""
+    """Draw a method's postures at a goal before two different next goals, and the postures of
+    random search there."""
     shared = shared_goal(study)
     if shared is None:
         return None
@@ -235,8 +237,9 @@ def draw_postures(study: Study) -> Parts | None:
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
-    """Draw the postures of runs at a shared goal, runs thin and their means thick; return a frame
-    of the postures, a row for each run, for each of the two tasks."""
+    """Draw the postures of runs at a shared goal, runs thin and their means thick; return two
+    frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``, ``hand`` and
+    the posture, a column for each joint."""
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius

@@ -49,10 +49,10 @@ _EARLY = 1_000
 def list_against_learner(study: Study) -> Rows:
     """List the mean rewards of every method and of the learner (EC1, EC4 on two arms), by task.
 
-    For methods that solved every run; p is corrected over the tasks of a method (Holm). The reward
-    of a deterministic method counts as exact. The test takes samples as independent, though runs
-    have the same seeds: with 100 runs of the learner and 20 of the other method, pairs would leave
-    out 80.
+    For methods that solved every run; p is two-sided, of the exchange test, or, for a deterministic
+    method, whose reward counts as exact, of the bootstrap test, and is corrected over the tasks of
+    a method (Holm). The exchange test takes samples as independent, though runs have the same
+    seeds: with 100 runs of the learner and 20 of the other method, pairs would leave out 80.
     """
     for label, method in study.methods[~study.methods.is_search].iterrows():
         cells, tests = [], []
@@ -79,8 +79,9 @@ def list_against_learner(study: Study) -> Rows:
 
 
 def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
-    """Return a copy of runs with the best ``reward`` of the first ``trials`` trials of each, NaN if
-    none succeeded; runs without trials keep their reward. Column ``gap`` stays as it is."""
+    """Return a copy of runs whose ``reward`` is the best of their first ``trials`` trials, NaN if
+    none of these succeeded; runs without trials keep their reward. Column ``gap`` stays as it
+    is."""
     learned, best = improvements(study), list[float]()
     rewards = runs.reward.to_numpy(np.float64, na_value=math.nan)
     for run_id, reward in zip(runs.run_id, rewards, strict=True):
@@ -158,7 +159,7 @@ def list_differences(study: Study) -> Rows:
     """List for each method from a file the built-in methods with the same use of the reward, with
     their gaps less its gap, on the tasks on which it solved every run; the smallest gap first.
 
-    Built-in methods are those that solved every run there, without settings and ablations.
+    Only built-in methods that solved every run there are listed, without settings and ablations.
     Intervals are for other runs on the same tasks.
     """
     methods = study.methods
@@ -176,8 +177,8 @@ def list_differences(study: Study) -> Rows:
 
 
 def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
-    """Return the mean gap of the ``first`` method less that of the ``second``, each a mean over
-    ``tasks``.
+    """Return the mean gap of the ``first`` method (a label) less the mean gap of the ``second``,
+    each a mean over ``tasks``.
 
     Tasks are not matched. Gaps of deterministic methods are taken as exact. The interval is for
     other runs on these tasks; two exact gaps have no interval.
@@ -265,9 +266,9 @@ def draw_ranking(study: Study) -> Parts | None:
 
 
 def name_in_figure(study: Study, line: Any) -> str:
-    """Return the name left of a line of the ranking, with ``…`` for its middle beyond 44 letters
-    (22 in a narrow figure). ``line`` is a heading (a text, its own name), or the dict of a row,
-    whose label ``method`` the study gives a name (:func:`.shown_name`)."""
+    """Return the name left of a line of the ranking; of a name with more than 44 letters (22 in a
+    narrow figure) the middle becomes ``…``. ``line`` is a heading, a text that is its own name, or
+    the dictionary of a row, whose ``method`` is a label; the name is then the method's title."""
     name = line if isinstance(line, str) else shown_name(study, line["method"])
     longest = _LONGEST_NAME // 2 if style.is_narrow() else _LONGEST_NAME
     if len(name) > longest:  # its end may say on how many tasks

@@ -145,8 +145,8 @@ def verify(
 def _perform_again(
     folder: Path, count: int, run_id: str | None, method_file: list[Path] | None
 ) -> int:
-    """Perform a run of a folder again, or without ``run_id`` so many of its runs; print what
-    differs and return the number of runs that do."""
+    """Perform a run of a folder again, or, without ``run_id``, ``count`` of its runs; print the
+    differences from the stored runs and return the number of runs with another result."""
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
     from coartic.runs.store import open_store
@@ -175,8 +175,8 @@ def _perform_again(
 
 
 def _describe_run(run: Run, code: str) -> None:
-    """Print id, seed, parameters and result of a run, and that its method is known by another
-    ``code`` here, if it is."""
+    """Print id, seed, parameters and result of a run, and, if ``code``, the version or code of its
+    method here, is another one than the run's, a sentence that says so."""
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.runs.plan import in_words

@@ -1,4 +1,4 @@
-"""Commands that run suites, list what there is, and begin your own method."""
+"""Commands that run suites, list tasks, suites and methods, and begin your own method."""
 
 from __future__ import annotations
 
@@ -191,7 +191,8 @@ def list_(
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, size, tasks, methods of a suite, by its name or file."""
+    """Yield pairs of word and text: title, description, numbers of runs and trials, tasks and
+    methods of a suite, and the command that runs it. ``name``: its name or file."""
     from coartic import builtin_tasks
     from coartic.analysis.words import number
 
@@ -238,7 +239,8 @@ def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, declaration, parameters, tasks, source of a method."""
+    """Yield pairs of word and text: title, name, information, parameters and tasks of a method,
+    whether its runs differ by seed, and its citation."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words
@@ -296,7 +298,8 @@ def check(
 
 
 def _show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print the findings and return the number of broken laws."""
+    """Print the finding of each law of ``name``, a method or a task file, and how many hold; return
+    the number of broken laws."""
     for law in laws:
         first, *more = law.finding.splitlines() or [""]
         say(

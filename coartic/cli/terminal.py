@@ -23,7 +23,8 @@ _ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\xa0": " "}
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    """Return characters of ASCII for what a terminal lacks: - for a minus sign, ? for others."""
+    """Return ASCII for the characters that a terminal lacks, ``-`` for a minus sign, ``?`` for one
+    without a counterpart, and the place after them, as an error handler of ``codecs`` does."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lacking = error.object[error.start : error.end]
@@ -74,8 +75,8 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text below their headings, the first column to the left; nothing without
-    rows."""
+    """Print rows of text below their headings, the first column to the left, other columns to the
+    right; nothing without rows."""
     if rows:
         widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
         for first, *others in (headings, *rows):
@@ -84,7 +85,8 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def say_part(name: str) -> None:
-    """Show on a terminal what is being made, in one line that changes; an empty name ends it."""
+    """Show the name of the part that is being made on a terminal, in one line that changes; an
+    empty name ends the line."""
     if sys.stderr.isatty():
         width = shutil.get_terminal_size().columns - 1
         say("", stream=sys.stderr, end="\r")
@@ -111,8 +113,8 @@ class Display:
         say("", stream=sys.stderr, end=self._end)
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress and the last run; before the first run (``cell`` None) what the folder
-        holds already."""
+        """Show the progress and the cell of the last run; before the first run (``cell`` None) show
+        which runs the folder has already."""
         from coartic.analysis.methods import title_of
 
         total = progress.total

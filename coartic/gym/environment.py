@@ -1,4 +1,4 @@
-"""One robot that makes one trial after another, and what environments are known by."""
+"""An environment of one robot that makes one trial after another, and ids of environments."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ class TaskEnv(Recorded, gymnasium.Env):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial, of the task or of a random instance of the family; return observation
         ``(O,)`` and info. With ``seed`` None the generator goes on. Raises ValueError for any
-        option, and for a seed that is no whole number from 0."""
+        option, and for a seed that is no whole number from 0. The info has ``task``, the task's
+        name, and ``is_success``, True if the trial has hit all goals."""
         super().reset(seed=whole_seed(seed))
         check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
@@ -66,8 +67,9 @@ class TaskEnv(Recorded, gymnasium.Env):
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Reach for the next goal by an action ``(A,)``; return observation ``(O,)``, reward (ticks
-        below 0), whether the trial has ended, False (no trial is truncated) and info. Raises
-        ResetNeeded if the trial had ended before or no trial was begun."""
+        below 0), whether the trial has ended, False (no trial is truncated) and info (``task`` and
+        ``is_success``). Raises ResetNeeded if the trial had ended before or no trial was begun, and
+        ValueError for an action of another shape or that is not finite."""
         state = self.robots.state
         if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
@@ -110,8 +112,8 @@ def normaliser_of(env: Any) -> Any:
 
 
 def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
-    """Return the environment inside its wrappers: those that Gymnasium and Stable-Baselines3 add by
-    themselves (:data:`ADDED`), and the wrapper ``known``, the object itself, if given. Raises
+    """Return the environment inside its wrappers: wrappers that Gymnasium and Stable-Baselines3 add
+    by themselves (:data:`ADDED`), and ``known``, a wrapper, the object itself, if given. Raises
     TypeError for any other wrapper, whose changes would be left out; the message calls the
     environment ``name``."""
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):

@@ -55,9 +55,9 @@ def score(
     episodes : int
         Trials of random actions on each task.
     seed : int
-        Of random actions and of methods.
+        Seed of random actions and of methods.
     **options
-        Those of :class:`TaskVectorEnv`.
+        Options of :class:`TaskVectorEnv`.
 
     Returns
     -------
@@ -158,10 +158,10 @@ def _rollout(
 
 @checked_arguments
 def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
-    """Return a table with reward, gap and share of completed trials, a row for each policy and one
-    for the best known (:func:`score`). ``rewards``, by policy, have shapes ``(K, trials)`` for K
-    tasks, NaN where a trial failed; ``best`` has the best known rewards, shape ``(K, 1)``, NaN
-    where none is known. Raises ValueError for other shapes."""
+    """Return a table with a row for each policy and one for the best known, columns ``reward``,
+    ``gap``, ``gap_low``, ``gap_high`` and ``completed`` (:func:`score`). ``rewards``, by policy,
+    have shapes ``(K, trials)`` for K tasks, NaN where a trial failed; ``best`` has the best known
+    rewards, shape ``(K, 1)``, NaN where none is known. Raises ValueError for other shapes."""
     optimum = np.asarray(best)
     earnings = {name: np.asarray(each) for name, each in rewards.items()} | {"best known": optimum}
     shapes = [earned.shape for earned in earnings.values()]

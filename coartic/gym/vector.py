@@ -54,12 +54,13 @@ class Recorded:
 
 
 class TaskVectorEnv(Recorded, VectorEnv):
-    """Let N robots act side by side, in a fraction of the time of N :class:`TaskEnv`.
+    """Vector environment: N robots act side by side, in a fraction of the time of N
+    :class:`TaskEnv`.
 
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
     process fails, which costs ``coartic.method.optimisers.FAILED``. A trial that has ended starts
     again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info``
-    are what it ended with. Nothing is random but which instance of a family is drawn.
+    have its last observation and infos. Only the draw of an instance of a family is random.
 
     Parameters
     ----------
@@ -69,12 +70,13 @@ class TaskVectorEnv(Recorded, VectorEnv):
         The task; or a family, ``"two-armed/v1"`` or the path of its file: each trial has an
         instance of the family.
     split : {"development", "test", "fresh"}, optional
-        Instances to train on (by default), to report on, or those of a ``year``. They never mix.
+        Instances of the family: to train on (``"development"``, the default), to report on
+        (``"test"``), or of a ``year`` (``"fresh"``). They never mix.
     count : int, optional
-        How many instances of the split, from its first; by default 1,000 of the development split
-        and 10 of the others.
+        How many instances of the split, from its first; by default 1,000 of the development split,
+        10 of the test and fresh splits.
     year : int, optional
-        Of fresh instances.
+        Year of fresh instances, such as 2027.
     ahead : int
         Goals in view beyond the next one.
     model : MotionModel
@@ -98,11 +100,11 @@ class TaskVectorEnv(Recorded, VectorEnv):
     it.
 
     An action has an entry for the hand, where the robot has two, and one for each joint. The box is
-    from -1 to 1; what is beyond is clipped. Up to 0.5 the hand is the one that the corrective
-    process brings to the goal by the shorter path in joint space, above 0.5 the other one. The
-    target is where the corrective process would bring it, plus :data:`REACH` times the entries of
-    the joints: zeros do what the corrective process does. Where it would fail, the present posture
-    takes the place of its result. Entries of joints that a robot does not have do nothing.
+    from -1 to 1; entries beyond are clipped. With an entry up to 0.5 the hand is the one that the
+    corrective process brings to the goal by the shorter path in joint space, above 0.5 the other
+    hand. The target is the posture that the corrective process finds for this hand, or, where the
+    process fails, the present posture, plus :data:`REACH` times the entries of the joints: zeros do
+    what the corrective process does. Entries of joints that a robot does not have do nothing.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -224,7 +226,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def _move(self, actions: Array, rows: RowIndex = slice(None)) -> None:
         """Let all robots whose trial goes on reach for their next goal; the results go into the
-        state, in place. ``actions`` ``(N, A)`` are of robots ``rows``; others keep their actions.
+        state, in place. ``actions``, shape ``(n, A)``, are of the n robots ``rows``; other robots
+        keep their actions.
 
         Raises ValueError for actions of another shape, or that are not finite.
         """
@@ -241,7 +244,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     def infos(self) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
         and ``is_success``, True where the robot has hit all goals of its trial. After :meth:`step`
-        a trial that ended has started again: what it ended with is in the step's ``final_info``."""
+        a trial that ended has started again: its last infos are in ``final_info`` of the step."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
@@ -279,8 +282,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
         Returns observations ``(N, O)``, rewards ``(N,)``, ticks below 0, True where the trial has
         ended, ``(N,)``, False for each (none is truncated), ``(N,)``, and a dictionary of infos. A
         trial that has ended starts again in this step: its observation is the first of the next
-        trial; ``final_obs`` of the infos has its last. Raises ResetNeeded before the first reset,
-        and ValueError for actions of another shape or that are not finite.
+        trial; ``final_obs`` of the infos has the last observation of the trial that ended. Raises
+        ResetNeeded before the first reset, and ValueError for actions of another shape or that are
+        not finite.
         """
         state = self.state
         if not state.going.all():

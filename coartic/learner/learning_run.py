@@ -19,7 +19,7 @@ from coartic.robot import Array
 from coartic.tasks.task import Task
 
 CORRECTIONS_BY_TENTH = "corrections"
-"""Detail of a stored run: corrective movements in trial 0 and in each tenth of the others."""
+"""Detail of a stored run: corrective movements in trial 0 and in each tenth of later trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class LearningRun:
     """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
     -inf."""
     corrections: NDArray[np.int64]
-    """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
+    """Corrective movements made in trial 0 and in each tenth of later trials, shape ``(11,)``."""
     counters: Meter
     """Counts of the run, without its replay."""
     wall_s: float = field(compare=False)
@@ -79,8 +79,8 @@ class LearningRun:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """True for the trials that hit every goal, bool, shape ``(trials,)``. The others failed:
-        they changed neither ``values`` nor ``targets``.
+        """True for the trials that hit every goal, bool, shape ``(trials,)``. Other trials failed,
+        and changed neither ``values`` nor ``targets``.
         """
         return ~np.ma.getmaskarray(self.rewards)
 

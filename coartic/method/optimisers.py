@@ -123,8 +123,8 @@ class Objective:
 
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
     hand sequence; the best sequence is kept. A point has these hands, unless others are given
-    with it: the lowest cost is that of the best solution with these hands, which other hands may
-    better.
+    with it: the lowest cost of points is the cost of the best solution with these hands; solutions
+    with other hands may cost less.
 
     Threads can share an objective, which makes their trials one after the other. A copy is refused,
     in another process as well: it would not count for the budget.
@@ -214,7 +214,8 @@ class Objective:
 
     @property
     def task(self) -> Task:
-        """The task. Raises UndeclaredError in a method, which cannot see it."""
+        """The task. Raises UndeclaredError if the objective was made without ``task``, as it is in
+        a method: a method cannot see its task."""
         if self._task is None:
             raise UndeclaredError("a method cannot see its task, nor what is known of the task")
         return self._task
@@ -227,7 +228,7 @@ class Objective:
     @property
     def best_known(self) -> int | None:
         """Lowest cost known of the task, ticks: of any hand sequence, also with goals that are hit
-        without a movement. Raises UndeclaredError in a method, which cannot see its task.
+        without a movement. Raises UndeclaredError in a method, as :attr:`task` does.
 
         None where no cost is shipped: for a task of your own, for instances of a family except the
         first 40 of its test split, and for another model than the paper's.
@@ -237,7 +238,8 @@ class Objective:
 
     @property
     def proven(self) -> bool:
-        """True if it is proven that no solution costs less than ``best_known``; False without."""
+        """True if it is proven that no solution costs less than ``best_known``; False without such
+        a proof. Raises UndeclaredError in a method, as :attr:`task` does."""
         known = self._known
         return known is not None and known.proven
 
@@ -323,10 +325,10 @@ class Objective:
         takes as many ticks as the point costs. No trial is counted.
 
         ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
-        default ``hands`` of this problem. A movement has a target of all joints (a joint that has
+        default :attr:`hands` of this objective. A movement has a target of all joints (one that has
         no entry in the point has the value at which it keeps still), or none where the entries of
         its goal are NaN. Goals that are missed are corrected by ``execute``. Raises UndeclaredError
-        in a method, which has :attr:`solution`, and ValueError if point or hands do not fit.
+        in a method, which can use :attr:`solution`, and ValueError if point or hands do not fit.
         """
         task, point = self.task, _entries_of("x", x)
         if point.shape != (self.dim,):
@@ -393,7 +395,7 @@ class Objective:
         Entries are finite, or NaN for all joints of a goal (the corrective process alone); an entry
         beyond 100,000 makes the trial fail. Joints that have no entry in a point keep still.
         ``hands`` is one hand sequence for all points (``"RRLR"``), or a sequence for each point; by
-        default ``hands`` of this problem.
+        default :attr:`hands` of this objective.
 
         Raises BudgetError if fewer trials are left than there are points: the trials that are left
         are made, for the first points. Raises ValueError for another shape, for infinite entries,
@@ -415,8 +417,9 @@ class Objective:
         return costs
 
     def _evaluate(self, points: Array, codes: Hands, costs: Array) -> None:
-        """Make a trial for each point ``(N, dim)`` with hands ``codes`` ``(N, G)``; write costs,
-        ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and note each new best."""
+        """Make a trial for each point ``(N, dim)`` with hands ``codes``, 0 left or 1 right, ``(N,
+        G)``; write costs, ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and keep
+        each point that is better than all before it."""
         made = self._session._make_trials(codes, self._targets_of(points))
         np.minimum(-made.rewards, FAILED, out=costs)
         if costs.min() < self._best_cost:
@@ -452,8 +455,8 @@ class Objective:
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
-        """Return the targets ``(N, G, dof)`` of points ``(N, dim)``; NaN for joints without an
-        entry."""
+        """Return the targets ``(N, G, dof)``, length unit and rad, of points ``(N, dim)``; NaN for
+        joints that have no entry in a point."""
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
         return targets
@@ -504,14 +507,14 @@ def objective(
     ----------
     task : Task, str or pathlib.Path
     hands : str, optional
-        A hand sequence (``"RRLR"``), by default the one with which the corrective process alone
-        does best. The optimum can have others: in ``two-armed-2`` no point with these hands is
-        known to come within 14 % of it.
+        A hand sequence (``"RRLR"``), by default the sequence with which the corrective process
+        alone gets the highest reward. The optimum can have other hands: in ``two-armed-2`` no point
+        with these hands is known to come within 14 % of the optimum.
     half_width : float
         Half the width of the bounds around ``x0``, length unit (base) and rad (joints).
     model : MotionModel
     budget : int, optional
-        Most trials, among them those by which hands are chosen; then BudgetError is raised.
+        Most trials, with the trials by which hands are chosen; then BudgetError is raised.
 
     Returns
     -------
@@ -528,7 +531,7 @@ def objective(
     TypeError
         The model is no MotionModel, or the task is neither a Task nor a text nor a path.
     MethodError
-        The corrective process completes no sequence, or there are too many to try.
+        The corrective process completes no sequence, or there are more than 4096 to try.
     """
     chosen = as_task(task)
     if budget is not None:
@@ -562,9 +565,9 @@ def problems(
     family : str
         Its name with its version, ``"two-armed/v1"``.
     split : {"test", "development"}
-        Instances to report on, or those to tune on.
+        Instances to report on (``"test"``), or to tune on (``"development"``).
     count : int
-        How many, from 1 to 10,000.
+        Number of instances, from 1 to 10,000.
     half_width : float
     model : MotionModel
     budget : int, optional
@@ -580,7 +583,10 @@ def problems(
     TaskError
         There is no such family.
     ValueError
-        The split or the count is another one.
+        The split is neither of these, the count is not from 1 to 10,000, or :func:`objective`
+        refuses an option.
+    MethodError
+        The corrective process completes no sequence of an instance, or there are more than 4096.
     """
     if not isinstance(split, str) or split not in ("test", "development"):
         raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
@@ -592,10 +598,10 @@ class OptimiserParameters(Parameters):
     """Parameters of every :class:`Optimiser`."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, those of the corrective process alone among them."""
+    """Trials of a run, with trials of the corrective process alone."""
     hands: str | None = None
-    """Hand sequence; by default the one with which the corrective process alone does best, or the
-    task's own where there are too many to try."""
+    """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
+    alone gets the highest reward, or the task's initial one where more than 4096 exist."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Half the width of the bounds, length unit (base) and rad (joints)."""
 

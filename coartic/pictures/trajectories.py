@@ -77,7 +77,7 @@ class Trajectory:
 
     def subtask(self, goal: int) -> Array:
         """Return the rows of ``configurations`` from the hit of the goal before, or the start, to
-        the hit of a goal, both included.
+        the hit of a goal, both included, shape ``(rows, dof)``.
 
         ``goal`` is a number from 1. Raises ValueError if there is no such goal.
         """
@@ -111,7 +111,7 @@ class Trajectory:
 
     def plot(self) -> Figure:
         """Return a figure of the robot at the start (pale) and at each hit, with the path of the
-        hand that hits."""
+        hand that hits each goal."""
         from matplotlib.figure import Figure
 
         from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
@@ -166,8 +166,8 @@ def trajectory(
 ) -> Trajectory:
     """Execute a solution and keep every control tick.
 
-    The number of ticks and the configurations at the hits are those of :func:`coartic.execute`,
-    bit for bit.
+    The number of ticks and the configurations at the hits are the same as in
+    :func:`coartic.execute`, bit for bit.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def trajectory(
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError
-        No movement can be made with the model.
+        A constant of the model is out of bounds.
     """
     task = as_task(task)
     execution = execute(task, movements, model=model)

@@ -83,7 +83,8 @@ _OF_METHOD = ("title", "citation", "stochastic", "defaults", "origin", "code")
 
 
 def _rule(name: str, kind: str) -> str:
-    """Return the condition that SQLite checks for a column of table ``results``."""
+    """Return the condition, in SQL, that SQLite checks for a column of table ``results``, from its
+    name and its type, such as ``TEXT NOT NULL``."""
     if kind.startswith("TEXT"):
         letters = f" AND {name} NOT GLOB '*[^LR]*'" if name.endswith("hands") else ""
         return f"typeof({name}) != 'blob'{letters}"
@@ -183,7 +184,8 @@ class Store:
 
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
         """Put a plan in place of the earlier plan. Runs that only the earlier plan asked for stay
-        in the file, and no view shows them. ``made_with`` is as of :meth:`made_with`.
+        in the file, and no view shows them. ``made_with`` has versions, platform, commit,
+        ``command`` and ``date`` of this command, by name.
 
         Raises CoarticError if the folder holds another suite.
         """
@@ -294,8 +296,9 @@ class Store:
         return dict(found)
 
     def others(self) -> Counter[int]:
-        """Return the number of runs, stale runs too, that the plan does not ask for, by the seed of
-        their suite."""
+        """Return the number of runs in the folder that the plan does not ask for, by the seed of
+        their suite; runs of another version or code of their method (:meth:`stale`) are among
+        them."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
         return Counter(dict(self._rows(query)))
@@ -375,8 +378,8 @@ class Store:
         return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of a part (:data:`PREFIXES`) by run id, of the first ``most`` ok
-        runs of each cell of the plan; runs without the part are left out."""
+        """Return the movements of a part (``solution``, ``initial`` or ``replay``) by run id, of
+        the first ``most`` ok runs of each cell of the plan; runs without the part are left out."""
         query = """SELECT run_id, goal, hand, kind, ticks, path FROM
             (SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
             FROM asked WHERE status = 'ok') AS solved
@@ -402,8 +405,8 @@ class Store:
     # Rows.
 
     def _suite(self) -> Any:
-        """Return the row of the last suite, with its environment. Raises CoarticError if there is
-        none."""
+        """Return the row of the last suite, with its environment. Raises CoarticError if no suite
+        is stored."""
         row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
         if row is None:
             raise CoarticError("it is not finished; repeat the `coartic run` command")
@@ -434,8 +437,8 @@ class Store:
             self._insert("learning", {"result_id": result, "rewards": blob})
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
-        """Return a cell from its row. Raises ValueError or TaskError if coartic cannot have written
-        the row."""
+        """Return a cell from its row of table ``cells``; its method has no ``where``. Raises
+        ValueError or TaskError if coartic cannot have written the row."""
         method = {name: row[name] for name in _OF_METHOD} | {
             "name": row["method"],
             "defaults": json.loads(row["defaults"]),
@@ -465,7 +468,8 @@ class Store:
                 raise ValueError("a solution is too long")
 
     def _plan_hash(self) -> str:
-        """Return the hash of the last suite: settings, command, date, environment, cells."""
+        """Return the hash, 64 hex digits, of the last suite: settings, command, date, environment,
+        cells."""
         return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:
@@ -481,7 +485,8 @@ class Store:
 
     def _cell(self, cell: Cell) -> tuple[int, str]:
         """Return the id and the code of the row of a cell; insert the row if it is missing. A row
-        that 4.0.0 wrote keeps its code, and is that of the version for which the code stands."""
+        that 4.0.0 wrote keeps its code, a hash, and counts as a row of the version for which this
+        code stands."""
         for number, code in self._rows("SELECT id, code FROM cells WHERE digest = ?", cell.digest):
             if version_of(code) == cell.method.version:
                 return number, code
@@ -507,12 +512,13 @@ class Store:
         return self._db.execute(f"WITH asked AS ({_ASKED}) {query}", values)
 
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return the rows of a query (:meth:`_execute`)."""
+        """Return a list of the rows of a query, in which ``asked`` is the runs of the plan. Raises
+        CoarticError if the file cannot be read."""
         with explain_errors(self.folder):
             return self._execute(query, values).fetchall()
 
     def _one(self, query: str, *values: object) -> Any:
-        """Return the first row of a query, or None."""
+        """Return the first row of a query; None if it has no row."""
         return next(iter(self._rows(query, *values)), None)
 
     def _frame(self, query: str) -> pd.DataFrame:
@@ -543,7 +549,7 @@ class Store:
 
 
 def _as_text(value: Any) -> Any:
-    """Return a list or a table as JSON, and any other value as it is."""
+    """Return a list, a tuple or a dictionary as JSON, and any other value unchanged."""
     is_table = isinstance(value, dict | list | tuple)
     return json.dumps(value, ensure_ascii=False) if is_table else value
 
@@ -696,9 +702,9 @@ def _check_files(folder: Path) -> None:
 def _has_tables(connection: sqlite3.Connection) -> bool:
     """Return True if the file has the tables of coartic, and False if the file is empty.
 
-    What other programs add to the file (statistics, indexes, tables, views) is let be, except
-    triggers, which change what is written. Raises CoarticError for any other file, and ValueError
-    for a row that names a missing row: nothing would show its run.
+    Additions of other programs (statistics, indexes, tables, views) pass, except triggers, which
+    change data as they are written. Raises CoarticError for any other file, and ValueError for a
+    row that names a missing row: no view would show its run.
     """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -736,8 +742,8 @@ _UNREADABLE = (
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Turn an error of this block into a CoarticError, be it an error of the system, of SQLite or
-    of the content of the file."""
+    """Turn an error of the block of this context (of the system, of SQLite or of the content of
+    ``runs.sqlite`` in ``folder``) into a CoarticError that names the file."""
     try:
         yield
     except (CoarticError, *_UNREADABLE) as error:
@@ -767,7 +773,7 @@ _SENTENCES = {
 
 
 def _explain(path: Path, error: Exception) -> str:
-    """Return a sentence on a file that cannot be used."""
+    """Return a sentence that the file ``path`` cannot be used, and why, from the error raised."""
     said = plain(str(error), 200) or type(error).__name__
     if isinstance(error, CoarticError):
         said = one_line(str(error))
@@ -802,9 +808,9 @@ def _why_not_opened(path: Path) -> str:
 
 
 def _unpack(blob: bytes, trials: int | None) -> Array:
-    """Return the rewards of the trials of a run from table ``learning``, which holds them packed
-    (:func:`reward_bytes`), shape ``(trials,)``; NaN stands for a trial that failed or whose reward
-    is not kept.
+    """Return the rewards of the trials of a run from table ``learning``, whose ``blob`` holds them
+    packed (:func:`reward_bytes`), shape ``(trials,)``; NaN stands for a trial that failed or whose
+    reward is not kept.
 
     Raises ValueError for damaged rewards, and for more rewards than trials.
     """

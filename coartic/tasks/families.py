@@ -173,7 +173,8 @@ class Family(FileData):
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
     """Starting postures; each instance has one: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
-    """Policy that finds the hands of trial 0; the instance names the hands."""
+    """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``; an
+    instance names the hands that the policy found for it."""
     apart: Thousandths = 300
     """Least distance between the centres of two goals, length unit."""
     clear: Thousandths = 200
@@ -188,7 +189,7 @@ class Family(FileData):
 def draft(family: Family, address: Address, attempt: int) -> Task:
     """Return the task drawn for the instance at ``address`` in attempt ``attempt`` (from 0); equal
     arguments give equal tasks. No rule of the family is checked (:func:`broken_rule`): goals may be
-    out of reach. ``initial_hands`` is the name of the family's policy, not yet a hand sequence.
+    out of reach. ``initial_hands`` of the task is a policy, not yet a hand sequence.
     """
     key = hash_key(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)
@@ -290,8 +291,8 @@ def first_good(
     family: Family, address: Address, most: int = MOST_ATTEMPTS
 ) -> tuple[Task, tuple[str, ...]]:
     """Return the first draft (task drawn for the instance at ``address``) that breaks no rule, and
-    the name of the rule (:func:`broken_rule`) that each earlier draft broke, in order. Raises
-    TaskError if each of the first ``most`` drafts breaks a rule.
+    for each earlier draft, in order, the name of the rule that it broke, such as ``"overlap"``
+    (:func:`broken_rule`). Raises TaskError if each of the first ``most`` drafts breaks a rule.
     """
     rejected: list[str] = []
     while len(rejected) < most:
