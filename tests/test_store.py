@@ -449,7 +449,7 @@ def test_a_value_that_no_run_can_have(copied, tmp_path, change):
         "cells SET method = 'other'",
         "cells SET trial_budget = 5",
         "environments SET content = json_set(content, '$.packages', 1)",
-        "environments SET content = 'x' || rowid",
+        "environments SET content = 'x'",
         "movements SET path = path || hex(zeroblob(3000000))",
         "movements SET path = path || hex(zeroblob(26000000))",
         "results SET environment = 99",

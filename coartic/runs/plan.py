@@ -85,7 +85,8 @@ class Job:
     suite: str = ""
     """Name of the suite that asks for the runs."""
     suite_trials: int | None = None
-    """Trials of a run by the suite's file, whatever a command asks for; None if it names none."""
+    """Trials of a run by the suite's file, where the command asks for a number of its own; or
+    None."""
 
     def run_id(self, number: int, code: str | None = None) -> str:
         """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and

@@ -190,7 +190,9 @@ class Store:
         Raises CoarticError if the folder holds another suite.
         """
         first = plan[0]
-        environment = dict(made_with) | {"suite_trials": first.suite_trials}
+        environment = dict(made_with)
+        if first.suite_trials is not None:
+            environment["suite_trials"] = first.suite_trials
         suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
         suite |= {name: environment.pop(name) for name in ("command", "date")}
         with self.transaction():
@@ -223,7 +225,8 @@ class Store:
             check_limits("the seed", suite["seed"], 0, MOST_SEED)
             if suite["time_limit_s"] is not None:
                 check_limits("the time limit", suite["time_limit_s"], 0.0, MOST_SECONDS)
-            trials = json.loads(suite["content"]).get("suite_trials")
+            content = json.loads(suite["content"])
+            trials = content.get("suite_trials") if isinstance(content, dict) else None
             if trials is not None:
                 check_limits("the suite's number of trials", trials, 1, MOST_TRIALS)
             name, limit_s, plan = suite["name"], suite["time_limit_s"], list[Job]()

@@ -39,7 +39,7 @@ def in_every_family(read, families, comparisons):
             if len(values) < FEWEST:
                 few.append(f"{family}{name}")
                 continue
-            findings.append(mean_beyond("", values, margin))
+            findings.append(mean_beyond("{}", values, margin))
             digits, unit_of = (2, "") if first.quantity else (1, " %")
             seen = written(mean(values), digits) + unit_of
             quantity = first.quantity or "gain as a share of the best known reward"
