@@ -3,7 +3,9 @@
 A sequence has a centre, at first the configurations of the corrective process **A**
 alone, which take the first trial of the sequence. A trial perturbs all explored joints of the
 centre at once; any better one moves the centre to the configurations in which it hit the goals, as
-in the learner (leaving its targets was tried and is no better). Hands are explored as the learner
+in the learner. To keep its targets would gain more: random search that goes on from its best trial
+after each of 1,000 parts (``stages``) gains 0 to 16 ticks more with targets on the paper's tasks,
+and less on none of 30 development instances of five families. Hands are explored as the learner
 does, with ε for each goal around the best sequence known. The SD and ε are the learner's, untuned.
 """
 

@@ -102,11 +102,12 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
         "corrective process with the same hands. A first movement that gets slower while the whole "
         "task gets faster is sacrificed for it. Idle hand nearer: share of the path to its next "
         "goal that a hand covers while idle. Random search is the learner without its memory: the "
-        "best of as many trials is selected. A row has the runs with one hand sequence (of at "
-        "least a tenth of a method's runs); random search has the same hands, and all its runs "
-        "count. The choice of hands, in rows without a sequence, is compared with random search "
-        "that tries every sequence. p is one-tailed, and uncorrected unless it says so; empty: no "
-        "such random search.",
+        "best of as many trials is selected. What exceeds it is more than one selection, but much"
+        " of that can be gain (docs/findings.md has rows at equal gain). A row has the runs with "
+        "one hand sequence (of at least a tenth of a method's runs); random search has the same "
+        "hands, and all its runs count. The choice of hands, in rows without a sequence, is "
+        "compared with random search that tries every sequence. p is one-tailed, and uncorrected "
+        "unless it says so; empty: no such random search.",
         folded=True,
     ),
     Section(
