@@ -8,7 +8,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
@@ -21,6 +21,34 @@ INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two."""
 RANDOM_SEARCH = "random-search"
 """Id of random search: the best of random targets around those of the corrective process."""
+
+
+COLORS = {
+    "ink": "#000000",
+    "walnut": "#4a2b18",
+    "grape": "#4b2a9b",
+    "navy": "#00558f",
+    "forest": "#007c52",
+    "rust": "#d55e00",
+    "silver": "#8c8c8c",
+    "azure": "#5bb8ea",
+    "rose": "#dc9fc3",
+    "amber": "#eba717",
+}
+"""Colours of methods, from dark to light, in steps that remain in grey and for readers with a
+colour vision deficiency. On a dark page ``page.css`` has lighter ones."""
+MARKS: dict[str, Any] = {
+    "star": ("*", "-"),
+    "circle": ("o", (0, (1, 1.2))),
+    "square": ("s", (0, (4, 1.5))),
+    "diamond": ("D", (0, (9, 1.5))),
+    "thin-diamond": ("d", "-"),
+    "triangle": ("^", (0, (3, 1, 1, 1, 1, 1))),
+    "inverted-triangle": ("v", (0, (2, 2))),
+    "plus": ("P", (0, (5, 1.2, 1, 1.2))),
+    "cross": ("X", (0, (7, 1, 3, 1))),
+}
+"""Marks of methods in Matplotlib's terms, each with the dash of lines."""
 
 
 class _KnownMethod(NamedTuple):

@@ -307,7 +307,7 @@ class Study:
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with whatever setting, represents its algorithm;
         - ``under``: label of the method of a setting or ablation, if this method ran; or empty;
-        - ``look``: colour and dash in figures.
+        - ``look``: colour and mark in figures.
         """
         return methods_of(self.runs, self.declared, self.late_imports)
 

@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
+from coartic.analysis.methods import COLORS
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
@@ -156,9 +157,9 @@ def for_page(plot: Plot) -> str:
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
-    one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
-    :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a page.
-    Looks that several elements have are classes, named by their hashes.
+    one, its grey is ``--grey``, its blue ``--blue``, and colours of methods have their names. Marks
+    with a :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a
+    page. Looks that several elements have are classes, named by their hashes.
     """
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point
@@ -175,7 +176,8 @@ def for_page(plot: Plot) -> str:
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
     # The backend leaves black fills out: they inherit the root's.
     text = text.replace(style.INK, "currentColor").replace(style.BACKGROUND, "var(--paper, none)")
-    for color, name in ((style.GREY, "grey"), (style.BLUE, "blue"), (style.SKY, "sky")):
+    names = {"grey": style.GREY, "blue": style.BLUE, **COLORS}
+    for name, color in names.items():
         text = text.replace(color, f"var(--{name}, {color})")
     head, body = text.split(">", 1)
     view = re.search(r'viewBox="[^"]*"', head)

@@ -1,7 +1,7 @@
 """Style of all figures: sizes, colours and marks.
 
 Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on white.
-All colours are legible on white and on #111. Dashes distinguish the same lines as colours.
+Methods have colours of their own (:data:`.COLORS`); marks and dashes distinguish the same lines.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
+from coartic.analysis.methods import COLORS, MARKS
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -43,43 +44,28 @@ COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 BACKGROUND = "#ffffff"
 TIP = "tip:"
 """Beginning of the id of a mark with a :func:`tip`."""
-_COLORS = {
-    "blue": "#0072b2",
-    "sky": "#56b4e9",
-    "green": "#009e73",
-    "orange": "#e69f00",
-    "vermillion": "#d55e00",
-    "purple": "#cc79a7",
-    "grey": "#7a7a7a",
-    "ink": "#000000",
-    "brown": "#8c564b",
-}
-BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK, _ = _COLORS.values()
+BLUE, SKY, GREEN, ORANGE = "#0072b2", "#56b4e9", "#009e73", "#e69f00"
+VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#7a7a7a", COLORS["ink"]
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
-_DASHES: dict[str, Any] = {
-    "solid": "-",
-    "dashed": (0, (4, 1.5)),
-    "dotted": (0, (1, 1.2)),
-    "dash-dotted": (0, (5, 1.2, 1, 1.2)),
-    "long-dashed": (0, (9, 1.5)),
-}
-OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": _DASHES["dotted"]}
-INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": _DASHES["dash-dotted"]}
+OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": (0, (1, 1.2))}
+INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.2))}
 """Looks of the lines at the optimum, and at the reward of the corrective process alone."""
 styled = style.context(["default", RC])
 """Decorator that draws in this style on Matplotlib's defaults, without the user's settings."""
 
 
 Look = dict[str, Any]
-"""Look of a method's lines and marks: ``color``, ``linestyle``, ``linewidth``, ``markersize``."""
+"""Look of a method's lines and marks: arguments of Matplotlib's ``plot``."""
 
 
 def look_of(names: tuple[str, str], bold: bool) -> Look:
-    """Return the look of lines and marks by ``names``, of a colour and of a dash; ``bold``: with a
-    wider line and larger marks."""
-    color, dash = names
+    """Return the look of lines and marks by ``names``, of :data:`.COLORS` and of
+    :data:`.MARKS`; ``bold``: with a wider line and larger marks."""
+    marker, dash = MARKS[names[1]]
+    look: Look = {"color": COLORS[names[0]], "marker": marker, "linestyle": dash}
+    look |= {"markevery": 0.2, "markeredgewidth": 0}  # a mark at every fifth of the diagonal
     sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
-    return {"color": _COLORS[color], "linestyle": _DASHES[dash], **sizes}
+    return look | sizes
 
 
 def grid(panels: int) -> tuple[int, int]:

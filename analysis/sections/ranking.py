@@ -252,7 +252,7 @@ def draw_ranking(study: Study) -> Parts | None:
         size = looks[row["method"]]["markersize"] + learner  # a diamond of equal width is smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
         axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
-        mark = "D" if learner else "o"
+        mark = looks[row["method"]]["marker"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = shown_name(study, row["method"])
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
