@@ -74,6 +74,7 @@ def methods_of(
             "setting": setting,
             "parts": (label,),
             "title": title_of(base, setting) + LATE_MARK * (base in marked),
+            "short": title_of(base, setting, short=True) + LATE_MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,
@@ -87,8 +88,9 @@ def methods_of(
     tasks = {label: {*of_method.task} for label, of_method in by_label.items()}
     for label, (one, two) in _joined_learners(tasks):
         conditions = label.partition(" ")[2].replace("-informed", "")
-        title = f"{rows[two]['algorithm']} {conditions}"
-        rows[label] = rows[two] | {"parts": (one, two), "title": title}
+        names = {"title": f"{rows[two]['algorithm']} {conditions}"}
+        names["short"] = f"{rows[two]['short'].rpartition(' ')[0]} {conditions}"
+        rows[label] = rows[two] | {"parts": (one, two)} | names
     for label, look in _looks_of(rows):
         rows[label]["look"] = look
     place = {name: number for number, name in enumerate(KNOWN_METHODS)}

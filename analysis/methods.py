@@ -61,6 +61,7 @@ class _KnownMethod(NamedTuple):
     headline: bool = False
     ablation_of: str = ""
     solvers: Sequence[str] = ()
+    short: str = ""
 
 
 KNOWN_METHODS = {
@@ -81,10 +82,12 @@ _WORDS = {
 """Words for parameters, before their values."""
 
 
-def title_of(method: str, setting: str = "") -> str:
+def title_of(method: str, setting: str = "", *, short: bool = False) -> str:
     """Return the name of a method, given by id, with its setting in words: ``learner EC4``, ``hill
-    climbing``, ``CMA-ES (other arm still)``. The name of a method from a file is its id."""
-    name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else one_line(method)
+    climbing``, ``CMA-ES (other arm still)``. The name of a method from a file is its id. ``short``:
+    the short name of a built-in method that has one."""
+    known = KNOWN_METHODS.get(method)
+    name = (short and known.short) or known.name if known else one_line(method)
     if not setting:
         return name
     pairs = (part.partition("=") for part in one_line(setting).split(", "))

@@ -299,6 +299,7 @@ class Study:
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``parts``: labels of its runs; where two have runs on a task, those of the last count;
         - ``title``: name on the page, in tables and figures;
+        - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
         - ``is_learner``: True for the paper's learner under the paper's conditions;
         - ``is_search``: True for searches for the optimum, which are references;

@@ -14,7 +14,6 @@ from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.methods import COLORS, KNOWN_METHODS, title_of
 from coartic.analysis.report.about import finding
 from coartic.analysis.sections import FIGURES, SECTIONS
-from coartic.analysis.sections.ranking import name_in_figure
 from coartic.pictures import drawing
 from tests.support.figures import misplaced
 from tests.support.made_up import row, study_of
@@ -39,9 +38,20 @@ def test_robots_and_goals_are_drawn_where_they_are():
         np.testing.assert_array_equal(line.get_xydata(), due)
 
 
-def test_a_long_name_keeps_its_end(traced):
-    for letters, name in ((44, 22 * "a" + 22 * "b"), (60, f"{22 * 'a'}…{21 * 'b'}")):
-        assert name_in_figure(traced, letters // 2 * "a" + letters // 2 * "b") == name
+@pytest.mark.parametrize("width", [None, 3.4])
+def test_a_long_name_is_whole(width):
+    long = "mine, " + 5 * "with a name that goes on and on, "
+    study = study_of([row(name, -300, task="ascending") for name in (long, "hill-climbing")])
+    figure = FIGURES["ranking"](study, width=width).figure
+    assert misplaced(figure) == ([], [])
+    words = " ".join(label.get_text() for label in figure.axes[0].get_yticklabels())
+    assert long.strip() in words.replace("\n", " ")
+
+
+def test_short_names_fit_and_differ():
+    short = [title_of(method, short=True) for method in KNOWN_METHODS]
+    assert len({*short}) == len(short)
+    assert max(map(len, short)) <= 22
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -52,6 +62,7 @@ def test_no_text_leaves_a_figure_of_any_width_or_lies_on_another(name, shipped):
             pytest.skip("the shipped results have no such figure")
         assert misplaced(plot.figure) == ([], []), width
         assert (plot.figure.get_figwidth() == width) == bool(width)
+        assert width is None or plot.figure.get_figheight() < 4.01
         assert plot.id == name
         assert all(map(len, (plot.alt, plot.caption, plot.data)))
 

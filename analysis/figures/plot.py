@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import io
 import re
+import textwrap
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.methods import COLORS
+from coartic.analysis.standings import compared, shown_name
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
@@ -31,6 +33,7 @@ from coartic.internal.text import one_line
 from coartic.internal.threads import environment
 
 FORMATS = (".svg", ".pdf", ".png")
+_LONGEST_NAME = 48  # letters of a line with a name; half of it in a narrow figure
 _NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # whatever the user has there: no date is written
 
 
@@ -113,6 +116,16 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     rows = study.methods.loc[[*labels]]
     from_file = ~rows.built_in.astype(bool)
     return {label: style.look_of(rows.look[label], from_file[label]) for label in rows.index}
+
+
+def name_in_figure(study: Study, method: str) -> str:
+    """Return the name of a method, given by label, in the figure that is being drawn: as
+    :func:`.shown_name`, in a narrow figure with its short name; a long name on several lines."""
+    title, longest = study.methods.title[method], _LONGEST_NAME
+    name = shown_name(study, method) if method in compared(study) else title
+    if style.is_narrow():
+        name, longest = name.replace(title, study.methods.short[method]), longest // 2
+    return "\n".join(textwrap.wrap(name, longest))
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:

@@ -36,8 +36,9 @@ TALLEST = 225 / INCH
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Matplotlib's settings of all figures."""
-LEAST_PANEL = 2.2
-"""Least width of a panel next to another one in a figure of chosen width, inches."""
+LEAST_PANEL, LEAST_SMALL_PANEL = 2.2, 1.6
+"""Least widths of a panel next to another one in a figure of chosen width, inches: a panel with
+names next to it, and one without."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
@@ -90,7 +91,11 @@ def is_narrow() -> bool:
 
 
 def panels(
-    shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
+    shape: tuple[int, int],
+    size: tuple[float, float],
+    used: int | None = None,
+    least: float = LEAST_PANEL,
+    **subplots: Any,
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure with panels; in a block of :func:`drawn_at`, of the width chosen there, with
     fewer panels side by side, and taller, where they would be too narrow.
@@ -104,6 +109,8 @@ def panels(
         journal.
     used : int, optional
         Number of panels used, the first ones; the others stay empty. By default all.
+    least : float
+        Least width of a panel next to another one in a figure of chosen width, inches.
     **subplots
         Arguments of Matplotlib's ``Figure.subplots``, such as ``sharey=True``.
 
@@ -114,7 +121,7 @@ def panels(
     """
     used = used or shape[0] * shape[1]
     if (width := _width.get()) is not None:
-        columns = min(shape[1], max(1, int(width // LEAST_PANEL)))
+        columns = min(shape[1], max(1, int(width // least)))
         rows = -(-used // columns)
         shape, size = (rows, columns), (width, size[1] * rows / shape[0])
     figure = Figure(figsize=size, layout="constrained")
@@ -134,8 +141,13 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
     """Draw a legend of ``columns`` columns, or fewer if the figure is narrow, below all panels; for
     more than two lines of entries the figure becomes taller."""
-    widest = 0.45 + 0.06 * max(len(str(handle.get_label())) for handle in handles)  # inches
-    columns = min(columns, max(1, int(figure.get_figwidth() // widest)))
+    widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
+    while columns > 1:
+        lines = -(-len(handles) // columns)
+        by_column = [widths[at : at + lines] for at in range(0, len(widths), lines)]
+        if sum(map(max, by_column)) <= figure.get_figwidth():
+            break
+        columns -= 1
     lines = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.15 * max(0, lines - 2))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
@@ -212,7 +224,8 @@ def log_axis(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def letters(panels: Iterable[Axes]) -> None:
-    """Name panels a, b, ... z before their titles; panels after the 26th stay as they are."""
+def letters(panels: Iterable[Axes], pad: float | None = None) -> None:
+    """Name panels a, b, ... z before their titles, ``pad`` points above the axes; panels after the
+    26th stay as they are."""
     for letter, axes in zip(ascii_lowercase, panels, strict=False):
-        axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left")
+        axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left", pad=pad)
