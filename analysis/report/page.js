@@ -78,7 +78,7 @@
   window.addEventListener("hashchange", reveal);
   /* Figures and short tables are printed, folded or not. */
   window.addEventListener("beforeprint", () => document.querySelectorAll("details.folded").forEach((each) => {
-    each.open ||= each.querySelector("figure") || each.querySelectorAll("tr").length <= 11;
+    each.open ||= each.querySelector("figure") || each.querySelectorAll("tbody tr").length <= 15;
   }));
   reveal();
 })();
