@@ -45,7 +45,8 @@ def bibliography(
     analysis : bool
         Add the works behind statistics and signatures.
     environment : mapping, optional
-        Environment of a results folder, for its version and commit; without it, this version.
+        Environment of a results folder (:attr:`.Study.made_with`), whose version and commit are
+        cited; by default the version of this program.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"

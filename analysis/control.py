@@ -92,8 +92,9 @@ def control_of(study: Study, task: str, label: str, hands: str, *, own: bool = F
 
 
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
-    """Return whether a method, if it is the learner by its condition, gives noise to an arm that is
-    not to hit; True for other methods, and on tasks for one arm, where there is none."""
+    """Return whether a method gives noise to the arm that is not to hit: the learner by its
+    condition, random search by its parameter ``idle_arm``. True for other methods, and on tasks for
+    one arm."""
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True
@@ -136,8 +137,8 @@ def _most_trials(study: Study, task: str, label: str) -> float:
 @checked_arguments
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     """Return by how much a method's signature exceeds the mean signature of random search with the
-    same hands (:func:`with_control`), a mean over the method's runs that have this control; NaN
-    without any."""
+    same hands (:func:`with_control`), in the unit of the signature: a mean over the method's runs
+    whose hands random search has; NaN without such runs."""
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
     return float(np.concatenate(excess).mean()) if excess else math.nan
@@ -179,10 +180,10 @@ def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS
     """Return a suite of random search, the control of signatures, where the study lacks it.
 
     For each method that may select its solution by rewards (:func:`selects`), the suite has random
-    search with as many trials as the method, with noise on the idle arm if the method has it, and
-    with each hand sequence that a tenth or more of the method's solved runs have, unless the study
-    has this random search. Write the suite to a file
-    and run it with the results of the study: ``coartic run control.toml --include FOLDER``.
+    search with as many trials as the method, with noise on the idle arm if the method has such
+    noise, and with each hand sequence that a tenth or more of the method's solved runs have, unless
+    the study has this random search. Write the suite to a file and run it with the results of the
+    study: ``coartic run control.toml --include FOLDER``.
 
     Parameters
     ----------

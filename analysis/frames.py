@@ -9,8 +9,9 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence, Set
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -32,9 +33,14 @@ from coartic.internal.text import counted, plain
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
-_LARGEST_GAP = 10
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
+_TWICE = (
+    "a run is there twice (runs of two sources that count alike need a column seed, folder or "
+    "run_id; number the draws of a bootstrap in a column run)"
+)
+_SOURCES = ("folder", "seed", "run_id", "run")
+"""Columns by which runs of a method on a task differ: all of them that a frame has."""
 
 
 def checked(
@@ -45,7 +51,8 @@ def checked(
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
     """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
-    missing numbers, ``names`` and ``others`` as they are.
+    missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` has
+    to agree: a run has a reward if it is ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
     that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
@@ -76,11 +83,16 @@ def checked(
             _refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
         columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
         _refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
+    if "reward" in numbers and "status" in frame.columns:
+        is_ok = (frame.status.astype(object) == "ok").to_numpy(bool)
+        stated = columns.assign(status=frame.status)
+        rule = "a run has a reward if its status is ok, and NaN otherwise"
+        _refuse_rows(stated, "status", is_ok != columns.reward.notna(), rule)
     return columns
 
 
 def inline(name: object) -> str:
-    """Return the name of a column as one printable line, cut if it is long (:func:`.plain`)."""
+    """Return the name of a column as one printable line, cut to 2,000 characters."""
     return plain(str(name))
 
 
@@ -138,26 +150,36 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     ``share`` where the frame has ``corrective_best``.
 
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
-    number of the task, from 0, in the order of names. ``more``: names of other columns of numbers
-    to keep. Raises CoarticError as :func:`checked` and :func:`_with_gaps` do, and for a task with
-    several best known rewards.
+    number of the task, from 0, in the order of names; ``key`` is the same number in all rows of a
+    run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError
+    as :func:`checked` and :func:`_with_gaps` do, and for a task with several best known rewards.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
-    setting = ["setting"] * ("setting" in there)
-    columns = _with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=setting))
+    others = [name for name in ("setting", *_SOURCES) if name in there]
+    columns = _with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=others))
     number, tasks = pd.factorize(columns.task)
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     for name in {"best_known", ZERO} & {*columns}:
         several = columns[name].groupby(task).transform("nunique") > 1
         _refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
     names = columns.method.to_numpy(object)
-    if setting:
+    if "setting" in there:
         settings = columns.setting.astype(object).where(columns.setting.notna(), "").astype(str)
         several = settings.groupby(pd.factorize(names)[0]).transform("nunique") > 1
         labels = np.array([*map(label_of, map(str, names), settings)], dtype=object)
         names = np.where(several, labels, names)
-    return columns.assign(task=task, method=pd.Series(names, columns.index, dtype=object))
+    frame = columns.assign(task=task, method=pd.Series(names, columns.index, dtype=object))
+    keys = [name for name in _SOURCES if name in there]
+    run = frame.groupby(["method", "task", *keys], dropna=False, sort=False).ngroup()
+    return frame.assign(key=run if keys else np.arange(len(frame)))
+
+
+def _scored_runs(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the frame of :func:`scored`. Raises CoarticError also for two rows of a run."""
+    found = scored(frame)
+    _refuse_rows(found, "method", found.duplicated("key"), f"{_TWICE}; needed is a row for a run")
+    return found
 
 
 def gaps(frame: pd.DataFrame) -> pd.Series:
@@ -209,7 +231,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        As :func:`gaps` does, and for a ``corrective_best`` above the best known reward.
+        A column is missing or a reward is wrong (:func:`gaps`), or ``corrective_best`` is above the
+        best known reward.
 
     Examples
     --------
@@ -280,7 +303,8 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     frame : DataFrame
-        As :func:`ranking` takes it.
+        With columns ``method``, ``task``, ``reward`` and ``best_known`` (negative ticks), and
+        perhaps ``setting`` and ``corrective_best`` (:func:`ranking`).
 
     Returns
     -------
@@ -292,7 +316,7 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`ranking` does.
+        A column is missing, a name is missing, or a reward is wrong (:func:`ranking`).
 
     Examples
     --------
@@ -303,11 +327,27 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
             task method  reward  n    gap
     0  ascending   mine  -298.0  2  0.021
     """
-    values = scored(frame).assign(task=frame.task)
+    values = _scored_runs(frame).assign(task=frame.task)
     scores = [name for name in ("gap", "share") if name in values]
     groups = values.groupby(["task", "method"], sort=False)
     table = groups.agg(reward=("reward", "mean"), n=("reward", "count")).join(groups[scores].mean())
     return table.reset_index()
+
+
+def compared_tasks(on: Iterable[tuple[Hashable, Set[Any]]]) -> Set[Any]:
+    """Return the tasks over which algorithms are ranked, given each algorithm with the tasks on
+    which one of its methods ran.
+
+    The tasks of that method for which the number of its tasks, times the number of algorithms that
+    ran on all of them, is largest; of several the most tasks. Empty without a method.
+    """
+    pairs = [*on]
+
+    def size(tasks: Set[Any]) -> tuple[int, int]:
+        there = len({algorithm for algorithm, others in pairs if others >= tasks})
+        return len(tasks) * there, len(tasks)
+
+    return max((tasks for _, tasks in pairs), key=size, default=frozenset())
 
 
 def ranking(frame: pd.DataFrame) -> pd.DataFrame:
@@ -326,7 +366,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
         runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
         (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
-        that it solved in every run, of ``missing`` tasks (the others with a best known reward), of
+        that it solved in every run, of ``missing`` tasks (other tasks with a best known reward), of
         ``runs`` and of ``failed`` runs on all tasks. A method with missing tasks has no gap and is
         last. The paper's learner over tasks for one arm and for two has a row of its own,
         ``"dual-process (EC1, EC4)"``. With ``corrective_best`` also the ``share`` of the possible
@@ -336,8 +376,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`gaps` does; also for missing names, and for a task with several best known
-        rewards.
+        A column is missing or a reward is wrong (:func:`gaps`), a name is missing, or a task has
+        several best known rewards.
 
     Examples
     --------
@@ -351,11 +391,13 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     mine    0.021        0       0
     yours   0.062        0       0
     """
-    frame = scored(frame)
-    every, rows = {*frame.task[frame.best_known.notna()]}, []
+    frame = _scored_runs(frame)
     by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
-    for of_method in by_method.values():
-        of_tasks = of_method[of_method.best_known.notna()]
+    known = [of_method[of_method.best_known.notna()] for of_method in by_method.values()]
+    every = compared_tasks(zip(by_method, ({*runs.task} for runs in known), strict=True))
+    rows = []
+    for of_method, runs in zip(by_method.values(), known, strict=True):
+        of_tasks = runs[runs.task.isin(every)]
         has_failed = of_tasks.gap.isna().groupby(of_tasks.task).transform("any")
         solved = of_tasks[~has_failed]
         by_task = dict([*solved.groupby("task").gap])
@@ -383,8 +425,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     ----------
     frame : DataFrame
         With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end.
-        Settings as in :func:`ranking`.
+        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end. With a
+        column ``setting``, a method with several settings is several methods.
     targets : sequence of float
         Gaps to the best known reward, such as ``[0.1, 0.05, 0.01]``.
 
@@ -399,8 +441,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        As :func:`ranking` does; also for trials below 1, targets that are no gaps, and a frame
-        without best known rewards.
+        A column is missing or a reward is wrong (:func:`ranking`), trials are below 1, targets are
+        no gaps, or the frame has no best known reward.
 
     Examples
     --------
@@ -413,16 +455,23 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     0   mine    40.0    0.5
     1   mine   900.0    1.0
     """
-    run = checked(frame, names=("run",)).run
-    frame = scored(frame, "trials").assign(run=run)
+    checked(frame, names=("run",))
+    frame = scored(frame, "trials")
+    in_order = frame.sort_values(["trials", "reward"], kind="stable")
+    again = in_order.duplicated(["key", "trials"]) & ~in_order.duplicated(
+        ["key", *SCORES, "trials"]
+    )
+    falls = in_order.groupby("key").reward.diff() < 0
+    improve = f"{_TWICE}, or its reward falls; needed are the best rewards so far"
+    _refuse_rows(in_order, "method", again | falls, improve)
     _refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
     reach = np.empty(0)
     with suppress(TypeError, ValueError):  # no numbers
         reach = real_array("targets", targets)
-    if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach < _LARGEST_GAP)).all():
+    if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach <= 1)).all():
         raise CoarticError(
             f"targets are {brief_value(targets)}: needed are gaps, shares of the best known reward "
-            f"from 0 to {_LARGEST_GAP} (not per cent), such as [0.1, 0.05, 0.01]"
+            "from 0 to 1, such as [0.1, 0.05, 0.01] for 10, 5 and 1 % (no per cent, no ticks)"
         )
     if not frame.best_known.notna().any():
         raise CoarticError("the frame has no best_known reward, so no targets")
@@ -430,7 +479,7 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     for method, of_method in frame.groupby("method", sort=False):
         times = []
         for task in every:
-            runs = of_method[of_method.task == task].groupby("run")
+            runs = of_method[of_method.task == task].groupby("key")
             reached = [[run.trials[run.gap <= gap].min() for gap in reach] for _, run in runs]
             trials = np.array(reached or [[np.nan] * len(reach)], dtype=np.float64)
             times.append(np.where(np.isnan(trials), np.inf, trials))
@@ -452,16 +501,18 @@ def solutions_of(
     task : Task
         The task of the trials.
     hits : DataFrame
-        A row for each hit, as :func:`coartic.analysis.read_hits` returns it: ``subject``,
-        ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the posture, a column for each of
-        ``task.robot.joint_names``, length unit and rad. It is checked in the same way.
+        A row for each hit: ``subject``, ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the
+        posture, a column for each of ``task.robot.joint_names``, length unit and rad. The frame is
+        checked like a file of :func:`coartic.analysis.read_hits`.
     implausible : {"refuse", "drop"}
-        What becomes of hits that the person cannot have made (:func:`.read_hits`).
+        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
+        out.
 
     Returns
     -------
     Solutions
-        A run for each trial in which all goals are hit, by subject and trial, as ``run_ids`` says.
+        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial, such as
+        ``P1 3``.
 
     Raises
     ------

@@ -205,8 +205,8 @@ def row_names(frame: pd.DataFrame) -> list[str]:
 
 
 def as_names(values: pd.Series) -> pd.Series:
-    """Return names as texts, as :func:`_written` has them; whole numbers without ``.0``, and an
-    empty text for a missing name."""
+    """Return names as texts with single spaces and plain hyphens (:func:`_written`); whole numbers
+    without ``.0``, and an empty text for a missing name."""
 
     def name(value: object) -> str:
         whole = isinstance(value, float) and value.is_integer()
@@ -217,7 +217,8 @@ def as_names(values: pd.Series) -> pd.Series:
 
 
 def as_numbers(values: pd.Series) -> NDArray[np.float64]:
-    """Return numbers, also of texts with typographic minus signs; NaN for what is no number."""
+    """Return numbers, shape ``(n,)``, also of texts with typographic minus signs; NaN for a value
+    that is no number."""
     if infer_dtype(values, skipna=True) in ("boolean", "mixed", "mixed-integer"):
         values = values.astype(object).where(~values.map(lambda value: isinstance(value, bool)))
     elif values.dtype.kind not in "iufO":  # durations of pandas would be nanoseconds
@@ -251,11 +252,13 @@ def checked_hits(
     implausible: Implausible = "refuse",
     ticks_per_unit: float | None = None,
 ) -> pd.DataFrame:
-    """Return a new frame of recorded hits as :func:`read_hits` returns it, checked and unwrapped.
+    """Return a new frame of recorded hits, checked, unwrapped and sorted, a row for each hit:
+    ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints (:func:`read_hits`).
 
     ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
     ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole. Raises CoarticError
-    as :func:`read_hits` does.
+    for a missing or wrong value, an implausible hit, and a wrapped joint that turns by more than
+    2.5 rad between hits.
     """
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")
@@ -401,12 +404,13 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
 def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float
 ) -> tuple[NDArray[np.object_], bool]:
-    """Return why sorted hits are implausible, an empty text for plausible ones, and whether the
-    hand is more than two radii from its goal in the median hit: then places are not checked.
+    """Return why sorted hits are implausible, a text for each, empty for a plausible hit, and
+    whether the hand is more than two radii from its goal in the median hit: then places are not
+    checked.
 
-    Warns of such a median hit, of ticks that rise from goal to goal in every trial, and of an arm
-    that is faster or slower than people's. Raises CoarticError if the median hit contradicts the
-    base that the task locks, or takes a number of ticks that no arm of the task could take;
+    Warns of a median hit so far off, of ticks that rise from goal to goal in every trial, and of an
+    arm that is faster or slower than people's. Raises CoarticError if the median hit contradicts
+    the base that the task locks, or takes a number of ticks that no arm of the task could take;
     ``unit``: ticks in a unit of time.
     """
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
@@ -492,7 +496,8 @@ def _implausible(
 
 
 def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
-    """Warn if three trials or more are equal to others, of the same subject or another one."""
+    """Warn if at least three different trials are there twice or more, equal in all numbers, of one
+    subject or of several."""
     hits = pd.util.hash_pandas_object(frame.drop(columns=["subject", "trial"]), index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
     copies = trials[trials.duplicated(keep=False)]

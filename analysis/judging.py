@@ -21,6 +21,7 @@ from coartic.analysis.words import capital, interval, p_value
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.internal.arguments import Numbers, checked_arguments
+from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
 
 RESAMPLES_OF_CLAIMS = 99_999
@@ -36,10 +37,12 @@ class Finding:
     holds: bool | None
     """True if the runs show the claim; None if the runs are too few."""
     evidence: str
+    """Sentence with the means and their intervals, or why the claim cannot be judged."""
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
-    """Tests of the claim's opposite, one of which refutes it."""
+    """Tests of the opposite of the claim; any test below 5 %, after correction, refutes the
+    claim."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
@@ -61,8 +64,9 @@ class Finding:
         its opposite, corrected or not.
 
         A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
-        that does not hold is not supported if ``opposite_p`` is below 5 %, or without tests. Other
-        claims, and claims with too few runs, are undecided."""
+        that does not hold is not supported if ``opposite_p`` is below 5 %, if the claim has no
+        test, or if values without spread contradict it. Other claims, and claims with too few runs,
+        are undecided."""
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -81,8 +85,9 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
 
 
 def _tests_over_tasks(values: Numbers, bound: float) -> tuple[Estimate, Estimate]:
-    """Test that the mean of values, one for each task, exceeds a bound: with all values, and
-    without the largest value."""
+    """Return two one-tailed bootstrap tests that the mean of values, one for each task, exceeds a
+    bound: with all values, and without the largest value. Two values are needed at least; p is NaN
+    for a test of a single value."""
     every = np.asarray(values, dtype=np.float64)
     return (
         bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
@@ -99,7 +104,8 @@ def mean_beyond(
     Parameters
     ----------
     sentence : str
-        Sentence of the evidence, with ``{}`` in the place of the mean and its interval.
+        Sentence of the evidence, with one ``{}`` in the place of the mean and its interval; other
+        braces are text.
     values : array_like, shape (tasks,)
         A value for each task; NaN, which does not count, for a task without a value.
     bound : float
@@ -111,13 +117,14 @@ def mean_beyond(
     -------
     Finding
         ``holds``: the mean lies on this side; None with fewer than three tasks. ``evidence``: the
-        sentence. Tests of the claim, of the claim without the task that favours it most, and of
-        its opposite.
+        sentence. ``tests`` has a test of the claim; ``without`` a test of the claim without the
+        task that favours it most; ``against`` a test of the opposite, with all tasks or without the
+        task that favours the opposite most, whichever has the larger p.
 
     Raises
     ------
     CoarticError
-        For another side.
+        For another side, and for a sentence that has not one ``{}``.
 
     Examples
     --------
@@ -125,6 +132,8 @@ def mean_beyond(
     >>> finding.holds, finding.evidence
     (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
     """
+    if sentence.count("{}") != 1:
+        raise CoarticError(f"the sentence {brief_value(sentence)} needs one {{}}, for the mean")
     there = np.asarray(values)
     there = there[~np.isnan(there)]
     if len(there) < FEWEST:
@@ -133,7 +142,7 @@ def mean_beyond(
     test, without = _tests_over_tasks(sign * there, sign * bound)
     opposite = max(_tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
     found = interval(mean(there).columns("mean"), "mean", 2)
-    evidence = f"{sentence.format(found)} ({counted(len(there), 'task')})"
+    evidence = f"{sentence.replace('{}', found)} ({counted(len(there), 'task')})"
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
 
@@ -149,8 +158,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Holds if all findings hold. It has the tests of all, and the tests in ``against`` of all. If
-        findings have too few runs, the first of these is returned.
+        Holds if all findings hold. It has ``tests``, ``against`` and ``without`` of all findings.
+        If findings have too few runs, the first of these is returned.
 
     Raises
     ------

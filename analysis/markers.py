@@ -67,21 +67,23 @@ def hits_from_markers(
     ticks_per_unit : float
         Ticks in a second.
     implausible : {"refuse", "drop"}
-        What becomes of hits that the person cannot have made (:func:`.read_hits`).
+        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
+        out.
 
     Returns
     -------
     DataFrame
-        Hits as :func:`.read_hits` returns them. Trials in which a goal is never reached have none;
-        ``attrs["unfinished"]`` is their number. :func:`pandas.concat` loses it: fit each person.
+        A row for each hit, with the columns of :func:`.read_hits`. Trials in which a goal is never
+        reached have no hits; ``attrs["unfinished"]`` is the number of such trials, which
+        :func:`pandas.concat` loses: fit each person.
 
     Raises
     ------
     CoarticError
         The recording is no such table or of several people, the median length of a link differs
         from the task's by more than 10 %, a marker has a longer gap, a link's length jumps by more
-        than 10 % (markers swap), two shoulders contradict each other, or hits are wrong as
-        :func:`.read_hits` says.
+        than 10 % (markers swap), two shoulders contradict each other, or :func:`.read_hits` would
+        refuse the hits.
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")
@@ -260,9 +262,10 @@ def _bridge(place: Array, time: Array, begin: NDArray[np.intp], step: float) -> 
 
 
 def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int, float, Array]]:
-    """Return the hits of a trial in the order of the goals, up to the first goal that is missed:
-    sample, place of the hand in ``tips``, ``(hands, n, 2)``, time in s and posture, both where the
-    tip enters the goal."""
+    """Return the hits of a trial in the order of the goals, up to the first goal that is missed,
+    each as index of the sample, index of the hand in ``tips``, time, s, and posture ``(dof,)``,
+    the last two where the tip enters the goal. ``tips`` are places of hands, ``(hands, n, 2)``,
+    ``time`` and ``q`` times ``(n,)`` and postures ``(n, dof)`` of the samples."""
     found: list[tuple[int, int, float, Array]] = []
     ways = np.diff(tips, axis=1, prepend=tips[:, :1])  # to each sample from the one before
     for goal in task.goal_array:

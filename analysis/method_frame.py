@@ -36,8 +36,8 @@ OWN_COLOR, OWN_MARK = "walnut", "star"
 """Colour of methods from files, and mark of the first: no built-in method has them."""
 
 
-LATE_MARK = " ‡"
-"""Mark behind the title of a method that loaded files of the user's too late."""
+MARK = " ‡"
+"""Mark behind the title of a method against which something was found (:attr:`.Study.marks`)."""
 
 
 def methods_of(
@@ -50,11 +50,11 @@ def methods_of(
     Parameters
     ----------
     runs : DataFrame
-        As :attr:`.Study.runs`, in the order of the suite.
+        A row for each run, with the columns of :attr:`.Study.runs`, in the order of the suite.
     declared : mapping of str to MethodInfo
         Declaration of each method, by its id without a setting.
     marked : collection of str, optional
-        Ids of methods whose titles get :data:`LATE_MARK`.
+        Ids of methods whose titles get :data:`MARK`.
 
     Returns
     -------
@@ -73,8 +73,8 @@ def methods_of(
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
             "parts": (label,),
-            "title": title_of(base, setting) + LATE_MARK * (base in marked),
-            "short": title_of(base, setting, short=True) + LATE_MARK * (base in marked),
+            "title": title_of(base, setting) + MARK * (base in marked),
+            "short": title_of(base, setting, short=True) + MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,
@@ -101,8 +101,9 @@ def methods_of(
 def _group_of(runs: pd.DataFrame) -> str:
     """Return the group of a method, one of :data:`GROUPS`, from its runs.
 
-    The first if the method declares the reward of trials and a run made more than one trial,
-    whatever else it uses; or else the second if it declares the formula; or else the third.
+    ``using the reward of each trial`` if the method declares this reward and a run made more than
+    one trial, whatever else it uses; or else ``using the reward as a formula`` if it declares the
+    formula; or else ``not using the reward``.
     """
     information = {each for text in runs.information.unique() for each in text.split(", ")}
     if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:
@@ -132,9 +133,9 @@ def joined_label(one: str, two: str) -> str:
 
 
 def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
-    """Return runs by label: first those of the learner over tasks for one arm and for two, by
-    :func:`joined_label` (of its first method on tasks on which its second did not run, and all of
-    its second), then those of each given method."""
+    """Return runs by label: first the runs of the learner over tasks for one arm and for two, by
+    :func:`joined_label` (runs of the first method on tasks on which the second did not run, and all
+    runs of the second), then the runs of each given method."""
     tasks = {method: {*runs.task} for method, runs in by_method.items()}
     joined = {
         label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
@@ -158,14 +159,14 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return some rows of :attr:`.Study.methods` without settings and ablations of a method that
-    has a row among them."""
+    """Return ``rows``, some rows of :attr:`.Study.methods`, less settings and ablations whose own
+    method is in ``rows``, too."""
     return rows[~rows.under.isin(rows.index)]
 
 
 def headline_methods(rows: pd.DataFrame) -> list[str]:
-    """Return the labels of the methods that represent their algorithms, of some rows of
-    :attr:`.Study.methods`; all labels if no method does.
+    """Return a list of the labels of the methods that represent their algorithms, of ``rows``, some
+    rows of :attr:`.Study.methods`; all labels if no method does.
 
     A setting counts where its method has no row. A row that joins conditions of the learner takes
     the place of the single conditions; of several such rows only the last counts, with the

@@ -20,7 +20,7 @@ LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two."""
 RANDOM_SEARCH = "random-search"
-"""Id of random search: the best of random targets around those of the corrective process."""
+"""Id of random search: the best of random targets around postures of the corrective process."""
 
 
 COLORS = {
@@ -84,8 +84,9 @@ _WORDS = {
 
 def title_of(method: str, setting: str = "", *, short: bool = False) -> str:
     """Return the name of a method, given by id, with its setting in words: ``learner EC4``, ``hill
-    climbing``, ``CMA-ES (other arm still)``. The name of a method from a file is its id. ``short``:
-    the short name of a built-in method that has one."""
+    climbing``, ``CMA-ES (other arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty
+    for none. The name of a method from a file is its id. ``short``: the short name of a built-in
+    method that has one."""
     known = KNOWN_METHODS.get(method)
     name = (short and known.short) or known.name if known else one_line(method)
     if not setting:

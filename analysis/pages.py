@@ -31,8 +31,8 @@ def write_study(
         Tables by name; table ``results`` becomes ``results.csv``. Other CSV files of the folder
         stay as they are.
     draw : callable
-        Takes table ``results``, as it is read from its file, and returns the figure (Matplotlib)
-        that becomes ``figure.svg``.
+        Function of table ``results``, as read from its file, that returns the figure (Matplotlib)
+        to be written as ``figure.svg``.
 
     Raises
     ------

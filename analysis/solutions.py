@@ -22,6 +22,7 @@ class Solutions:
     label: str
     """Label: the method with its setting."""
     runs: tuple[Execution, ...]
+    """Executions of the solutions, one for each run."""
     run_ids: tuple[str, ...] = ()
     """Ids of the runs, in the order of ``runs``."""
     unfinished: int = 0

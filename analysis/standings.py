@@ -9,10 +9,12 @@ from collections.abc import Iterable, Mapping
 
 import pandas as pd
 
-from coartic.analysis.frames import ranking
-from coartic.analysis.method_frame import with_joined_learners
+from coartic.analysis.frames import compared_tasks, ranking
+from coartic.analysis.method_frame import BY_TRIAL, with_joined_learners, without_settings
 from coartic.analysis.study import Study, cached
+from coartic.analysis.words import interval, number
 from coartic.internal.text import counted
+from coartic.runs.plan import trials_in
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
@@ -43,7 +45,8 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method of :func:`compared` on some tasks. Raises KeyError for others.
+    """Return the runs of a method on some tasks, failed ones too. Raises KeyError for a label that
+    :func:`compared` does not have.
 
     No rows if the method has no run on one of the tasks, or if it is a row of
     :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.
@@ -61,20 +64,51 @@ def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
 
 @cached
 def common_tasks(study: Study) -> tuple[str, ...]:
-    """Return the names of the tasks over which algorithms are compared, in the order of the study.
-
-    The tasks of that method for which the number of its tasks, times the number of algorithms that
-    ran on all of them, is largest. Empty if no method is compared.
-    """
+    """Return the names of the tasks over which algorithms are compared (:func:`.compared_tasks`),
+    in the order of the study. Empty if no method is compared."""
     every = compared(study).items()
-    sets = [(study.methods.algorithm[method], {*runs.task}) for method, runs in every]
+    on = compared_tasks((study.methods.algorithm[method], {*runs.task}) for method, runs in every)
+    return tuple(task for task in study.tasks if task in on)
 
-    def pairs(tasks: set[str]) -> tuple[int, int]:
-        algorithms = len({algorithm for algorithm, on in sets if on >= tasks})
-        return len(tasks) * algorithms, len(tasks)
 
-    widest = max((tasks for _, tasks in sets), key=pairs, default=set())
-    return tuple(task for task in study.tasks if task in widest)
+@cached
+def equal_trials(study: Study) -> int:
+    """Return the number of trials of a run with which methods are ranked: the number in the suite's
+    file or, where no compared method has it, the number of most algorithms, the least of several;
+    the most that a run made, where no method has such a parameter."""
+    asked, algorithms = _trials_asked(study), dict[int, set[str]]()
+    for method in compared(study):
+        for part in study.methods.parts[method]:
+            if asked[part] and study.methods.information[method] == BY_TRIAL:
+                algorithm = study.methods.algorithm[method]
+                algorithms.setdefault(asked[part], set()).add(algorithm)
+    by_suite = study.plan[0].suite_trials
+    if by_suite in algorithms:
+        return by_suite
+    if not algorithms:
+        return int(study.runs.trials.max())
+    return max(sorted(algorithms), key=lambda n: len(algorithms[n]))
+
+
+@cached
+def trials_of(study: Study) -> dict[str, int]:
+    """Return the number of trials of a run of each row of :attr:`.Study.methods`, by label:
+    :func:`equal_trials` for a method that has no such parameter and made no more, and for a method
+    that does not use the reward of trials."""
+    asked, equal = _trials_asked(study), equal_trials(study)
+    made = study.runs.groupby("label").trials.max()
+    return {
+        str(label): max(asked[part] or max(int(made[part]), equal) for part in row.parts)
+        if row.information == BY_TRIAL
+        else equal
+        for label, row in study.methods.iterrows()
+    }
+
+
+@cached
+def _trials_asked(study: Study) -> dict[str, int]:
+    """Return the number of trials that the parameters of each label name; 0 if they name none."""
+    return {job.cell.label: trials_in(job.cell.parameters) for job in study.plan}
 
 
 def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -92,22 +126,49 @@ def common_runs(study: Study) -> pd.DataFrame:
 
 
 @cached
-def board(study: Study) -> pd.DataFrame:
-    """Return a row for each method with a gap, by label, the smallest gap first, with the columns
-    of :func:`.ranking` and of :attr:`.Study.methods`.
+def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
+    """Return the standings: a row for each method with a gap, by label, with the columns of
+    :func:`.ranking` and of :attr:`.Study.methods`, and with ``ranked``.
 
-    Methods that solved every run on :func:`common_tasks` are ranked over these tasks, other methods
-    from files over the tasks on which they solved every run; other built-in methods have no row.
+    Ranked are methods that solved every run on :func:`common_tasks`, in at most
+    :func:`equal_trials`; the smallest gap is first. Below them, not ranked, are methods with more
+    trials, and methods from files or of the labels ``also`` that lack a run or a solution on one of
+    these tasks, over the tasks on which they solved every run. Other methods have no row.
     """
     runs, methods = common_runs(study), study.methods
     parts = [ranking(runs)] if len(runs) else []
     there = {*parts[0].index[parts[0].gap.notna()]} if parts else set()
     for method, every in compared(study).items():
         on_solved = every[every.task.isin(solved_tasks(study, method))]
-        if len(on_solved) and method not in there and not methods.built_in[method]:
+        is_shown = not methods.built_in[method] or method in also
+        if len(on_solved) and method not in there and is_shown:
             parts.append(ranking(together(study, {method: on_solved})))
     rows = pd.concat(parts) if parts else pd.DataFrame(columns=["gap", "share", "runs"])
-    return rows[rows.gap.notna()].sort_values("gap", kind="stable").join(methods)
+    rows = rows[rows.gap.notna()].join(methods)
+    has_more = rows.index.map(trials_of(study)) > equal_trials(study)
+    rows = rows.assign(ranked=rows.index.isin(there) & ~has_more)
+    return rows.sort_values(["ranked", "gap"], ascending=[False, True])
+
+
+def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
+    """Return a sentence for each row of :func:`board` that is not ranked, settings left out: its
+    gap, why it is not ranked, and the gap of the first method on the same tasks."""
+    rows, sentences = without_settings(board(study, also)), []
+    for method in rows.index[~rows.ranked]:
+        on, name = solved_tasks(study, method), study.methods.title[method]
+        text = f"{name} {interval(rows.loc[method], 'gap', scale=100, unit=' %')} is not ranked"
+        reasons = [_on_tasks(study, method)]
+        if trials_of(study)[method] > equal_trials(study):
+            others = number(equal_trials(study))
+            reasons.append(f"{number(trials_of(study)[method])} trials, not {others}")
+        text += f": {'; '.join(filter(None, reasons))}"
+        first = rows.index[0]
+        if rows.ranked.iloc[0] and len(same := runs_on(study, first, on)):
+            gap = ranking(together(study, {first: same})).gap.iloc[0]
+            text += f"; on {'it' if len(on) == 1 else 'these'} {rows.title.iloc[0]} has "
+            text += f"{number(100 * gap, 1)} %"
+        sentences.append(f"{text}.")
+    return sentences
 
 
 def own_methods(study: Study) -> list[str]:
@@ -125,10 +186,25 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
 
 
 def shown_name(study: Study, method: str) -> str:
-    """Return the title of a method, for a method from a file that did not solve every run on
-    :func:`common_tasks` with the number of tasks that it solved of all: ``mine (3 of 8 tasks)``."""
-    row, on = study.methods.loc[method], {*solved_tasks(study, method)}
-    if row.built_in or {*common_tasks(study)} <= on:
-        return str(row.title)
+    """Return the title of a method with what sets its numbers apart from the others:
+    ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
+    :func:`common_tasks`; ``mine (400 trials)`` for another number of trials than
+    :func:`equal_trials`, where its setting does not say it."""
+    row, trials = study.methods.loc[method], trials_of(study)[method]
+    apart = [] if row.built_in else [_on_tasks(study, method)]
+    if trials != equal_trials(study) and "trials=" not in row.setting:
+        apart.append(f"{number(trials)} trials")
+    words = "; ".join(filter(None, apart))
+    return f"{row.title} ({words})" if words else str(row.title)
+
+
+def _on_tasks(study: Study, method: str) -> str:
+    """Return on how many of all tasks a method solved every run, ``3 of 8 tasks``, with the number
+    of its failed runs; empty if it did so on :func:`common_tasks`."""
+    on = {*solved_tasks(study, method)}
+    if {*common_tasks(study)} <= on:
+        return ""
     every = {task for runs in compared(study).values() for task in runs.task}
-    return f"{row.title} ({len(on)} of {counted(len(every), 'task')})"
+    failed = int(compared(study)[method].reward.isna().sum())
+    more = f", {counted(failed, 'failed run')}" if failed else ""
+    return f"{len(on)} of {counted(len(every), 'task')}{more}"

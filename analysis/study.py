@@ -46,7 +46,7 @@ from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 
 CellKey = tuple[str, str]
-"""Name of a task, and label of a method: its id with its setting."""
+"""Name of a task, and label of a method: its id with its setting, ``cma-es/bandit sigma=0.1``."""
 
 
 UNITS = {
@@ -68,7 +68,7 @@ def solved(runs: pd.DataFrame) -> pd.DataFrame:
 
 def typical_run(runs: pd.DataFrame) -> str:
     """Return the id of the run with the reward nearest to the median, the first of several. All
-    runs need a solution (:func:`solved`)."""
+    runs must have a solution, status ``ok``."""
     rewards = runs.reward.to_numpy(dtype=np.float64)
     return str(runs.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
@@ -129,7 +129,7 @@ def load(folder: str | Path) -> Study:
                 "or has a part of the runs. Repeat the `coartic run` command, which does what is "
                 "missing, or --include all parts in another folder."
             )
-        return Study(folder, plan, store.made_with(), runs, store.late_imports())
+        return Study(folder, plan, store.made_with(), runs, store.marks())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,8 +143,9 @@ class Study:
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     stored: pd.DataFrame
     """Runs as stored, a row for each; :attr:`runs` has further columns."""
-    late_imports: dict[str, list[str]] = field(default_factory=dict)
-    """Files that runs loaded too late to count as code of their method, by the method's id."""
+    marks: dict[str, list[str]] = field(default_factory=dict)
+    """What was found against methods, sentences by the method's id: code that was loaded too late,
+    and results that depend on earlier runs."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -177,7 +178,7 @@ class Study:
         Returns
         -------
         Study
-            Gaps are as in this study: best known rewards are of all its methods.
+            A new study. Its gaps are the same as here: best known rewards are of all methods here.
 
         Raises
         ------
@@ -200,7 +201,7 @@ class Study:
         kept = pd.MultiIndex.from_tuples([(job.cell.task.name, job.cell.label) for job in jobs])
         of = pd.MultiIndex.from_frame(self.runs[["task", "label"]])
         stored = self.stored[of.isin(kept)]
-        part = Study(self.folder, jobs, self.made_with, stored, self.late_imports)
+        part = Study(self.folder, jobs, self.made_with, stored, self.marks)
         vars(part)["optima"] = {
             name: self.optima[name] for name in part.tasks if name in self.optima
         }
@@ -213,7 +214,7 @@ class Study:
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
-        """Tasks by name, with titles that differ (:func:`.titled_apart`)."""
+        """Tasks by name; of tasks with equal titles the titles here have the names, too."""
         tasks = {job.cell.task.name: job.cell.task for job in self.plan}
         return {task.name: task for task in titled_apart(tasks.values())}
 
@@ -224,10 +225,10 @@ class Study:
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """Best known rewards by name of the task, with proven bounds and sources; tasks without one
-        are left out (:func:`.best_known`).
+        """Best known rewards by name of the task, with proven bounds and sources; tasks without a
+        best known reward are left out (:func:`.best_known`).
 
-        The reward of :attr:`corrective_best` where it is higher than all others.
+        The reward of :attr:`corrective_best` counts where it is higher than all others.
         """
         rewards = best_known(self.stored, self.tasks.values())
         for name, best in rewards.items():
@@ -238,8 +239,8 @@ class Study:
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
-        """Reward, ticks, of the corrective process alone with its best hands, by name of the task:
-        the zero of gain, share and targets.
+        """Reward, negative ticks, of the corrective process alone with its best hands, by name of
+        the task: the zero of gain, share and targets.
 
         With the task's initial hands where there are over 4,096 hand sequences; NaN if the
         corrective process completes the task with none of these hands.
@@ -291,26 +292,29 @@ class Study:
     def methods(self) -> pd.DataFrame:
         """A row for each method with its setting, by label, in the order of lists and figures.
 
-        Two conditions of the learner can make a further row: EC1 on tasks for one arm and EC4 on
-        tasks for two arms. Columns:
+        Two conditions of the learner can make a further row, the first on tasks for one arm, the
+        second on tasks for two arms: EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4.
+        Columns:
 
         - ``base``: id of the method without a setting;
         - ``condition``: exploration condition of the learner; empty for other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
-        - ``parts``: labels of its runs; where two have runs on a task, those of the last count;
+        - ``parts``: labels of its runs, a tuple of one text, or two of a joined row, in which runs
+          of the second label count on a task with runs of both;
         - ``title``: name on the page, in tables and figures;
         - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
         - ``is_learner``: True for the paper's learner under the paper's conditions;
         - ``is_search``: True for searches for the optimum, which are references;
-        - ``information``: use of the reward, one of three groups;
+        - ``information``: use of the reward: ``using the reward of each trial``, ``using the reward
+          as a formula`` or ``not using the reward``;
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with whatever setting, represents its algorithm;
-        - ``under``: label of the method of a setting or ablation, if this method ran; or empty;
-        - ``look``: colour and mark in figures.
+        - ``under``: of a setting or ablation, label of its method, if this method ran; or empty;
+        - ``look``: names of colour and mark in figures, a tuple of two texts.
         """
-        return methods_of(self.runs, self.declared, self.late_imports)
+        return methods_of(self.runs, self.declared, self.marks)
 
     @cached_property
     def cells(self) -> dict[CellKey, pd.DataFrame]:
@@ -338,14 +342,16 @@ class Study:
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
-        """A row for each movement of the solutions (docs/results.md), of all runs of the folder,
-        also in a study by :meth:`only`."""
+        """A row for each movement of the solutions: ``run_id``, ``order``, ``goal``, ``hand``,
+        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder, also in a study
+        by :meth:`only`."""
         with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id of each run that made trials, with the rewards of its trials, ticks, shape
-        ``(trials,)``, NaN for failed trials; of all runs, as :attr:`solutions`."""
+        """Yield the id of each run that made trials, with the rewards of its trials, negative
+        ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept; of all
+        runs of the folder, also in a study by :meth:`only`."""
         with open_results(self.folder) as store:
             yield from store.rewards()
 
@@ -356,17 +362,17 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Names as in :attr:`runs`; a setting follows its method: ``"random-search
-            sigma=0.1"``. Conditions of the learner may go by their own names, ``"EC4"``.
+            Name of the task, and label of the method, its id with its setting:
+            ``"random-search sigma=0.1"``; for conditions of the learner also ``"EC4"``.
         replay : bool
             Execute the noiseless trial after learning in place of the solution, for runs that have
-            such a trial. The solution of a learner is its best trial; the replay shows what was
-            learned without this selection.
+            a replay. The solution of a learner is its best trial; the replay shows what was learned
+            without this selection.
 
         Returns
         -------
         Solutions
-            Executions of the first 500 solved runs, of those with a replay for ``replay``.
+            Executions of the first 500 solved runs, for ``replay`` only of runs with a replay.
 
         Raises
         ------
@@ -400,7 +406,7 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Names as in :meth:`executed`.
+            Name of the task, and label of the method, its id with its setting; also ``"EC4"``.
         replay : bool
             Take the noiseless trial after learning in place of the solution.
 
@@ -408,6 +414,11 @@ class Study:
         -------
         ndarray, shape (runs, goals, dof)
             Configurations, length unit (base) and rad (joints); of the first 500 solved runs.
+
+        Raises
+        ------
+        CoarticError
+            The folder has no runs of the method on the task, or they cannot be executed again.
         """
         return self.executed(task, method, replay=replay).configurations
 
@@ -436,14 +447,16 @@ class Study:
 
     @cached
     def _signature_of_each(self, name: str, task: str, method: str, *, replay: bool) -> Array:
-        """Return a signature of each run of :meth:`executed`, ``(n,)``; NaN for runs without it."""
+        """Return a signature of each run of :meth:`executed`, ``(n,)``; NaN for runs that lack
+        it."""
         return signature_named(name).each(self.executed(task, method, replay=replay))
 
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
         """Return a signature of the runs of a method on a task, shape ``(n,)``: of the first 500
-        solved runs, without the runs that lack the signature. ``name`` and ``replay`` are as in
-        :meth:`signature`, ``task`` and ``method`` (a label) as in :attr:`runs`."""
+        solved runs, without the runs that lack the signature. ``name`` is in
+        ``coartic.analysis.SIGNATURES``; ``method`` is a label, the id with its setting; ``replay``
+        takes the noiseless trial after learning. Raises CoarticError for unknown names."""
         values: Array = self._signature_of_each(name, task, method, replay=replay)
         return values[np.isfinite(values)]
 
@@ -452,8 +465,8 @@ class Study:
         """Return a signature of a method's runs on a task by hand sequence, in alphabetical order.
 
         Arrays have shape ``(n,)``; runs without the signature are left out. Signature ``hand``, the
-        choice of hands itself, has one entry ``""`` for all hand sequences together. Parameters are
-        as in :meth:`signature_of`.
+        choice of hands itself, has one entry ``""`` for all hand sequences together. ``name`` is in
+        ``coartic.analysis.SIGNATURES``; ``method`` is a label, the id with its setting.
         """
         values = self._signature_of_each(name, task, method, replay=False)
         runs = self.executed(task, method).runs
@@ -464,17 +477,17 @@ class Study:
     @cached
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
-        runs of each method on each task, of all runs as :attr:`solutions`; runs without a replay
-        are left out."""
+        runs of each method on each task, also in a study by :meth:`only`; for ``replay`` runs
+        without a replay are left out."""
         with open_results(self.folder) as store:
             return store.movements(part, MOST_EXECUTED)
 
 
 @cached
 def one_by_one(study: Study) -> dict[str, Task]:
-    """Return the tasks that a report shows one by one, by name: all tasks, but no instances of
-    families, changed ones such as ``two-armed/v1/i017.radius-0.2`` included, if there are more than
-    eight of them."""
+    """Return the tasks that a report shows one by one, by name: all tasks, except that instances of
+    families, also changed ones such as ``two-armed/v1/i017.radius-0.2``, are left out if there are
+    more than eight instances."""
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     left_out = drawn if len(drawn) > 8 else ()
     return {name: task for name, task in study.tasks.items() if name not in left_out}

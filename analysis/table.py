@@ -12,9 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from coartic.analysis.standings import common_tasks, compared, shown_name
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
+from coartic.internal.text import counted
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -30,8 +32,8 @@ class Column(NamedTuple):
     """Name in the CSV file; the beginning of names if ``ending`` is ``*``."""
     ending: str = ""
     """``[]``: the column has an interval (``gap_low``, ``gap_high``); ``±``: the column has a
-    standard deviation (``ours_sd``); ``*``: all columns that begin with the name; ``[*]``: these,
-    each with an interval."""
+    standard deviation (``ours_sd``); ``*``: all columns that begin with the name; ``[*]``: all such
+    columns, each with an interval; empty: the column alone."""
     header: str = ""
     """Heading; ``{}`` is the rest of a name after its beginning, such as a task. Shares are in per
     cent if the heading has ``(%)``. Empty: only the CSV file has the column."""
@@ -62,10 +64,11 @@ class Table:
     columns: tuple[Column, ...]
     """Columns of the CSV file in their order; ``run_ids``, of the runs behind each row, is last."""
     rows: Callable[[Study], Rows]
+    """Function of a study that yields pairs of a row's name and its values by column."""
 
     def __call__(self, study: Study) -> pd.DataFrame:
-        """Return the table of a study, with :func:`_shown_names` as its ``attrs``. It is cached: do
-        not change it."""
+        """Return the table of a study, a row for each name; its ``attrs`` have titles and other
+        names for showing it. It is cached: do not change it."""
         return _rows_of(study, self)
 
     def _repr_html_(self) -> str:
@@ -117,8 +120,8 @@ class TableFrame(pd.DataFrame):
 @cached
 def _rows_of(study: Study, table: Table) -> pd.DataFrame:
     """Return a table as a DataFrame: a row for each name, and only the columns of the table, with
-    ``_low``, ``_high`` and ``_sd`` written out; NaN where a row has no entry. Its ``attrs`` are
-    those of :func:`_shown_names`."""
+    ``_low``, ``_high`` and ``_sd`` written out; NaN where a row has no entry. Its ``attrs`` have
+    ``titles``, ``under``, ``own`` and ``best_known`` (:func:`_shown_names`)."""
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
@@ -138,17 +141,26 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
 
     ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
     and ablation, by label; ``own``: labels of methods from files; ``best_known``: True if a best
-    known reward does not come from this folder alone.
+    known reward does not come from this folder alone; ``compared``: number of compared tasks, in
+    words.
     """
     methods, tasks = study.methods, study.tasks
+    names = {label: shown_name(study, label) if label in compared(study) else title
+             for label, title in methods.title.items()}  # fmt: skip
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
     marks = {name: marked(task) for name, task in tasks.items()}
     return {
-        "titles": {**families, **marks, **methods.title},
+        "titles": {**families, **marks, **names},
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
+        "compared": counted(len(common_tasks(study)), "task"),
         "best_known": any(not best.only_here for best in study.optima.values()),
     }
+
+
+def caption_of(table: Table, frame: pd.DataFrame) -> str:
+    """Return the caption of a table's frame; ``{tasks}`` in it is the number of compared tasks."""
+    return table.caption.replace("{tasks}", frame.attrs["compared"])
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:
@@ -163,7 +175,9 @@ def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
     """Return the common entries of a row for a cell with these runs: task, method, numbers of runs
     and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.
 
-    A table leaves out entries for which it has no column. Without a solved run numbers are NaN.
+    Entries are ``task``, ``method``, ``runs``, ``solved``, ``reward``, ``reward_sd``,
+    ``reward_median``, ``gap`` and ``run_ids``; a table leaves out entries for which it has no
+    column. Without a solved run reward and gap are NaN.
     """
     rewards = solved(runs).reward.to_numpy(np.float64)
     return {

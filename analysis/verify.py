@@ -58,8 +58,10 @@ PLANNED = (  # all that a plan says
     "SELECT * FROM plan JOIN cells ON cells.id = cell ORDER BY position",
 )
 # Whatever a file says, it is checked in bounded time and memory.
-MOST_GOALS, LONGEST_TEXT, LONGEST_PATH = 256, 100_000, 10_000_000  # characters of tasks, paths
+MOST_GOALS, LONGEST_TEXT, LONGEST_PATH = 256, 100_000, 10_000_000  # characters of tasks, solutions
 MOST_TRIALS, MOST_TICKS, MOST_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run, movement
+LONGEST_VALUE = 50_000_000  # bytes of a value in the file
+NO_PLAN = "It has no plan yet: repeat the `coartic run` command."
 UNCHECKED = (
     "Times, dates, reasons, counts of what was spent, and where and with what it was run are taken "
     "as stored; so is what methods declare, and what the suite was called.",
@@ -100,8 +102,8 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
-    """Return x and y of the hand of ``arm`` (in ``arms`` of :func:`stored_task`) for configurations
-    in the columns of ``q``; ``on_path``: by NumPy's cosine and sine."""
+    """Return x and y of the hand of ``arm`` (slice of joints, lengths of links, shoulder's place)
+    for configurations in the columns of ``q``; ``on_path``: by NumPy's cosine and sine."""
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
     angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
@@ -113,7 +115,7 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 
 def stored_task(definition: str, model: str) -> Any:
     """Return a task from its stored JSON, with its constants of movement (``model``), start
-    (``q0``), locked base coordinates and arms. Raises ValueError if it is too long to check."""
+    (``q0``), locked base coordinates and arms. Raises ValueError for no goal, or too much text."""
     need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
@@ -241,8 +243,8 @@ def check_runs(folder: Path) -> _Report:
     """Execute all stored runs of a results folder again, check its cells and plan; report what
     differs or is unchecked.
 
-    Runs that the last plan does not ask for are among them. Raises sqlite3.Error if the folder
-    cannot be read.
+    Runs that the last plan does not ask for are among them. Raises sqlite3.Error or ValueError if
+    the folder cannot be read.
     """
     with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:
         db.row_factory = sqlite3.Row
@@ -250,9 +252,15 @@ def check_runs(folder: Path) -> _Report:
 
 
 def _check_all(db: sqlite3.Connection) -> _Report:
-    """Check the plan, the cells, and the runs one by one; none if a table or view is foreign."""
+    """Return the report on plan, cells and runs; none is checked if a table or view is foreign."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
+    db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
+    if not db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+        return _Report(0, 0, [], [NO_PLAN], [])
+    for name, ours in (("application_id", 0x636F6172), ("user_version", 6)):
+        (there,) = db.execute(f"PRAGMA {name}").fetchone()
+        need(there == ours, f"its {name} is {there}, and {ours} in a file of coartic of format 6")
     query = f"""SELECT sql FROM sqlite_master WHERE sql IS NOT NULL
         AND (type = 'trigger' OR name IN ({", ".join("?" for _ in OURS)})) ORDER BY type, name"""
     if hash_of([sql for (sql,) in db.execute(query, OURS)])[:16] != SCHEMA:
@@ -296,8 +304,8 @@ def _check_all(db: sqlite3.Connection) -> _Report:
 
 
 def _check_identity(row: Any) -> None:
-    """Raise ValueError if a run is not that of its cell: its id is a hash of the cell, the seed of
-    the suite and the number of the run, and ends with the hash of the code."""
+    """Raise ValueError if the id or the seed of a run does not belong to its cell: the id is a hash
+    of the cell, the seed of the suite and the number of the run, and ends with the code."""
     suite_seed, run = row["suite_seed"], row["run"]
     digits = hashlib.sha256(f"{row['digest']} {suite_seed} {run}".encode()).hexdigest()[:16]
     need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
@@ -309,7 +317,7 @@ def _check_identity(row: Any) -> None:
 def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
     """Yield a sentence for each row that refers to a missing row, contradicts itself or cannot be
     read, and for each name of two tasks in the plan. ``tasks`` gets the task of each cell by id, or
-    what is wrong with it; its digest is a hash of task, method, parameters, constants, budget."""
+    words on what is wrong; a cell's digest is a hash of task, method, parameters, model, budget."""
     for table, number, missing, _ in db.execute("PRAGMA foreign_key_check"):
         yield f"Row {number} of table {table} names a row of {missing} that is not there."
     for row in db.execute("SELECT * FROM cells"):
@@ -341,7 +349,7 @@ def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]
 
 
 def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence if the plan was changed."""
+    """Yield a sentence if the plan is not as it was written, by its stored hash."""
     hashes = [row[0] for row in db.execute("SELECT plan_hash FROM suite")]
     rows = [[*row] for query in PLANNED for row in db.execute(query)]
     if hashes != [hash_of(rows)] and (hashes or rows):
@@ -352,7 +360,7 @@ def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
 def _missing(db: sqlite3.Connection) -> Iterator[str]:
     """Yield a sentence if the plan, or a part of its runs, is not there."""
     if not db.execute("SELECT count(*) FROM suite").fetchone()[0]:
-        yield "It has no plan yet: repeat the `coartic run` command."
+        yield NO_PLAN
     query = """SELECT runs, count(run), min(run) FROM plan LEFT JOIN asked USING (position)
         GROUP BY position"""
     counts = db.execute(query).fetchall()
@@ -373,7 +381,7 @@ def hash_of(content: Any) -> str:
 def _check_rewards(row: Any) -> bytes:
     """Return the rewards of a run as bytes: the best reward, then by how much each trial is worse,
     plus 1, or 0 without a reward; all lowest bytes come first, then the next. Raises ValueError for
-    damage, and for another best trial."""
+    damage, and if the stored best trial is not the first with the reward of the run."""
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
         content = zlib.decompressobj().decompress(row["rewards"] or EMPTY, size + 1)
@@ -391,9 +399,12 @@ def _check_rewards(row: Any) -> bytes:
 
 
 def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
-    """Return the movements of a run by part (empty where it has none), and all as stored, part by
-    part, which the result's hash covers. Raises ValueError for a missing or malformed one."""
+    """Return the movements of a run by part (empty without movements), and a list of all as stored,
+    which the result's hash covers. Raises ValueError for a missing or malformed movement."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
+    query = "SELECT part, sum(length(path)) FROM movements WHERE result_id = ? GROUP BY part"
+    for part, length in db.execute(query, [run]):
+        need(length <= LONGEST_PATH, f"{part} is too long")
     stored: dict[str, list[Any]] = {part: [] for part in STATED}
     query = """SELECT part, "order", goal, hand, kind, ticks, path FROM movements
         WHERE result_id = ? ORDER BY "order\""""
@@ -401,7 +412,6 @@ def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[Mo
         need(order == len(parts[part]), f"movement {len(parts[part])} is missing")
         which, is_count = f"movement {order}", type(ticks) is int and 0 <= ticks <= MOST_TICKS
         need(is_count, f"{which} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
-        need(len(text) <= LONGEST_PATH, f"{which} is too long")
         points = np.array(json.loads(text), dtype=np.float64)
         is_place = points.ndim == 1 + (kind == "path") and len(points)
         need(is_place, f"{which}: {kind} has no such points")
@@ -416,14 +426,14 @@ def main() -> int:
     folder = Path(*sys.argv[1:])
     try:
         report = check_runs(folder)
-    except sqlite3.Error as error:
-        print(f"{folder} cannot be read: {error}.")
-        return 2
-    print(f"{report.runs} runs checked, {report.movements} movements executed.")
-    lines = [*(report.wrong or ["Nothing differs."]), *report.unfinished, "Not checked:"]
-    lines += report.unchecked
+        code = 1 if report.wrong or report.unfinished else 0
+        lines = [f"{report.runs} runs checked, {report.movements} movements executed."]
+        lines += [*(report.wrong or ["Nothing differs."]), *report.unfinished, "Not checked:"]
+        lines += report.unchecked
+    except Exception as error:  # whatever the file holds
+        code, lines = 2, [f"{folder} cannot be read: {error}."]
     print(*("".join(c if c.isprintable() else "?" for c in line) for line in lines), sep="\n")
-    return 1 if report.wrong or report.unfinished else 0
+    return code
 
 
 if __name__ == "__main__":

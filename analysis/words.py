@@ -86,7 +86,7 @@ def p_value(p: float) -> str:
 
 
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
-    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals as in :func:`number`.
+    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals, by default three figures.
 
     Empty for NaN, and for an interval of no length, which would look like certainty.
     """
@@ -131,7 +131,8 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
 
 
 def titled_apart(tasks: Iterable[Task]) -> list[Task]:
-    """Return the tasks in their order, with copies of those that get another title: titles differ.
+    """Return the tasks in their order, so that titles differ: a task that needs another title is
+    replaced by a copy with this title.
 
     The title of a changed task, ``ascending.radius-0.2``, is the title of its task and the change.
     Other tasks with the same title have their names in the title.

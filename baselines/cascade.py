@@ -36,7 +36,7 @@ LIMIT = 2.0
 """Largest change of any joint; where it binds, level 1 falls short."""
 
 SLACK = 1e-6
-"""Length unit: where limits bind, level 2 would be left with a single point."""
+"""ε, length unit: without it level 2 would be left with a single point where limits bind."""
 
 
 class Solution(NamedTuple):
@@ -54,7 +54,8 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
     """Solve level 1, then level 2, and return the changes x of the joints.
 
     ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
-    ``(m,)``; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver fails.
+    ``(m,)``, length unit; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver
+    fails.
     """
     joints = rows.shape[1]
     weights = np.diag([2.0] + [2.0 * DAMPING**2] * joints)
@@ -68,8 +69,9 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
 def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
-    """Solve one level, 1 or 2; return its variables (the changes; for level 1 the slack s, then the
-    changes) and the number of iterations. Raises MethodError if the solver fails."""
+    """Minimise ½ vᵀ H v + gᵀ v (``hessian`` H, ``gradient`` g) under the limits of ``level``, 1 or
+    2, with A ``rows`` and b ``least``; return the variables v (the changes; for level 1 the slack
+    s, then the changes) and the number of iterations. Raises MethodError if the solver fails."""
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))
     matrix[:task, :-joints] = -1.0

@@ -42,13 +42,16 @@ class Leg(NamedTuple):
     """The path from the start, or from one goal, to the next."""
 
     movement: Movement
+    """Movement of kind ``path`` to the goal."""
     ticks: int
+    """Control ticks of the movement."""
     q: Array
     """Configuration in which the goal is hit, shape ``(dof,)``."""
     memory: Any
     """Memory of the controller when the goal is hit, with which the next leg goes on."""
     steps: NDArray[np.int64]
-    """Numbers of control steps: all, and those in which level 1 and level 2 bind."""
+    """Numbers of control steps, shape ``(3,)``: of all, of steps in which level 1 binds, and of
+    steps in which level 2 binds."""
 
 
 class _StuckError(Exception):
@@ -57,7 +60,7 @@ class _StuckError(Exception):
 
 @dataclass
 class Controller(ABC):
-    """The control loop on one task; the session counts what it spends."""
+    """The control loop on one task; the session counts evaluations and iterations."""
 
     session: Session
     task: Task
@@ -75,17 +78,19 @@ class Controller(ABC):
 
     @abstractmethod
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
-        """Return the memory (what the controller keeps from step to step) with which it begins the
-        leg from configuration ``q`` to the goal of the first of ``aims``, pairs of hand and goal;
-        ``memory`` is the memory at the end of the leg before, None for the first leg."""
+        """Return the memory (data that the controller keeps from step to step, of its own kind)
+        with which it begins the leg from configuration ``q`` to the goal of the first of ``aims``,
+        pairs of hand and goal; ``memory`` is the memory at the end of the leg before, None for the
+        first leg."""
 
     @abstractmethod
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Any, first: bool
     ) -> tuple[Solution, Array, Any]:
         """Return three things for a control step from ``q``: the solution of the cascade; the
-        changes that the joints prefer; the memory after the step. Changes are of the joints that
-        are not locked, in lengths of a control step. ``first``: it is the first step of a leg."""
+        changes that the joints prefer, ``(joints,)``; the memory after the step. Changes are of the
+        joints that are not locked, in lengths of a control step. ``aims``: the goal of the leg with
+        its hand, then goals ahead. ``first``: True for the first step of a leg."""
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
         """Simulate control steps until the hand of the first of ``aims`` is in its goal, from the
@@ -129,8 +134,9 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Solve the cascade (:func:`solve_cascade`) and return its solution; count two programmes
-        in ``solves``, and the iterations in the session."""
+        """Solve level 1, then level 2 of the cascade (:func:`solve_cascade`) and return the changes
+        of the joints; count two programmes in ``solves``, and the iterations in the session. Raises
+        MethodError if the solver fails."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
@@ -182,13 +188,14 @@ class Control(Method):
     """Goals after the current one that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has too many hand sequences to simulate; None if it has
-        not."""
+        """Return a sentence that a task has more than 4096 hand sequences, too many to simulate;
+        None for fewer."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """Simulate the control of all hand sequences as far as they can be best; return the paths
-        of the sequence with the fewest ticks (:meth:`search`)."""
+        """Simulate the control of all hand sequences as far as they can be best; return the paths,
+        a movement for each goal, of the sequence with the fewest ticks. Raises MethodError if the
+        hand gets stuck in all sequences, or the solver fails."""
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)
         ordered = [hand for hand in HANDS if hand in task.hands]
@@ -200,7 +207,7 @@ class Control(Method):
         """Return the paths, a movement for each goal, of the candidate (hand sequence) with the
         fewest ticks: the candidate with the fewest ticks so far is extended by a leg until one is
         complete. Of equal candidates the one with the fewest changes of hand is kept, then the
-        first. Raises MethodError if the hand gets stuck in all of them."""
+        first. Raises MethodError if the hand gets stuck in all candidates."""
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)

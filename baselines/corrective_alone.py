@@ -48,8 +48,8 @@ class BestHands(Method):
     stochastic = False
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has too many hand sequences to try one by one; None if it
-        has not."""
+        """Return a sentence that a task has more than 4096 hand sequences, too many to try one by
+        one; None for fewer."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:

@@ -47,7 +47,8 @@ class HillClimbing(Method):
         hopeless: set[str] = set()  # A alone does not complete them, ever
 
         def draw() -> str:
-            """Draw a hand sequence around the best one; uniformly if none has succeeded yet."""
+            """Return a hand sequence drawn around the best one, or, if none has succeeded yet,
+            uniformly; never a hopeless one."""
             while True:
                 chosen = list(attempts.hands or letters[0] * session.goals_count)
                 for goal in range(len(chosen)):

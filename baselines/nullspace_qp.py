@@ -43,9 +43,10 @@ class HandController(Controller):
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
     ) -> tuple[Solution, Array, Array]:
-        """Return the solution for a control step from ``q`` that moves the hand straight to its
-        goal, and the joints as near to what they prefer as that allows; the changes that they
-        prefer, shape ``(joints,)``; and ``memory``, unchanged. ``first`` is not used."""
+        """Return three things for a control step from ``q``: the solution, which moves the hand
+        straight to its goal, and the joints as near to the changes that they prefer as that allows;
+        these preferred changes, shape ``(joints,)``; and ``memory``, unchanged. ``first`` is not
+        used."""
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)

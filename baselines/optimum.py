@@ -32,16 +32,18 @@ class OptimumParameters(Parameters):
     """The restriction, and how long to search."""
 
     other_arm: Literal["free", "still"] = "free"
-    """``still``: the arm that is not chosen does not move."""
+    """``still``: the arm whose hand is not chosen for a goal does not move on the way to it."""
     base: Literal["task", "y", "xy"] = "task"
-    """Base coordinates that are locked: those of the task, or these in addition."""
+    """Base coordinates that are locked in addition to the task's own locks: ``y``, ``xy``, or none
+    for ``task``."""
     nodes: Nodes = 200
     """Postures per goal and hand."""
     graphs: Count = 3
     """Independent graphs, or more, until there are as many ``chains``."""
     chains: Count = 100
-    """Starts, over all graphs and hand sequences, each with the other arm spread out, too. With
-    three, the best path known was missed on 9 of 40 random tasks for one arm."""
+    """Least number of starts, over all graphs and hand sequences, each also with the idle arm
+    moving in equal steps. With three, the best path known was missed on 9 of 40 random tasks for
+    one arm."""
 
 
 class OptimumSearch(Method):

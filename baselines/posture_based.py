@@ -194,8 +194,9 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """Return, by goal (from 0) and hand, copies of those stored postures whose hand correction
-        brings to the goal, as corrected, shape ``(n, dof)``; the other arm is as in ``q``."""
+        """Return, by goal (from 0) and hand, copies of the stored postures, corrected so that the
+        hand is at the goal, shape ``(n, dof)``; postures that correction cannot bring there are
+        left out. The other arm has its joint angles in ``q``."""
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))
@@ -302,12 +303,13 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Keep at the beginning of ``far`` (indices of postures), in place, those whose hand is farther
-    than ``tolerance`` from (x, y), and return their number.
+    """Keep at the beginning of ``far`` (indices of postures), in place, the postures whose hand is
+    farther than ``tolerance``, length unit, from (x, y), and return their number.
 
-    For each of these, in order, fill a row of ``wanted`` with the step that the hand is to make
-    towards (x, y), at most ``_LONGEST`` far, and of ``jacobian`` with the columns of the arm's
-    joints. ``xs`` and ``ys``, an entry for each joint and the hand, are work space.
+    For each of these, in order, fill a row of ``wanted``, ``(n, 2, 1)``, with the step that the
+    hand is to make towards (x, y), at most 0.5 length units, and of ``jacobian``, ``(n, 2, dof)``,
+    with the columns of the arm's joints. ``xs`` and ``ys``, an entry for each joint and the hand,
+    are work space.
     """
     tip = len(arm.links)
     left = 0

@@ -32,8 +32,8 @@ Nodes = Annotated[int, Field(ge=10, le=1000)]
 Count = Annotated[int, Field(ge=1)]
 """Parameter: a number of graphs, chains or starts."""
 BEAM_WIDTH = 64
-"""Hand sequences that are planned for each graph: all where there are no more, with two hands up to
-six goals; else those that a beam of this width over the goals ends with."""
+"""Most hand sequences that are planned for each graph: all sequences of two hands for up to six
+goals; of more sequences those with which a beam search of this width over the goals ends."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first
@@ -84,9 +84,11 @@ class Beginning(NamedTuple):
     nodes: dict[Hand, Array]
     """Nodes of the layer in which each hand was last used."""
     cost: Array
-    """``cost[i, j]``: the cheapest way to node i of the hand used last and j of the other."""
+    """``cost[i, j]``: the joint-space length of the shortest chain to node i of the hand used last
+    and node j of the other hand."""
     back: tuple[NDArray[np.int32], ...]
-    """For each goal, the node that a state came from."""
+    """For each goal, ``back[i, j]``: the index of the node from which the chain came to this
+    state."""
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
@@ -114,7 +116,8 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
 def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain]:
     """Return the cheapest chain of nodes of each hand sequence that has a chain, in alphabetical
     order: the hands, and a configuration for each goal. At each goal the ``most`` cheapest
-    beginnings of sequences are kept (None: all); with no more sequences than that none is lost."""
+    beginnings of sequences are kept (None: all); if there are at most so many sequences, no chain
+    is lost."""
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
     kept = [Beginning((), start, np.zeros((1, 1)), ())]
     for _ in range(len(task.goals)):
@@ -178,9 +181,9 @@ def cheapest_chains(
     """Yield hands and configurations ``(G, dof)`` of the cheapest chain of each hand sequence, at
     most ``most`` a graph in alphabetical order (:func:`chains_of`), of ``graphs`` random graphs
     with ``nodes`` postures per goal and hand, then of more graphs until at least ``chains`` are
-    yielded. With ``spread`` and two hands each chain is followed by its :func:`move_other_arm`,
-    which is not one of the ``chains``. The session counts the evaluations. Raises MethodError if a
-    goal has no posture in a graph."""
+    yielded. With ``spread`` and two hands each chain is followed by a copy in which the idle arm
+    moves in equal steps (:func:`move_other_arm`), which does not count for ``chains``. The session
+    counts the evaluations. Raises MethodError if a goal has no posture in a graph."""
     yielded = 0
     for number in itertools.count(1):
         layers, spent = sample_layers(task, nodes, rng)
@@ -203,8 +206,8 @@ def cheapest_chains(
 
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     """Return a copy of a chain's configurations, shape ``(G, dof)``, in which each arm moves in
-    equal steps from goal to goal between those that its hand hits, at first from the start; after
-    the last of them it keeps still."""
+    equal steps, goal by goal, from the start to the first goal that its hand hits and from each
+    such goal to the next; after its last goal it keeps still."""
     configurations = chain.copy()
     for hand in task.hands:
         joints = task.robot.joints(hand)

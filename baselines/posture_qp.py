@@ -89,8 +89,8 @@ class PostureController(Controller):
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array], first: bool
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
         """Update the postures, unless the step is the ``first`` of a leg, and solve for a control
-        step from ``q`` towards the posture of the current goal. Returns the solution, the preferred
-        changes and the postures by aim (:meth:`Controller.step`)."""
+        step from ``q`` towards the posture of the current goal. Return the solution, the preferred
+        changes, ``(joints,)``, in lengths of a control step, and the postures by aim."""
         postures = [memory[aim] for aim in aims]
         if not first:
             self.sweep(q, aims, postures)
@@ -124,10 +124,10 @@ class PostureController(Controller):
         return postures
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Replace each posture in the list ``postures`` by one a step nearer to where the path from
-        ``q`` through all is shortest; return the largest length that :meth:`step_nearer` returns.
-        The sum of two distances is least where their ends, each weighted by the inverse of its
-        distance, have their mean (Weiszfeld 1937)."""
+        """Replace each posture in the list ``postures`` by a posture a step nearer to where the
+        path from ``q`` through all is shortest; return the largest length of these steps, length
+        unit and rad mixed (:meth:`step_nearer`). The sum of two distances is least where their
+        ends, each weighted by the inverse of its distance, have their mean (Weiszfeld 1937)."""
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]

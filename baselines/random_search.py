@@ -67,18 +67,18 @@ class RandomSearchParameters(RandomSearchHandsParameters):
     """Parameters of random search."""
 
     hands: str | None = None
-    """Hand sequence; by default the sequence with which the corrective process alone does best, or
-    the task's own where there are too many to try."""
+    """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
+    alone gets the highest reward, or the task's initial one where more than 4096 exist."""
 
 
 def draw_trials(
     session: Session, hands: str | None, parameters: RandomSearchHandsParameters
 ) -> tuple[Attempts, int]:
-    """Make trials with noise until none is left; return the trials, which keep the best, and how
-    many had noise.
+    """Make trials with noise until none is left; return the trials, which keep the best one, and
+    the number of trials with noise.
 
     ``hands``: a hand sequence, or None for the sequence with which the corrective process alone
-    does best. ``parameters.trials``: most trials, those of the corrective process alone among them.
+    does best. ``parameters.trials``: most trials, with trials of the corrective process alone.
     Raises MethodError for no trial at all, and if the process completes no hand sequence.
     """
     attempts = Attempts(session, parameters.trials)
@@ -118,8 +118,8 @@ def _follows(session: Session, hands: str) -> NDArray[np.bool_]:
 
 
 class RandomSearchHands(Method):
-    """Random search that divides its trials evenly among all hand sequences; with the task's own
-    sequence alone where there are too many."""
+    """Random search that divides its trials evenly among all hand sequences; if more than 4096
+    exist, it has the task's initial hand sequence alone."""
 
     name = "random-search/hands"
     tuned_on = "nothing: the paper's values"
@@ -133,12 +133,14 @@ class RandomSearchHands(Method):
     Parameters = RandomSearchHandsParameters
 
     def most_together(self) -> int:
-        """Return the largest number of runs that one job performs (:func:`runs_at_once`)."""
+        """Return the largest number of runs that one job performs: 72, or fewer if they have more
+        than 4,000,000 trials together; at least 1. These runs are made one after the other."""
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
         """Make equal shares of the trials with one hand sequence after the other; return the
-        movements of the best trial. Raises MethodError if the corrective process completes none."""
+        movements of the best trial. Raises MethodError if the corrective process completes no hand
+        sequence."""
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
@@ -167,10 +169,10 @@ class RandomSearch(RandomSearchHands):
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials with one hand sequence, parameter ``hands`` or by default the one with which
-        the corrective process alone does best, until none is left; return the movements of the best
-        trial. Raises MethodError if there is no trial to make, or if the corrective process alone
-        misses a goal."""
+        """Make trials with one hand sequence, parameter ``hands`` or by default the sequence with
+        which the corrective process alone does best, until none is left; return the movements of
+        the best trial. Raises MethodError if there is no trial to make, or if the corrective
+        process alone misses a goal with this sequence, or by default with every sequence."""
         parameters: RandomSearchParameters = self.parameters
         with session.solving():
             best, evaluations = draw_trials(session, parameters.hands, parameters)

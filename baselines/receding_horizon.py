@@ -43,7 +43,7 @@ class RecedingHorizonParameters(Parameters):
     """The horizon, and the effort of the search."""
 
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
-    """Goals in view beyond the one to be hit; all where there are no more."""
+    """Number of goals in view beyond the one to be hit; at the end of a task fewer."""
     nodes: Nodes = 200
     """Postures per goal of a posture graph, shared by the hands: with two, half as many each."""
     graphs: Count = 3
@@ -51,8 +51,8 @@ class RecedingHorizonParameters(Parameters):
     chains: Count = 24
     """Chains of each window, over all graphs and hand sequences."""
     starts: Count = 24
-    """Starts of each window that are polished, the shortest: all chains, and all of them with the
-    other arm spread out, are ranked by length."""
+    """Number of starts of each window that are polished, the shortest: all chains, each also with
+    the idle arm moving in equal steps, are ranked by length."""
 
 
 class RecedingHorizon(Method):

@@ -26,7 +26,7 @@ class ShortestPlans(NamedTuple):
     """The plans found from many starts."""
 
     by_hands: dict[HandSequence, PathPlan]
-    """The shortest plan of each hand sequence that has one."""
+    """The shortest plan of each hand sequence for which a solve converged."""
     solves: int  # one for each start
     failed: int  # solves that did not converge
 
@@ -40,7 +40,9 @@ class PlanInTicks(NamedTuple):
     """A plan in whole ticks."""
 
     movements: tuple[Movement, ...]
+    """A movement for each goal."""
     execution: Execution
+    """Execution of these movements."""
     plan: PathPlan
     """The plan that was rounded."""
 
@@ -54,8 +56,9 @@ def shortest_plans(
     still: bool,
 ) -> ShortestPlans:
     """Solve from each start, a hand sequence and configurations ``(G, dof)``; return the shortest
-    plan of each hand sequence. With ``still`` the arm that is not chosen for a goal does not move.
-    The session counts the effort. Raises MethodError if no solve finds a path."""
+    plan of each hand sequence. With ``still`` the arm whose hand is not chosen for a goal does not
+    move on the way to it. The session counts the effort. Raises MethodError if no solve finds a
+    path."""
     best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
     for hands, start in starts:

@@ -40,21 +40,21 @@ class TrajectoryParameters(Parameters):
     """The hand sequences that are planned, and the starts of each."""
 
     most_sequences: Count = BEAM_WIDTH
-    """Hand sequences that are planned for: all where there are no more, with two hands up to six
-    goals; else those that a beam of this width over the goals ends with in some graph."""
+    """Most hand sequences that are planned in a graph: all sequences of two hands for up to six
+    goals; of more sequences those with which a beam search of this width over the goals ends."""
     nodes: Nodes = 150
     """Postures per goal and hand in a graph."""
     graphs: Count = 3
     """Independent graphs, one or two starts for a hand sequence from each. With one, the best
     path was missed on 3 of 23 small random tasks."""
     chains: Count = 30
-    """Chains of all hand sequences, from as many further graphs as that takes."""
+    """Least number of chains of all hand sequences, from as many further graphs as are needed."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
 
 
 class SmoothParameters(TrajectoryParameters):
-    """The plans and starts, and whether the plan stops."""
+    """The hand sequences and starts, and whether plans stop at goals."""
 
     stop: Literal[0, 1] = 0
     """1: the plan comes to a full stop at each goal, where velocities, for jerk accelerations too,
@@ -70,8 +70,8 @@ class JerkParameters(SmoothParameters):
 
 
 class HandJerkParameters(JerkParameters):
-    """One start for a hand sequence, as a plan by jerk of the hand takes some four times as long;
-    on the paper's tasks a second one found no other plan for any of them."""
+    """One start for a hand sequence, because a plan by jerk of the hand takes some four times as
+    long; on the paper's tasks a second start found no other plan for any hand sequence."""
 
     graphs: Count = 1
     """Independent graphs, one start for a hand sequence from each."""
@@ -88,8 +88,8 @@ def cheapest_plan(
     stops: bool = False,
 ) -> PathPlan:
     """Solve from each of ``starts``, configurations ``(G, dof)``; return the cheapest plan that
-    converged, or, if none did, the plan of the last start. ``stops`` as in
-    :meth:`~.trajectory_problem.TrajectoryProblem.solve`. The session counts the effort."""
+    converged, or, if none did, the plan of the last start. With ``stops`` velocities (for jerk also
+    accelerations) are 0 at each goal. The session counts the effort."""
     plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
@@ -166,9 +166,9 @@ class TrajectoryOptimisation(Method):
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
         """Return a list of starts, each ``(G, dof)``, for each hand sequence planned: the cheapest
-        chain of each graph, but for jerk of the hand the same chain with the other arm in even
-        motion, and copies of the first start with noise. Raises MethodError if a goal has no
-        posture."""
+        chain of each graph; except for jerk of the hand, each chain also with the idle arm moving
+        in equal steps; and copies of the first start with noise. Raises MethodError if a goal has
+        no posture."""
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(

@@ -55,7 +55,7 @@ MODEL_BASED = frozenset(
 
 Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
 JOINT_WEIGHT = 0.1
-"""Weight of joint jerk beside jerk of the hand, (length unit / rad)²."""
+"""Weight of joint jerk relative to jerk of the hand, (length unit / rad)²."""
 _NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(6)  # on [-1, 1], of each segment
 
 _ONE_AT_A_TIME = RLock()
@@ -94,9 +94,11 @@ class Instance:
     """Start, goals, hand of each goal and joints that cannot move: the parameters of one solve."""
 
     q0: Array
+    """Starting configuration, shape ``(dof,)``, length unit and rad."""
     goals: Array
-    """Goal centres, shape ``(G, 2)``."""
+    """Goal centres, shape ``(G, 2)``, length unit."""
     hands: tuple[Hand, ...]
+    """Hand of each goal."""
     held: NDArray[np.bool_]
     """Joints that cannot move on the way to each goal, bool, shape ``(G, dof)``."""
     radius: float
@@ -105,7 +107,8 @@ class Instance:
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
         """Return the instance of a task with a hand for each goal; each hand is to end within
-        ``radius``, length unit, of its goal's centre. ``still`` as in :func:`held_joints`."""
+        ``radius``, length unit, of its goal's centre. With ``still`` the arm whose hand is not
+        chosen for a goal cannot move on the way to it."""
         held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
 

@@ -39,10 +39,11 @@ class Attempts:
         """Joints that are explored at each goal, shape ``(G, dof)``."""
         left = session.trials_left
         self.left = trials if left is None else min(trials, left)
-        """Trials left, of ``trials`` at most."""
+        """Number of trials left, at most ``trials``."""
         self.trials_made = 0
+        """Number of trials made."""
         self.reward = -math.inf
-        """Best reward so far."""
+        """Best reward so far; -inf before the first success."""
         self.hands = ""
         """Hand sequence of the best trial, empty before the first success."""
         self.best_trial = -1
@@ -54,14 +55,15 @@ class Attempts:
 
     def by_correction(self, *hands: str) -> Trials:
         """Make a trial without targets, in which the corrective process alone goes to each goal,
-        with each of some hand sequences such as ``"RRLR"``; return the results
-        (:meth:`by_targets`)."""
+        with each of some hand sequences such as ``"RRLR"``; remember the best trial, and return the
+        results of all trials made."""
         shape = (len(hands), self._session.goals_count, self._session.dof)
         return self.by_targets([*hands], np.full(shape, np.nan))
 
     def around(self, hands: str, values: Array) -> Trials:
-        """Make N trials with one hand sequence, and return their results. ``values`` ``(N, n)`` are
-        targets of the n explored joints, goal by goal; other joints keep still."""
+        """Make N trials with one hand sequence; remember the best trial, and return the results of
+        all trials made. ``values``, shape ``(N, n)``, are targets of the n explored joints of all
+        goals, goal by goal; other joints keep still."""
         targets = np.full((len(values), *self.explored.shape), np.nan)
         targets[:, self.explored] = values
         return self.by_targets(hands, targets)
@@ -72,7 +74,8 @@ class Attempts:
         """Make N trials with targets of shape ``(N, G, dof)`` and one hand sequence, or a hand
         sequence for each trial; remember the best trial, and return the results of all trials made.
 
-        ``until``, shape ``(N,)``: the first trial whose reward exceeds its entry is the last made.
+        ``until``, rewards of shape ``(N,)``: the first trial whose reward exceeds its entry is the
+        last trial made. Raises BudgetError if no trial of the session is left.
         """
         trials = self._session.trials(hands, targets, until=until)
         rewards = trials.rewards

@@ -58,14 +58,15 @@ class Rounding:
         """Return the plan solved again with each segment but the last at the nearest whole number
         of steps, and the last, as short as it then can be, rounded up; None if a solve fails. At a
         shortest path the total does not change, to first order, with its division into segments, so
-        of all roundings (:meth:`every`) this has nearly always fewest ticks."""
+        of all roundings (:meth:`every`) this one nearly always has the fewest ticks."""
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
     def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
         """Yield roundings of a plan to whole steps, the nearest first: each segment but the last is
         rounded up or down, the last up. Goals ``merged`` (from 0) are hit without a movement. Of
-        the nearest 64 roundings, all for up to seven goals, those that can be solved are yielded.
+        the nearest 64 roundings, which are all for up to seven goals, roundings that cannot be
+        solved are left out.
         """
         exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
@@ -88,10 +89,11 @@ class Rounding:
     def plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """Yield pairs: a set of goals (from 0) that are hit without a movement, and the shortest
-        plan in which they are; first the empty set with ``plan`` itself. Such a plan pays if its
-        path grows by less than the ticks that it saves. ``worth`` returns whether a number of ticks
-        is of interest; sets of goals that cannot come to such a number are left out."""
+        """Yield pairs: a tuple of goals (from 0) that are hit without a movement, and the shortest
+        plan in which these goals are hit so; first the empty tuple with ``plan`` itself. Such a
+        plan pays if its path grows by fewer steps than the ticks that it saves. ``worth`` returns
+        whether a number of ticks is of interest; goals that cannot come to such a number are left
+        out."""
         goals = len(self._instance.hands)
         able = _mergeable(task, self._instance.hands)
         waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
@@ -181,9 +183,10 @@ def movements(
 
     Joints that are held on the way to a goal stay where they are, even if an earlier movement ended
     by a hit short of its target. With ``steps``, a number per goal, the target of a movement lies
-    beyond the rim of the goal's disc, on the same line, so that it hits after at most that many;
-    if no such target does, it is the configuration given. For 0 steps it is a corrective movement,
-    which is not made where the hand is in the goal already. The session counts the effort.
+    beyond the rim of the goal's disc, on the same line, so that the movement hits after at most
+    that many steps; if no such target does, the target is the configuration given. For 0 steps the
+    movement is corrective, and is not made where the hand is in the goal already. The session
+    counts the effort.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model

@@ -22,18 +22,20 @@ from coartic.runs.record import Outcome
 WORKERS_S = 600.0  # longest wait for a worker
 _PAUSE_S = 0.05  # pause between looks for finished jobs
 _RETURN_S = 2.0  # time in which a restarted worker connects again
+_LOGGERS = "distributed", "distributed.client", "tornado.application", "asyncio"
 _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """An executor: a Dask scheduler, whose workers have this version of coartic.
+    """Executor that performs jobs on the workers of a Dask scheduler, which have this version of
+    coartic.
 
     Parameters
     ----------
     address : str
         Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
     say : callable
-        Takes sentences on what it waits for.
+        Function that is called with a sentence, such as that no worker is connected.
 
     Examples
     --------
@@ -79,11 +81,12 @@ class Dask:
             client.close(timeout=3)
 
     def _client(self) -> Any:
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported here
         try:
             from distributed import Client
             from distributed.comm.addressing import resolve_address
 
+            for name in _LOGGERS:  # to which Dask gives levels when it is imported
+                logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported here
             resolve_address(self.address)  # without a port, a client would wait for a minute
             return Client(self.address, set_as_default=False)
         except ImportError:

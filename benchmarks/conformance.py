@@ -42,11 +42,14 @@ _UNDECLARED = ("does not declare", "own compiled", "outside its session")  # wor
 
 
 class Law(NamedTuple):
-    """A law by name, whether it holds, and the finding in words."""
+    """A law of methods or tasks, and whether it holds."""
 
     name: str
+    """Name of the law, such as ``determinism``."""
     passed: bool
+    """True if the law holds."""
     finding: str
+    """Words on what was checked; for a broken law its first problem."""
 
 
 def _law(name: str, problems: Iterable[str], finding: str) -> Law:
@@ -60,9 +63,9 @@ def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
     """Check every law of a method by runs on tasks, and return the laws in order, kept and broken.
-    ``tasks`` are the shipped tasks by default; those to which the method does not apply are left
-    out: without any task left, law ``solution`` is broken, the last one. ``verbose`` shows what the
-    method prints and logs, and the tracebacks of its crashes."""
+    ``tasks`` are the shipped tasks by default; tasks to which the method does not apply are left
+    out, and without any task left the last law, ``solution``, is broken. ``verbose`` shows prints
+    and logs of the method, and the tracebacks of its crashes."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
@@ -97,8 +100,10 @@ def check_method(
 def _laws_of_runs(
     info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
 ) -> Iterator[Law]:
-    """Yield the laws on the runs of a method, kept or broken; ``runs`` holds the runs by kind and
-    task, ``checked_with`` names the parameters in words."""
+    """Yield the laws on the runs of a method, kept or broken: ``solution``, ``determinism``, ``no
+    hidden state``, ``limits``, ``information`` and ``failure``. ``runs`` holds the runs by kind,
+    such as ``first`` or ``other seed``, and name of the task; ``checked_with`` names the parameters
+    in words."""
 
     def of_kind(kind: str) -> dict[str, Outcome]:
         return {task: run.outcome for (each, task), run in runs.items() if each == kind}
@@ -180,8 +185,8 @@ def _laws_of_runs(
 
 
 def _laws_of_declaration(info: MethodInfo) -> list[Law]:
-    """Return laws ``declaration`` (title and citation are there) and ``parameters`` (they survive
-    JSON, are validated and cannot be changed) of a method."""
+    """Return laws ``declaration`` (title and citation are there) and ``parameters`` (parameters
+    survive JSON, are validated and cannot be changed) of a method."""
     parameters, config = info.complete({}), info.rules()["config"]
     again, problems = info.complete(parameters), []
     if again != parameters:
@@ -214,8 +219,9 @@ def _hopeless_task(like: Task) -> Task:
 
 
 def check_task_file(path: Path, registered: Registry) -> list[Law]:
-    """Check every law of a task file, and return the laws in order; for an invalid file the first
-    law alone. ``registered``: the methods of which some have to apply."""
+    """Check every law of a task file, and return the laws in order: ``valid``, ``name``, ``distinct
+    goals``, ``solvable``, ``methods``; for an invalid file the first alone. ``registered``: known
+    methods; at least one has to apply to the task."""
     try:
         task = load_task(path)
     except TaskError as error:

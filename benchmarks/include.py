@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -29,11 +29,17 @@ from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, explain_errors, open_store, writing
 
 
-def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Path) -> list[Job]:
+def include_folders(
+    plan: Sequence[Job],
+    folders: Sequence[str | Path],
+    out: Path,
+    tasks: Collection[str] | None = None,
+) -> list[Job]:
     """Copy the runs of other folders into ``out``; store there, and return, the plan of all runs.
 
     ``shipped`` names the shipped results. To perform the returned plan in ``out`` makes only those
-    runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has.
+    runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has,
+    those on ``tasks`` alone if tasks are named.
     A warning names an unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
@@ -65,7 +71,7 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
             if wrong:
                 more = f" (`coartic verify` names {len(wrong) - 1} more)" * (len(wrong) > 1)
                 raise CoarticError(f"{name} is not included. {wrong[0]}{more}")
-        joined = _join(plan, sources)
+        joined = _join(plan, sources, tasks)
         target = stack.enter_context(writing(out))
         if SHIPPED in sources and target.begin_as(sources[SHIPPED]):
             del sources[SHIPPED]  # all its runs are there
@@ -77,15 +83,22 @@ def include_folders(plan: Sequence[Job], folders: Sequence[str | Path], out: Pat
     return joined
 
 
-def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
+def _join(
+    plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
+) -> list[Job]:
     """Return the plan with the cells of the sources, its own cells first. A cell has the runs that
     the plan asks for, and the runs that follow in the sources without a gap.
 
-    Raises CoarticError if sources contradict each other, or the plan about runs that no source has.
+    Raises CoarticError if sources contradict each other, or contradict the plan on a cell with runs
+    that no source has.
     """
-    plans = {name: source.plan() for name, source in sources.items()}
+    whole = {name: source.plan() for name, source in sources.items()}
+    plans = {
+        name: [job for job in jobs if tasks is None or job.cell.task.name in tasks]
+        for name, jobs in whole.items()
+    }
     held = {
-        (plans[name][position].cell.digest, number)
+        (whole[name][position].cell.digest, number)
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
@@ -116,8 +129,8 @@ def _join(plan: Sequence[Job], sources: Mapping[str, Store]) -> list[Job]:
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of sources with runs in their plan that the joined plan ``jobs`` lacks, and with cells
-    of stochastic methods, not ``asked`` for, of which it has fewer runs than are asked for of some
+    """Warn of a source whose plan has runs that the joined plan ``jobs`` lacks, and of a source
+    that has fewer runs of a stochastic method's cell, not ``asked`` for, than are asked for of some
     cell. ``asked`` (numbers of runs) and ``jobs`` are by digest, ``plans`` by name of source."""
     most = max(asked.values())
     for name, part in plans.items():
@@ -136,23 +149,24 @@ def _warn_of_gaps(
             )
         if few:
             words = (
-                f"{counted(len(few[0].numbers), 'run')} of {_named(few)}; {most} are asked for here"
+                f"{counted(len(jobs[few[0].cell.digest].numbers), 'run')} of {_named(few)}; "
+                f"{most} are asked for here"
             )
             warnings.warn(f"{name} has {words}", stacklevel=4)
 
 
 def _named(jobs: Sequence[Job]) -> str:
-    """Name the cell of the first job, and count the other cells."""
+    """Return words that name the cell of the first job, and count the other cells."""
     others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
 def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
-    """Check that parts of a plan agree. ``parts`` holds the jobs of each part by its origin;
-    ``first`` stands for a part without jobs.
+    """Check that jobs agree, within a part of a plan and between parts. ``parts`` holds the jobs of
+    each part by its origin, such as a folder; ``first`` stands for a part without jobs.
 
-    Raises CoarticError if two parts say different things about the suite, a task, a method or a
-    cell.
+    Raises CoarticError if two jobs differ in suite, seed or trial budget, in the definition of a
+    task of one name, in the version or code of a method, or in a parameter of a cell.
     """
     first_said: dict[str, tuple[str, object]] = {}
 
@@ -179,8 +193,8 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
-    """Copy the runs of a source's plan that the target lacks. ``origin`` gives the folder of each
-    run of the target (:func:`.same_run`), and gets the copied runs.
+    """Copy the runs of a source's plan that the target lacks. ``origin`` has the folder of each run
+    of the target, by digits of its id and version (:func:`.same_run`); the copied runs are added.
 
     Raises CoarticError if the target has another result of a run.
     """

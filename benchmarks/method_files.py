@@ -115,8 +115,9 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
 def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
-    """Yield the infos of a module's methods, with their code. Raises CoarticError for no method, a
-    wrong declaration (:func:`_check_declaration`), and a file that cannot be read."""
+    """Yield the infos of ``methods``, the classes that ``module`` defines, with their code;
+    ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
+    declaration of name, title, citation or information, and a file that cannot be read."""
     for method in methods:
         _check_declaration(method, origin)
         try:
@@ -141,7 +142,8 @@ def _methods_of_module(
 def _check_declaration(method: type[Method], origin: str) -> None:
     """Check that a method declares its name, title, citation and what it was tuned on, texts of
     one line, and its information; ``origin`` is the name of its file in messages. Raises
-    CoarticError for a missing or wrong one. What else an id must be, the registry checks."""
+    CoarticError for a missing or wrong declaration. The registry checks the form of ids
+    (:func:`~.registry.check_id`)."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation", "tuned_on"):
         text = getattr(method, attribute, None)

@@ -49,8 +49,9 @@ def code_of(method: type[Method], file: Path) -> str:
 
 
 def own_files(known: Collection[str] = ()) -> set[str]:
-    """Return the paths of the files of the user's that this process has loaded: of all modules but
-    those named in ``known``, the standard library's, installed packages' and this project's."""
+    """Return the paths of the user's files that this process has loaded: files of all modules
+    except modules named in ``known``, of the standard library, of installed packages and of this
+    project."""
     found = {path for name, path in _loaded().items() if name not in known}
     return {path for path in found if not _is_installed(path) and os.path.exists(path)}
 
@@ -63,9 +64,9 @@ def libraries() -> dict[str, str]:
 
 
 def content_of(path: str) -> bytes:
-    """Return what counts of a file: of Python its tokens without comments, blank lines and widths
-    of indentation, the same under every version of Python; of any other file each byte. Raises
-    OSError for a file that cannot be read."""
+    """Return the content of a file that counts in a hash: of a Python file its tokens without
+    comments, blank lines and widths of indentation, the same under every version of Python; of any
+    other file all bytes. Raises OSError for a file that cannot be read."""
     content = Path(path).read_bytes()
     if not path.endswith(".py"):
         return content
@@ -86,7 +87,8 @@ def content_of(path: str) -> bytes:
 
 
 def _between(lines: list[bytes], start: tuple[int, int], end: tuple[int, int]) -> bytes:
-    """Return the text from a place to another one, each a line from 1 and a letter from 0."""
+    """Return the text in ``lines`` from ``start`` up to ``end``, each the number of a line, from 1,
+    and of a letter in it, from 0."""
     text = [line.decode(errors="replace") for line in lines[start[0] - 1 : end[0]]]
     text[-1] = text[-1][: end[1]]
     text[0] = text[0][start[1] :]
@@ -107,8 +109,8 @@ def _loaded() -> dict[str, str]:
 
 @cache
 def _ours() -> tuple[str, ...]:
-    """Return the folders of this project's packages, by the names under which they are imported and
-    where they are."""
+    """Return the absolute paths of the folders of this project's packages, as they are imported and
+    with links followed."""
     folders = [str(PACKAGE), *(str(PACKAGE / name) for name in OURS - {"coartic"})]
     return tuple({*map(os.path.abspath, folders), *map(os.path.realpath, folders)})
 
@@ -125,13 +127,15 @@ def _is_installed(path: str) -> bool:
 
 @cache
 def _distributions() -> dict[str, list[str]]:
-    """Return the names of the installed packages that a name of an import comes from."""
+    """Return, for each name that can be imported, such as ``yaml``, a list of the names of the
+    installed packages that have it, such as ``["PyYAML"]``; always the same dictionary."""
     return dict(metadata.packages_distributions())
 
 
 def _imports(path: str) -> Iterator[str]:
-    """Yield the full name of each module or attribute that a Python file imports, wherever it does,
-    and of each attribute that it takes of ``coartic``. Relative imports are left out."""
+    """Yield the full name of each module or attribute that a Python file imports anywhere, such as
+    ``numpy.linalg``, and of each attribute of ``coartic`` that the file uses, such as
+    ``coartic.learn``. Relative imports are left out."""
     tree = ast.parse(Path(path).read_bytes())
     names = {"coartic"}
     for node in ast.walk(tree):
@@ -147,8 +151,8 @@ def _imports(path: str) -> Iterator[str]:
 
 
 def _built_in_versions(imported: Iterable[str]) -> list[str]:
-    """Return a line with id and version for each built-in method that imports reach: the methods of
-    their modules, or of the whole folder for a module without methods."""
+    """Return a line with id and version for each built-in method that ``imported`` names reach: the
+    methods of an imported module, or, for a module without methods, of its whole folder."""
     names = {coartic.HOME.get(name.removeprefix("coartic."), name) for name in imported}
     modules = set[str]()
     for name in names:
@@ -161,8 +165,8 @@ def _built_in_versions(imported: Iterable[str]) -> list[str]:
 
 
 def _packages(imported: Iterable[str]) -> list[str]:
-    """Return a line with name and version for each installed package that imports name, without the
-    packages that this project itself needs."""
+    """Return a line with name and version for each installed package that the ``imported`` modules
+    belong to, without the packages that this project itself needs."""
     tops = {name.partition(".")[0] for name in imported} - OURS - sys.stdlib_module_names
     needs = [each for each in metadata.requires("coartic") or () if "extra ==" not in each]
     ours = {_plain_name(re.split(r"[^\w.-]", each)[0]) for each in needs}
@@ -171,5 +175,6 @@ def _packages(imported: Iterable[str]) -> list[str]:
 
 
 def _plain_name(name: str) -> str:
-    """Return the name of a package as package indexes compare it."""
+    """Return the name of a package as package indexes compare names: small letters, with ``-`` for
+    each run of ``-``, ``_`` and ``.``."""
     return re.sub(r"[-_.]+", "-", name).lower()

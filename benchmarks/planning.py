@@ -34,7 +34,15 @@ from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain_inline, sentence_error
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, tasks_by_name, trials_in
-from coartic.tasks.families import instance_of, named_by, own_families, read_family
+from coartic.tasks.families import (
+    instance_of,
+    is_file,
+    load_family,
+    named_by,
+    own_families,
+    read_family,
+    shipped_families,
+)
 from coartic.tasks.task import address_of, check_task
 
 
@@ -75,7 +83,7 @@ class Request(FileData):
     A method that the suite does not have is run on every task of the suite that it applies to."""
     method_files: _Files = ()
     """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
-    all methods of the file run, together with the others."""
+    all methods of the file run, together with the methods named."""
     family_files: _Files = ()
     """Files with your own families."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
@@ -173,8 +181,8 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
-    """Return the ids of methods from files that are not in use: neither the suite nor the request
-    names a method of such a file."""
+    """Return the ids of all methods in the user's files, without files with a method that the suite
+    or the request names."""
     files = {
         registered[method].where
         for names in (request.methods, *(block.methods for block in suite.blocks))
@@ -214,12 +222,14 @@ def _asked_tasks(
     """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
     a function that gives a task by its name.
 
-    A request brings task files, tasks and instances, those that the suite does not have. Raises
+    A request brings the task files, tasks and instances that the suite does not have. Raises
     CoarticError for a task whose name belongs to another task.
     """
     for path in request.family_files:
         check_kind(str(path), "family")
-    families = own_families(request.family_files)
+    of_tasks = [each.rpartition("/")[0] for each in request.tasks if isinstance(each, str)]
+    paths = (*request.family_files, *(Path(each) for each in of_tasks if is_file(each)))
+    families = own_families([*dict.fromkeys(paths)])
     names, own = dict[str, None](), dict[str, Task]()
 
     def task_named(name: str) -> Task:
@@ -232,10 +242,12 @@ def _asked_tasks(
 
     for each in request.tasks:
         if isinstance(each, str) and not each.endswith(".toml"):
-            names |= dict.fromkeys(named_by(each))
+            place, _, numbers = each.rpartition("/")
+            named = f"{load_family(place).name}/{numbers}" if is_file(place) else each
+            names |= dict.fromkeys(named_by(named))
             continue
         task = load_task(each) if isinstance(each, str) else check_task(each)
-        is_known = task.name in builtin_tasks() or address_of(task.name)
+        is_known = task.name in builtin_tasks() or task.family in (*families, *shipped_families())
         if (task_named(task.name) if is_known else own.setdefault(task.name, task)) != task:
             whose = "a shipped task" if is_known else "another task"
             raise CoarticError(
@@ -258,8 +270,9 @@ def _suite_jobs(
     task_named: TaskNamed,
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs of a suite, each from ``job``, which is :func:`_job_of` for the suite and the
-    request; ``own`` names the tasks that the request brings.
+    """Yield the jobs of a suite. ``job`` makes a job of task, method, parameters and number of runs
+    (:func:`_job_of`); ``own`` has the names of the tasks that the request brings; ``task_named``
+    returns a task by name.
 
     Raises CoarticError for a method that is unknown, or that does not apply to a task of a block
     without wildcards, and for parameters that a method does not take.
@@ -287,9 +300,9 @@ def _extra_jobs(
     methods: Sequence[MethodInfo],
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: methods new to the
-    suite on the tasks of the suite, and all methods on the tasks that the request brings, where
-    they apply."""
+    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: ``methods`` new to the
+    suite on the tasks of the suite, and all ``methods`` on ``own``, the tasks that the request
+    brings, where they apply. ``job`` makes a job of task and method."""
     of_suite = {each.cell.method.name for each in jobs}
     there = {(each.cell.task.name, each.cell.label) for each in jobs}
     new = [method for method in methods if method.name not in of_suite]
@@ -309,9 +322,9 @@ def _job_of(
     parameters: Mapping[str, Any] | None = None,
     runs: int | None = None,
 ) -> Job:
-    """Return the job of a method with parameters on a task. Numbers of the request go before
-    ``runs``, the number of a block, before ``parameters``, and before the numbers of the suite. A
-    method that is not stochastic has run 0 alone; no run if a range begins later."""
+    """Return the job of a method with parameters on a task. Runs and trials of the request replace
+    ``runs``, the number of a block, and ``trials`` in ``parameters``; these replace the numbers of
+    the suite. A method that is not stochastic has run 0 alone; no run if a range begins later."""
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)
@@ -320,7 +333,7 @@ def _job_of(
     numbers = asked if isinstance(asked, range) else range(asked)
     numbers = numbers if method.stochastic else range(numbers.start, 1)
     limit_s = request.time_limit_s or suite.time_limit_s
-    return Job(cell, request.seed, numbers, limit_s, suite.name)
+    return Job(cell, request.seed, numbers, limit_s, suite.name, suite.trials)
 
 
 def _why_nothing_runs(
@@ -339,7 +352,8 @@ def _why_nothing_runs(
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
     """Return the first job of each cell.
 
-    Raises CoarticError for two numbers of runs of a cell, and for too many trials.
+    Raises CoarticError for two numbers of runs of a cell, and for more than 10,000,000 trials a
+    run.
     """
     distinct = dict[str, Job]()
     for job in jobs:

@@ -9,7 +9,7 @@ group. If the common folder is removed or full, answers are lost, and the suite 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
 used up its limit: other work on the machine changes no result. The CPU time of processes that a
 method starts is not counted. A job that waits forever is ended later, by wall time, and repeated
-once: the machine may have slept.
+once, as the machine may have slept; a job that waits twice has timed out.
 """
 
 from __future__ import annotations
@@ -64,6 +64,7 @@ _STARTS = 5  # processes in a row that end before their first job: then the suit
 _UNKEPT = 74  # exit code of a process that could not write its answer
 _REPEATED = (None, -9, 255, _UNKEPT)  # exit codes (late, killed, lost server): repeat a job once
 _IDLE_S = 60.0  # longest wait of a process for jobs
+_SPINS_S = 2.0  # CPU time beyond its limit after which a job is ended from outside
 _END_S = 1.0  # time for a killed process to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 MORE_FILES = "after `ulimit -n 1024`, which allows more open files"
@@ -71,13 +72,13 @@ _BEGUN, _SAID = "begun", "said"  # files among the answers of a process
 
 
 class Local:
-    """An executor: processes on this machine, ``jobs`` at once, by default one a core.
+    """Executor that performs jobs in processes on this machine, ``jobs`` at once, by default one a
+    core.
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
-    time is repeated once. Then its runs end as crashed, and a suite does not keep them, so that the
-    next command performs them again. The time in which coartic's kernels are compiled does not
-    count. ``verbose`` shows what methods print and log, and their tracebacks.
+    time is repeated once; then its runs have timed out. The time in which coartic's kernels are
+    compiled does not count. ``verbose`` shows what methods print and log, and their tracebacks.
     """
 
     @checked_arguments
@@ -87,8 +88,9 @@ class Local:
         self.verbose = verbose
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish; a job whose process
-        ends has ``timeout`` or ``crashed``. One process performs jobs of one method in order.
+        """Yield each job with its outcomes, in the order in which jobs finish; the outcomes of a
+        job whose process ends are ``timeout`` or ``crashed``. A process performs jobs of one method
+        in order.
 
         Raises CoarticError if process after process ends before its first job, and if answers
         cannot be written.
@@ -113,7 +115,8 @@ class Workers:
         self.folder.cleanup()
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield each job with its outcomes, as :meth:`Local.perform` does."""
+        """Yield each job with its outcomes, in the order in which jobs finish. Raises CoarticError
+        if process after process ends before its first job, and if answers cannot be written."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.cell.method.key].append(job)
@@ -134,7 +137,8 @@ class Workers:
                 for worker in tuple(workers):
                     exit_code = worker.exit_code  # before its answers, which end with it
                     yield from worker.answers()
-                    if exit_code is None and worker.jobs and not worker.is_late:
+                    spins = exit_code is None and worker.spins
+                    if exit_code is None and worker.jobs and not (spins or worker.is_late):
                         continue
                     workers.remove(worker)
                     if exit_code is None and not worker.jobs and self.stays:
@@ -153,10 +157,10 @@ class Workers:
                         )
                     if lost:
                         time.sleep(_POLL_S)  # a killed server may not have ended yet
-                    elif exit_code in _REPEATED and id(job) not in repeated:
+                    elif exit_code in _REPEATED and not (spins or id(job) in repeated):
                         repeated.add(id(job))
                     else:
-                        yield job, worker.failure(exit_code)
+                        yield job, worker.failure(exit_code, spins=spins)
                         worker.jobs.popleft()
                     rest = list(worker.jobs)  # a job is repeated alone: answers may be lost
                     alone = 1 if rest and id(rest[0]) in repeated else 0
@@ -184,8 +188,8 @@ class Workers:
         return Worker(self.folder.name, method, self.local)
 
     def check_room(self) -> None:
-        """Check that the folder of answers is there and has room: its loss can be the reason why a
-        process ended. Raises OSError."""
+        """Raise OSError unless the folder of answers is there and has room: its loss can be the
+        reason why a process ended."""
         place = Path(self.folder.name, "room")
         place.write_bytes(bytes(_ROOM))
         place.unlink()
@@ -196,12 +200,12 @@ class Worker:
 
     def __init__(self, folder: str, method: tuple[str, str, str], local: Local) -> None:
         self.method = method
-        """:attr:`MethodInfo.key` of the method."""
+        """Module or file, id and code of the method (:attr:`MethodInfo.key`)."""
         self.jobs = deque[Job]()
         """Jobs without an answer."""
         self.since_s = math.inf
         """Clock at the beginning of the first of these jobs, s."""
-        self._timeout_s = local.timeout_s
+        self._timeout_s, self._since_cpu_s = local.timeout_s, math.inf
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
         theirs, self._ours = multiprocessing.Pipe(duplex=False)
@@ -213,7 +217,7 @@ class Worker:
         """Send jobs to the process, and start it if it is new; if it cannot start, nothing is
         raised and :attr:`exit_code` is 1."""
         self.jobs.extend(jobs)
-        self.since_s = math.inf
+        self.since_s = self._since_cpu_s = math.inf
         (self._folder / _BEGUN).unlink(missing_ok=True)
         try:
             if self.process.pid is None:
@@ -239,25 +243,39 @@ class Worker:
         return time.monotonic() > self.since_s + self.wall_limit_s
 
     @property
+    def spins(self) -> bool:
+        """True if the current job has used up its CPU time, and goes on: its method ignores the
+        signals."""
+        limit_s = (self.jobs and self.jobs[0].time_limit_s) or _LONGEST_S
+        return self.cpu_s > self._since_cpu_s + limit_s + _SPINS_S
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time of the process so far, s; 0 where the system does not say it (Linux does)."""
+        with contextlib.suppress(AttributeError, OSError, OverflowError):
+            return time.clock_gettime((~(self.process.pid or 0) << 3) | 2)
+        return 0.0
+
+    @property
     def wall_limit_s(self) -> float:
         """Limit of wall time for the current job, which must exist, s: three times its limit of CPU
-        time, a day without one, and ``timeout_s``."""
+        time (a day without a limit), plus ``timeout_s``."""
         return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
         """Yield the jobs that have been answered since the last call, with their outcomes."""
         if self.since_s == math.inf and (self._folder / _BEGUN).exists():
-            self.since_s = time.monotonic()
+            self.since_s, self._since_cpu_s = time.monotonic(), self.cpu_s
         while self.jobs and (answer := self._folder / str(self._answered)).is_file():
             job = self.jobs.popleft()
             self._answered += 1
-            self.since_s = time.monotonic()
+            self.since_s, self._since_cpu_s = time.monotonic(), self.cpu_s
             yield job, outcomes_from(job, answer.read_bytes())
             answer.unlink()
 
     @property
     def last_output(self) -> str:
-        """Words on how the process ended, and the last lines that it wrote."""
+        """Words on how the process ended, and the last three lines that it wrote."""
         text, code = b"", self.exit_code or 0
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
@@ -267,14 +285,14 @@ class Worker:
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
-    def failure(self, exit_code: int | None) -> list[Outcome]:
-        """Return the outcomes of the current job of a process that has ended, or that is late
-        (``exit_code`` None)."""
+    def failure(self, exit_code: int | None, *, spins: bool) -> list[Outcome]:
+        """Return the outcomes of the current job of a process that has ended, or (``exit_code``
+        None) that :attr:`spins` or is late."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
-        if exit_code is None:
+        if exit_code is None and not spins:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
-            return fail(job, "crashed", reason, wall_s=self.wall_limit_s)
-        if exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME:
+            return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
+        if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME):
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
             return fail(job, "crashed", "its answer could not be written: its folder was removed")
@@ -333,8 +351,9 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
 
 
 def _answer_to(job: Job, folder: Path) -> bytes:
-    """Perform a job, and return its outcomes as JSON, crashed ones if JSON cannot hold them; the
-    system ends this process at the job's limit of CPU time. Empties the log in ``folder`` first."""
+    """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
+    cannot hold them; the system ends this process at the job's limit of CPU time. Empties the log
+    in ``folder`` first."""
     with contextlib.suppress(OSError):  # the file is missing
         os.truncate(folder / _SAID, 0)
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
@@ -388,9 +407,9 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 
 
 def start_process(process: Any) -> None:
-    """Start a process of :data:`CONTEXT` that computes as workers do
-    (:func:`coartic.internal.threads.worker_variables`), without running the main program again in
-    it. Raises OSError or EOFError if the process does not start."""
+    """Start a process of :data:`CONTEXT` with the environment variables of a worker (one thread,
+    the same instructions everywhere), without running the main program again in the process. Raises
+    OSError or EOFError if the process does not start."""
     try:
         os.getcwd()
     except FileNotFoundError:

@@ -40,8 +40,8 @@ _LIBRARIES = (
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Return versions, platform and commit of this process, and the variables of its workers:
-    always the same dictionary, not to be changed."""
+    """Return, by name, versions, platform, processor, arithmetic and commit of this process, and
+    the environment variables of its workers: always the same dictionary, not to be changed."""
     processor = platform.processor()
     with contextlib.suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
@@ -76,7 +76,8 @@ def made_with() -> dict[str, Any]:
 
 def _commit_of_checkout() -> dict[str, Any] | None:
     """Return the commit of the checkout that the code runs from, as ``id``, and as ``dirty``
-    whether files were changed since; None for an installed package or without Git."""
+    whether files of the commit were changed since (new files do not count); None for an installed
+    package or without Git."""
     # A GIT_DIR of the caller, such as a hook, must not replace this checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
 
@@ -95,9 +96,9 @@ def _commit_of_checkout() -> dict[str, Any] | None:
 
 
 def arithmetic() -> str:
-    """Return how workers round, as hashes of bits that a process started as they are says
-    (:func:`_say_arithmetic`); empty if no process starts. Where a hash is the same, that library
-    rounds alike; a processor's name says little on virtual machines."""
+    """Return how workers round, as ``NumPy HASH, libm HASH``: hashes of the bits of some results,
+    computed in a process that is started like a worker; empty if no process starts. Where a hash is
+    the same, that library rounds alike; a processor's name says little on virtual machines."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
     process = CONTEXT.Process(target=_say_arithmetic, args=(theirs,), daemon=True)
     try:

@@ -39,8 +39,8 @@ _INFOS = TypeAdapter(list[MethodInfo])
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     """Return every known method by id, built-in ones first.
 
-    Raises CoarticError for a file that cannot be loaded or holds no method, and as :func:`check_id`
-    does.
+    Raises CoarticError for a file that cannot be loaded or holds no method, and for an id that is
+    malformed, reserved or taken (:func:`check_id`).
     """
     infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
@@ -65,8 +65,9 @@ _asking = threading.Lock()
 
 
 def current_code(method: MethodInfo) -> str:
-    """Return the code (:attr:`MethodInfo.code`) that a method has here; ``none`` if its file no
-    longer defines it. Raises CoarticError for a file that cannot be used."""
+    """Return the code that a method has here, versions such as ``1.2`` or the hash of a method
+    file's code; ``none`` if its file no longer defines the method. Raises CoarticError for a file
+    that cannot be used."""
     if method.is_ours:
         return built_in()[method.name].code
     with _asking:
@@ -97,8 +98,9 @@ def check_id(name: str, origin: str, registered: Registry) -> None:
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
-    """Return the ids of the methods that a name stands for, in the order of ``registered``: ``EC1``
-    for a condition of the learner, ``optimum/*`` for all ids that match, in the same case.
+    """Return the ids of the methods that a name stands for, in the order of ``registered``: of one
+    method for an id or a condition of the learner, such as ``EC1``, of all methods whose ids match
+    for a wildcard, such as ``optimum/*``; capitals matter.
 
     Raises CoarticError if no id matches.
     """

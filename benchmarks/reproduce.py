@@ -18,8 +18,11 @@ from coartic.method import Meter
 from coartic.motion.solution import hint_of
 from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
-from coartic.runs.record import LATE, PARTS, Run, too_long
+from coartic.runs.record import EARLIER, LATE, PARTS, Run, too_long
 from coartic.runs.store import open_store
+
+AFTER_ANOTHER = "with the same seed after another run"
+"""Words of a doubt about a method whose results depend on its earlier runs (:func:`doubts_of`)."""
 
 
 def find_run(prefix: str, folder: Path) -> Run:
@@ -45,7 +48,7 @@ def find_run(prefix: str, folder: Path) -> Run:
 
 def trajectory_of(run: Run) -> Trajectory:
     """Return the solution of a run tick by tick. Raises CoarticError if the run has no solution, or
-    none that can be executed."""
+    if its solution cannot be executed or is too long."""
     if "solution" not in run.scores:
         why = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
@@ -93,8 +96,9 @@ def perform_runs_again(
 
 
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
-    """Return at most ``count`` runs of a folder, spread over its cells. Runs count whose methods
-    still have the version or code of the run. Raises CoarticError if there is no such run."""
+    """Return at most ``count`` runs of a folder, spread over its cells, of methods that have in
+    ``registered`` the same version or code as in the run. Raises CoarticError if there is no such
+    run."""
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
@@ -112,8 +116,8 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
 
 
 def doubts_of(run: Run) -> Iterator[str]:
-    """Yield what is doubtful about a method, in words, from one of its runs, which is made again
-    after a run with another seed, in a new process."""
+    """Yield sentences on doubts about a method, from one of its runs, which is made again after a
+    run with another seed, in a new process: angles in degrees, hidden state, no use of the seed."""
     name, task = run.cell.method.name, run.cell.task.name
     advice = f"see: coartic check {name}"
     if hint := hint_of(run.solution.movements):
@@ -122,7 +126,7 @@ def doubts_of(run: Run) -> Iterator[str]:
     other, again = perform_in_order(jobs)
     for change in compare_runs(run, again)[:1]:
         yield (
-            f"{name} gives another result on {task} with the same seed after another run "
+            f"{name} gives another result on {task} {AFTER_ANOTHER} "
             f"({change}): it keeps something, or draws from a generator without a seed; {advice}"
         )
     changes = compare_runs(run, other)
@@ -140,12 +144,13 @@ def doubts_of(run: Run) -> Iterator[str]:
 
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Return the differences between the results of two runs, in words, an empty list for equal
-    results. Times and environments do not count, nor rewards that one run does not keep, nor files
-    that were loaded late: earlier runs of a process may have loaded them."""
+    results. Times and environments do not count, nor rewards that one run does not keep, nor marks
+    (:func:`.mark_of`), which depend on earlier runs."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
+    marks = LATE, EARLIER
     first, second = (
-        run.to_row() | {"details": {k: v for k, v in run.outcome.details.items() if k != LATE}}
+        run.to_row() | {"details": {k: v for k, v in run.outcome.details.items() if k not in marks}}
         for run in (a, b)
     )
     changes = [

@@ -13,7 +13,6 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +20,16 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import made_with
-from coartic.benchmarks.reproduce import doubts_of
+from coartic.benchmarks.reproduce import AFTER_ANOTHER, doubts_of
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted
+from coartic.internal.text import counted, error_line
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
-from coartic.runs.record import Run, late_import
+from coartic.runs.record import EARLIER, Run
 from coartic.runs.store import Store, writing
 
 _EXECUTORS = {
@@ -53,16 +52,16 @@ class Progress:
     present: int = 0
     """Runs of the plan that the folder had before."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Runs that the folder has from another version or code of their method (:meth:`Store.stale`).
-    They are kept, and no report shows them."""
+    """Runs that the folder has from another version or code of their method, by the method, that
+    version and the present one. They are kept, and no report shows them."""
     done: int = 0
     """Runs performed by this call."""
     failed: int = 0
     """Runs of the plan that are not ok."""
     crashed: int = 0
     """Runs of the plan that crashed."""
-    late: dict[str, list[str]] = field(default_factory=dict)
-    """Files that runs of the folder loaded too late, by method (:meth:`Store.late_imports`)."""
+    marks: dict[str, list[str]] = field(default_factory=dict)
+    """Sentences on methods against which runs of the folder speak (:meth:`Store.marks`)."""
     others: Counter[int] = field(default_factory=Counter)
     """Runs of earlier commands in the folder that the plan does not ask for, by the seed of their
     suite. They are kept, and no report shows them."""
@@ -75,6 +74,7 @@ class Progress:
     timed: Counter[str] = field(default_factory=Counter)
     """Number of runs with a known wall time, by method."""
     workers: int = 1
+    """Number of runs that are performed at once."""
 
     def count(self, status: str) -> None:
         """Count a run of the folder by its status."""
@@ -116,7 +116,9 @@ class Progress:
         minutes, seconds = divmod(self.wall_s, 60)
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
-        runs = counted(self.total, "run") + (f" ({self.present} reused)" if self.present else "")
+        there = self.present + self.done
+        runs = counted(there, "run") if there == self.total else f"{there} of {self.total} runs"
+        runs += f" ({self.present} reused)" if self.present else ""
         failed = f"{self.failed} failed" if self.failed else "none failed"
         left_out = [
             f"{counted(count, 'run')} {what}"
@@ -131,7 +133,8 @@ class Progress:
 
 
 Watcher = Callable[[Progress, Cell | None], None]
-"""Function that is called before the first run, and after each run with its cell."""
+"""Function that is called before the first run, and after each run with its cell. An exception in
+it ends no run: a warning says so, and it is not called again."""
 
 
 def run_suite(
@@ -148,11 +151,13 @@ def run_suite(
     ----------
     suite : str, Path or Suite
         A shipped suite by name, or a suite file (``.toml``).
-    folder, executor, watch
-        As in :func:`perform`.
+    folder : str or Path
+        Results folder, which is made if it is missing.
+    executor, watch
+        Place where methods run, and function called after each run (:func:`perform`).
     options
-        As in :func:`plan_suite`, such as ``tasks``, ``methods``, ``runs`` per cell and ``trials``
-        per run.
+        Fields of :class:`~coartic.benchmarks.planning.Request`, such as ``tasks``, ``methods``,
+        ``runs`` per cell and ``trials`` per run.
 
     Returns
     -------
@@ -162,7 +167,8 @@ def run_suite(
     Raises
     ------
     CoarticError
-        As :func:`plan_suite` and :func:`perform` do.
+        A name or a number is refused (:func:`plan_suite`), or the folder cannot be used
+        (:func:`perform`).
 
     Examples
     --------
@@ -185,10 +191,9 @@ def perform(
 
     The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
     that fail are stored and counted, and raise nothing; those that crashed, or timed out under a
-    lower limit, are performed again by the next call. An interruption keeps finished runs. Runs
-    that waited without computing are not kept; a warning names them. For each method of a file, a
-    run is made again after a run with another seed; a warning says if the results differ, or if
-    targets may be meant in degrees.
+    lower limit, are performed again by the next call. An interruption keeps finished runs. For each
+    method of a file, a run is made again after a run with another seed; a warning says if the
+    results differ, or if targets may be meant in degrees.
 
     Parameters
     ----------
@@ -215,7 +220,16 @@ def perform(
         a method with missing runs has no code here.
     """
     folder, clock = folder_named(folder), time.perf_counter()
-    watch = watch or (lambda progress, cell: None)
+    watches = [watch] if watch else []
+
+    def tell(cell: Cell | None) -> None:
+        try:
+            for each in watches:
+                each(progress, cell)
+        except Exception as error:
+            watches.clear()
+            warnings.warn(f"watch is not called again: {error_line(error)}", stacklevel=3)
+
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
         known = " or ".join(_EXECUTORS.values())
@@ -224,12 +238,12 @@ def perform(
         store.replace_plan(plan, made_with())
         progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
         progress.others[plan[0].seed] -= progress.stale.total()
-        progress.late = store.late_imports()
+        progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.cell.method.name] += len(job.numbers)
         progress.workers = executor.workers
-        watch(progress, None)
+        tell(None)
         jobs, first = _divided(missing, executor.workers), dict[str, Run]()
         while jobs:
             alone: list[Job] = []
@@ -239,35 +253,32 @@ def perform(
                     if len(runs) > 1:  # a failure may come from other runs of the job
                         alone += [run.job for run in runs if run.outcome.status not in _SURE]
                         runs = [run for run in runs if run.outcome.status in _SURE]
-                    runs = [run for run in runs if not _has_waited(run)]
                     store.write(runs)
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
                             first.setdefault(run.cell.method.name, run)
                         progress.finish(run)
-                        watch(progress, run.cell)
+                        tell(run.cell)
             jobs = alone
-        known, progress.late = progress.late, store.late_imports()
-        late = [late_import(*each) for each in progress.late.items() if each[0] not in known]
-        for doubt in chain(late, chain.from_iterable(map(doubts_of, first.values()))):
+        doubts = list[str]()
+        for run in first.values():
+            of_run = [*doubts_of(run)]
+            doubts += of_run
+            if any(AFTER_ANOTHER in doubt for doubt in of_run):
+                details = run.outcome.details | {EARLIER: [run.cell.task.name]}
+                store.write([replace(run, outcome=replace(run.outcome, details=details))])
+        known, progress.marks = progress.marks, store.marks()
+        found = {sentence for of_method in known.values() for sentence in of_method}
+        marks = [each for of_method in progress.marks.values() for each in of_method]
+        for doubt in [*(each for each in marks if each not in found), *doubts]:
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
 
 
-def _has_waited(run: Run) -> bool:
-    """Return whether a run waited, without using its CPU time, until its limit of wall time ended
-    it. That is no result: the run is not stored, and a warning says to repeat the command."""
-    times = run.outcome.times
-    if run.outcome.status != "crashed" or times.wall_s is None or times.cpu_s is not None:
-        return False
-    where = f"run {run.number} of {run.cell.label} on {run.cell.task.name}"
-    warnings.warn(f"{where} is not kept: {run.outcome.reason}. Repeat the command", stacklevel=3)
-    return True
-
-
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan, a job for each cell; count others in ``progress``.
+    """Return the missing runs of the plan, a job for each cell; count the runs of the plan that
+    ``store`` has in ``progress``.
 
     A run that crashed is performed again, and so is a run that timed out under a lower time limit,
     unless the code of the method is not here. Raises CoarticError if runs are missing whose method

@@ -119,7 +119,7 @@ _TAKEN_BY = {
     "results folder": "coartic report {}",
     "suite": "coartic run {}",
     "task": "coartic run SUITE --tasks {}",
-    "family": "coartic run SUITE --family-file {}",
+    "family": "coartic run SUITE --tasks {}/i000..i009",
     "method file": "coartic check METHOD --method-file {}",
     "shipped family": "coartic list {}",
 }
@@ -127,10 +127,10 @@ _TAKEN_BY = {
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of what is named, a key of :data:`_TAKEN_BY`: of a shipped suite or family,
-    of a file ``.py`` (a method file, by its ending alone), of a file ``.toml`` (a suite, family or
-    task, by its keys) or of a results folder; empty for anything else. Raises CoarticError for a
-    ``.toml`` that cannot be read."""
+    """Return the kind of the thing that is named: ``suite`` or ``shipped family`` for the name of a
+    shipped one; ``method file`` for a name that ends in ``.py``; ``suite``, ``family`` or ``task``
+    for a file ``.toml``, by its keys; ``results folder``; or an empty text for anything else.
+    Raises CoarticError for a ``.toml`` that cannot be read."""
     if name in suites():
         return "suite"
     if {name, f"{name}/v1"} & {*shipped_families()}:
@@ -145,15 +145,15 @@ def kind_of(name: str) -> str:
 
 
 def check_kind(name: str, *kinds: str) -> None:
-    """Check that what is named, if it has a kind (:func:`kind_of`), is of one of these kinds.
-    Raises CoarticError, which names the command for its kind; without ``kinds`` for every kind."""
+    """Check that the thing that is named has no kind (:func:`kind_of`), or one of these kinds, such
+    as ``suite``. Raises CoarticError for another kind, which names the command that takes it."""
     kind = kind_of(name)
     if kind and kind not in kinds:
         raise CoarticError(f"{name} is a {kind}: {_TAKEN_BY[kind].format(quote(name))}")
 
 
 def suites() -> dict[str, Suite]:
-    """Return the shipped suites by name."""
+    """Return a new dictionary of the shipped suites by name."""
     return {path.stem: _read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
@@ -187,10 +187,10 @@ def _read_suite(path: Path) -> Suite:
 def tasks_of(
     suite: Suite, block: _Block, own: Collection[str], task_named: TaskNamed
 ) -> Iterator[Task]:
-    """Yield the tasks of a block that have a number of goals that it allows, with a freed base or a
-    moved goal where the block asks for it. ``own`` has the names of the user's tasks,
-    ``task_named`` returns a task by name. A block for all tasks (``*``) is for the user's tasks as
-    well, unless it moves a goal."""
+    """Yield the tasks of a block, in order: tasks with a number of goals that the block allows,
+    with a freed base or a moved goal where the block asks for it. ``own`` has the names of the
+    user's tasks, ``task_named`` returns a task by name. A block for all tasks (``*``) is for the
+    user's tasks as well, unless it moves a goal."""
     every = [*builtin_tasks(), *own]
     names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):

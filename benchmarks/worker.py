@@ -38,6 +38,7 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
+_LONGEST_DETAILS = 10_000_000
 
 
 def process_peak_mb() -> float | None:
@@ -65,7 +66,8 @@ def fail(
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
-    """Return outcomes as JSON. Raises TypeError or ValueError for data that JSON cannot hold."""
+    """Return outcomes as JSON, a list with a table of fields for each. Raises TypeError or
+    ValueError for data that JSON cannot hold."""
 
     def plain(outcome: Outcome) -> dict[str, Any]:
         parts = {part: [*map(movement_data, made)] for part, made in outcome.parts.items()}
@@ -76,8 +78,8 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 
 
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
-    """Return the outcomes of a job from its answer (:func:`answer_of`); crashed outcomes if the
-    answer cannot be read."""
+    """Return the outcomes of a job from its answer, the JSON of :func:`answer_of`; an outcome
+    ``crashed`` for each run if the answer cannot be read."""
     try:
         content = json.loads(answer)
         for each in content:
@@ -186,7 +188,8 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
     """Check a method's result, and return its movements, ``parts``, and ``details`` as keywords of
-    :class:`Outcome`. Raises SolutionError for a result that cannot be stored, or breaks a rule."""
+    :class:`Outcome`. Raises SolutionError for a result that is no Result or cannot be stored, and
+    UndeclaredError for movements without a target if the corrective process is not declared."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     try:
@@ -204,6 +207,8 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
 
 def _plain_details(details: Any) -> dict[str, Any]:
     """Return a copy of the details of a result as plain data. Raises TypeError or ValueError for
-    details that JSON cannot hold."""
+    details that JSON cannot hold, and for more than 10,000,000 characters."""
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
+    if len(text) > _LONGEST_DETAILS:
+        raise ValueError(f"details of {len(text)} characters; at most {_LONGEST_DETAILS} are kept")
     return dict(json.loads(text.encode()))

@@ -1,5 +1,7 @@
 """``coartic`` and ``python -m coartic``: the command line."""
 
+import sys
+
 from coartic.internal.interruption import catch_signals, end_if_interrupted
 
 
@@ -11,6 +13,13 @@ def main() -> None:
         from coartic.cli import main as run_command
 
         run_command()
+    except ModuleNotFoundError as error:
+        if error.name not in ("coartic.analysis", "coartic.baselines", "coartic.benchmarks"):
+            raise
+        sys.exit(
+            f"Error: {error.name} is missing: this checkout has no symbolic links. Install the "
+            "wheel, or `git config core.symlinks true` and `git checkout -- coartic`."
+        )
     finally:  # whatever libraries have made of the interruption
         end_if_interrupted()
 

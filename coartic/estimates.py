@@ -46,6 +46,8 @@ FEWER_RESAMPLES = 1_999
 LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""
+HUGE = 50_000
+"""Beyond so many values an interval is that of a normal distribution, which the mean then has."""
 IN_CACHE = 1 << 18
 """Values that are drawn at once: few enough for the processor's cache."""
 NEGLIGIBLE = 1e-9
@@ -57,10 +59,13 @@ class Estimate:
     """A number and how sure it is. NaN where there is no interval or no test."""
 
     value: float
+    """The mean, the difference or another number that is estimated."""
     low: float = math.nan
     """Lower end of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
+    """Upper end of the interval."""
     p: float = math.nan
+    """P-value of the test of this number."""
     n: tuple[int, ...] = ()
     """Number of values in each sample; a number taken as known is no sample."""
     resamples: int = 0
@@ -105,8 +110,8 @@ def centred(values: Array) -> Array:
 
 @checked_arguments
 def mean(values: Numbers, *, resamples: Resamples = RESAMPLES) -> Estimate:
-    """Return the mean of a sample ``(n,)`` with its interval, as :func:`mean_of_means` makes it.
-    Raises ValueError for a sample that is empty or not finite."""
+    """Return the mean of a sample ``(n,)`` with its 95 % BCa bootstrap interval, which needs three
+    values (:func:`mean_of_means`). Raises ValueError for a sample that is empty or not finite."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
 
@@ -119,24 +124,26 @@ def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
 def difference_of_means(
     first: Numbers, second: Numbers, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """Return the mean of ``first`` less the mean of ``second``, two independent samples, with its
-    interval, as :func:`mean` does."""
+    """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
+    and ``(m,)``, with its 95 % BCa bootstrap interval, which needs three values in each. Raises
+    ValueError for a sample that is empty or not finite."""
     return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
 
 
 def mean_of_means(
     samples: Sequence[Array], weights: Sequence[float], resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """Return the weighted sum of the means of independent samples, with its BCa interval.
+    """Return the weighted sum of the means of independent samples, with its 95 % BCa interval.
 
-    Samples have shapes ``(n,)``, each with a weight. Each is resampled within itself. Raises
-    ValueError without a sample. The edge cases:
+    Samples have shapes ``(n,)``, each with a weight. Each sample is resampled within itself. Raises
+    ValueError without a sample, and for a sample that is empty or not finite. The edge cases:
 
     - a sample of fewer than :data:`FEWEST` values: no interval;
     - no spread in any sample: the interval is that point, which says that the samples have no
       spread, not that the populations have none;
     - a sample of more than :data:`LARGE` values, or one for which BCa is not defined: the
-      percentile interval.
+      percentile interval;
+    - a sample of more than :data:`HUGE` values: the normal interval.
     """
     if not samples:
         raise ValueError("needed is a sample at least")
@@ -148,6 +155,10 @@ def mean_of_means(
         return Estimate(value, n=n)
     if not any(map(varies, samples)):
         return Estimate(value, value, value, n=n)
+    if max(n) > HUGE:
+        variances = (weight**2 * sample.var(ddof=1) / len(sample) for sample, weight in parts)
+        width = scipy.special.ndtri(TAILS[1]) * math.sqrt(sum(variances))
+        return Estimate(value, value - width, value + width, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
     kept = sum(n) <= LARGE

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from coartic.internal.limits import brief_value, check_limits
 
 MODEL_VERSION = 1
-"""Version of what all results come from: robot, movement, session, objective, optimisers, scoring.
-Whoever changes what runs give there raises it, and no earlier run goes with later ones."""
+"""Version of the code that all results come from: robot, movement, session, objective, optimisers,
+scoring. Raised with every change of results: runs of two versions are not compared."""
 PAPER_RADIUS = 0.1
 """θ^g of the paper's tasks, length unit."""
 
@@ -68,10 +68,8 @@ _BOUNDS = {
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
     """Return the model itself. Raises TypeError if it is no MotionModel, and ValueError if one of
-    its constants is out of bounds, so that no movement can be made.
-
-    ``radius`` is the radius of the goals, length unit; if it is given, ``correction_tolerance``
-    must be below it.
+    its constants is out of bounds or, with ``radius``, the radius of the goals, length unit, if
+    ``correction_tolerance`` is not below it.
     """
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")

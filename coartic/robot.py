@@ -87,8 +87,8 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     """Return the derivatives of x and of y of point ``tip`` of an arm by the angle of ``joint``.
 
     In length unit per rad: a column of the geometric Jacobian. ``tip`` and ``joint`` are indices
-    in ``xs`` and ``ys``, as :func:`chain` fills them; 0 is the shoulder. A rotation about a joint
-    moves the tip at right angles to the line between them.
+    in ``xs`` and ``ys``, x and y of shoulder (0), joints and hand (:func:`chain`). A rotation about
+    a joint moves the tip at right angles to the line between them.
     """
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
@@ -103,9 +103,9 @@ class Robot:
     gives the published initial rewards of the one-armed tasks (docs/model.md).
 
     A configuration ``q`` has shape ``(dof,)``: the base's x and y (length unit), the joint angles
-    of the left arm and those of the right one (rad, each from the link before). Methods take one or
-    many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another shape or that is not
-    finite, and for a hand that is neither ``"left"`` nor ``"right"``.
+    of the left arm and the joint angles of the right arm (rad, each from the link before). Methods
+    take one or many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another shape or
+    that is not finite, and for a hand that is neither ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
@@ -252,8 +252,9 @@ class Robot:
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """Return the positions of a hand, ``(..., 2)``, and their Jacobians, ``(..., 2, dof)``, for
-        configurations ``(..., dof)``: :meth:`forward_kinematics` and :meth:`jacobian` at once."""
+        """Return the positions of a hand, ``(..., 2)``, length unit, and their Jacobians, ``(...,
+        2, dof)``, for configurations ``(..., dof)``: :meth:`forward_kinematics` and
+        :meth:`jacobian` at once. Raises ValueError if ``q`` or ``hand`` does not fit the robot."""
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1
@@ -345,7 +346,8 @@ class Robot:
 
 
 def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
-    """Return two lists, x and y of shoulder, joints and hand of an arm in ``q`` (:func:`chain`)."""
+    """Return two lists, x and y, length unit, of shoulder, joints and hand of an arm with n links
+    in ``q``, n + 1 entries each; ``cos`` and ``sin`` fit the type of ``q``."""
     xs: list[Any] = [None] * (len(arm.links) + 1)
     ys = [*xs]
     chain(q, arm, xs, ys, cos, sin)

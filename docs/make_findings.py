@@ -18,7 +18,7 @@ from typing import Any, get_args
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import by_task, fill_page, load, mean_beyond
+from coartic.analysis import Study, by_task, fill_page, load, mean_beyond, means
 from coartic.analysis.judging import Verdict
 from coartic.analysis.methods import title_of
 
@@ -100,6 +100,32 @@ def published_spreads() -> pd.DataFrame:
     return spreads.sort_index()
 
 
+def zeros_of_gain(study: Study) -> pd.DataFrame:
+    """Return the gain of random tasks from either zero, in per cent of the way to the best known
+    reward, by family and over families of up to eight goals: of the corrective process alone with
+    its best hands from the initial solution, and of the learner from both."""
+    runs = study.runs[study.runs.status == "ok"]
+    of_learner = runs.method.isin(["dual-process/EC1", "dual-process/EC4"])
+    rewards = {
+        "initial": runs[runs.method == "corrective-alone/given"].groupby("task").reward.first(),
+        "hands": pd.Series(study.corrective_best),
+        "learner": runs[of_learner].groupby("task").reward.mean(),
+        "best": runs.groupby("task").best_known.first(),
+    }
+    tasks = pd.DataFrame(rewards).astype(float).dropna()
+    gains = pd.DataFrame(index=tasks.index)
+    gains["family"] = gains.index.str.partition("/").get_level_values(0)
+    for name, reached, zero in (
+        ("hands", "hands", "initial"),
+        ("learner", "learner", "initial"),
+        ("learner_from_hands", "learner", "hands"),
+    ):
+        gains[name] = 100 * (tasks[reached] - tasks[zero]) / (tasks.best - tasks[zero])
+    every = gains[gains.family != "many-goals"].assign(family="all")
+    table = means(pd.concat([every, gains]), ["family"], ["hands", "learner", "learner_from_hands"])
+    return table.set_index("family").rename(columns={"rows": "tasks"}).rename_axis("row")
+
+
 def filled_pages() -> dict[str, str]:
     """Every page that is made from a template, by its path below ``docs``.
 
@@ -149,6 +175,8 @@ def store(results: Path) -> None:
             table.to_csv(
                 kept / "by-task.csv", float_format="%.6g", lineterminator="\n", index=False
             )
+            zeros = zeros_of_gain(load(results / suite))
+            zeros.to_csv(kept / "zeros.csv", float_format="%.6g", lineterminator="\n")
 
 
 def main() -> None:

@@ -73,12 +73,12 @@ def claims() -> Iterator[str]:
             f"{c['place']}: “{c['quote']}”",
             f"{c['test'][0].upper()}{c['test'][1:]}.",
             judged.replicates[name],
-            judged.more_than_selection[name],
+            judged.more_than_one_selection[name],
         )
         for name, c in tomllib.loads((REPLICATION / "claims.toml").read_text("utf-8")).items()
     )
     heads = "claim", "goals", "the paper says", "how it is judged", "replicates"
-    yield from table((*heads, "more than selection"), rows)
+    yield from table((*heads, "more than one selection"), rows)
 
 
 def margins() -> Iterator[str]:

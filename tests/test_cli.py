@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from coartic import __version__, load_task
+from coartic import CoarticError, __version__, load_task
 from coartic.analysis.report import build
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
@@ -21,6 +21,7 @@ from coartic.cli import COMMANDS, draw
 from coartic.cli.terminal import Display, say
 from coartic.gym import TaskEnv
 from coartic.pictures import film
+from coartic.runs.store import lock
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
@@ -225,7 +226,10 @@ def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_p
     monkeypatch.setattr("coartic.cli.run.interruptible", interruptible)
     error = coartic(*SMALL, "--out", out, "--seed", 7)[2]
     assert f"{out} holds 2 runs of seed 0" in error.partition("Runs: ")[0]
+    assert f"Saved in {out}: 2 runs; " in sentences[0]()
     assert "To report 2 runs of seed 0 there, repeat the earlier command" in sentences[0]()
+    edit(out, "DELETE FROM results")
+    assert f"Saved in {out}: 0 runs; " in sentences[0]()
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -237,8 +241,14 @@ def test_a_results_folder_and_a_method_file_are_named_by_their_commands(
     assert coartic(*SMALL, "--out", "paper")[0] == 0
     assert coartic(*SMALL, "--out", "out")[0] == 0
     assert coartic("new", "my-search")[0] == 0
-    for command in ("check", "list", "run"):
+    for command in ("check", "run"):
         assert "out is a results folder: coartic report out" in coartic(command, "out")[2]
+    code, text, _ = coartic("list", "out")
+    runs = load("out").runs
+    assert (code, text.splitlines()[-1]) == (0, f"out: {len(runs)} runs.")
+    assert all(run_id in text for run_id in runs.run_id)
+    assert coartic("list", "paper")[1].startswith("Suite")
+    assert coartic("list", "./paper")[1].startswith("run_id")
     for command in ("check", "list"):
         assert "add --method-file my_search.py" in coartic(command, "my-search")[2]
 
@@ -475,3 +485,26 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
         for option in known.params:
             if command != "run" and option.opts[0] not in (option.name, "--help", "--open"):
                 assert {f"{command} {each}" for each in option.opts} & tried, option.opts
+
+
+@pytest.mark.process
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is full")
+def test_a_full_device_behind_a_stream_ends_no_run(tmp_path):
+    """What is printed on it is lost; of the standard output a sentence says so."""
+    command = [sys.executable, "-m", "coartic", *map(str, SMALL), "--runs", "3", "--out"]
+    for stream, code in (("stderr", 0), ("stdout", 2)):
+        out = tmp_path / stream
+        with open("/dev/full", "w") as full:
+            streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, stream: full}
+            done = subprocess.run([*command, out], text=True, cwd=ROOT, **streams)
+        assert done.returncode == code, done
+        assert (load(out).runs.status == "ok").all()
+        if stream == "stdout":
+            assert "Error: the standard output cannot be written: No space left" in done.stderr
+            assert "Traceback" not in done.stderr
+
+
+def test_two_reports_of_a_folder_are_written_one_after_the_other(tmp_path, traced):
+    with lock(tmp_path), pytest.raises(CoarticError, match="another `coartic report` is at work"):
+        build.write_report(traced, tmp_path)
+    assert not (tmp_path / "report.html").exists()

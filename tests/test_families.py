@@ -1,14 +1,16 @@
 """Families of random tasks: what is drawn, what is rejected, and that it stays."""
 
 import hashlib
+import importlib
 import json
 import math
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coartic import TaskError, corrective_trial, load_task
+from coartic import TaskError, corrective_trial, load_task, problems
 from coartic.analysis.study import load
 from coartic.benchmarks.runner import run_suite
 from coartic.internal.limits import MOST_CELLS
@@ -220,3 +222,35 @@ def test_a_family_of_ones_own_is_run_by_its_file(tmp_path, in_this_process):
     assert task.goals != load_task("one-armed/v1/i000").goals  # numbers come from its name
     with pytest.raises(TaskError, match="rename the file"):
         run_suite("quick", tmp_path, family_files=[shipped])
+
+
+def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic, in_this_process):
+    """Where a family is named; an instance of it where a task is named."""
+    (tmp_path / "sub").mkdir()
+    monkeypatch.chdir(tmp_path / "sub")
+    (tmp_path / "mine.v1.toml").write_text((FAMILY_FOLDER / "two-armed.v1.toml").read_text())
+    path = "../mine.v1.toml"
+    task = load_task(f"{path}/i001")
+    address = address_of("mine/v1/i001")
+    assert task == instance_of(load_family(path), address)
+    assert [cost.task for cost in problems(path, count=2)][1] == task
+    gymnasium = pytest.importorskip("gymnasium")
+    importlib.import_module("coartic.gym")
+    env = gymnasium.make("coartic/Task-v2", task=path, count=2, split="test")
+    assert env.reset(seed=0)[1]["task"] in (f"{path}/i000", f"{path}/i001")
+    assert named_by(f"{path}/i000..i001") == [f"{path}/i000", f"{path}/i001"]
+    for name in (path, Path(path)):
+        with pytest.raises(TaskError, match="is a family: name an instance, such as .*toml/i000"):
+            load_task(name)
+    assert "coartic run SUITE --tasks ../mine.v1.toml/i000..i009" in coartic("check", path)[2]
+    assert coartic("list", path)[1].startswith("Family     ../mine.v1.toml")
+    assert coartic("list", f"{path}/i001")[1].startswith("Task")
+    assert coartic("draw", f"{path}/i000..i001", "--out", "drawn")[0] == 0
+    assert load_task("drawn/mine/v1/i001.toml") == task
+    for name in (f"{path}/i000..i001", "drawn/mine/v1/i001.toml"):
+        code, text, _ = coartic("run", "paper", "--tasks", name, "--methods", "EC4", "--runs", 1,
+                                "--trials", 5, "--out", "out")  # fmt: skip
+        assert (code, text[:5]) == (0, "2 run" if ".." in name[3:] else "1 run")
+    for wrong in ("i0", "x000", "i00x"):
+        with pytest.raises(TaskError, match="is not an instance of a family"):
+            load_task(f"{path}/{wrong}")

@@ -55,13 +55,14 @@ def test_the_ecdf_is_the_share_of_pairs_that_are_reached():
 
 def test_a_method_that_lacks_a_task_or_failed_on_it_is_not_ranked():
     frame = random_frame(np.random.default_rng(1))
+    frame = frame.groupby(["method", "task", "run"]).tail(1).copy()
     frame.loc[(frame.method == "one") & (frame.task == "left") & (frame.run == 0), "reward"] = (
         np.nan
     )
     table = frames.ranking(frame[(frame.method != "two") | (frame.task == "right")])
     assert table.index[0] == "three"
     assert table.gap.isna().tolist() == [False, True, True]
-    assert table.failed["one"] == 4
+    assert table.failed["one"] == 1
     by_hand = (-100 - frame.reward[frame.method == "three"]) / 100
     assert table.gap["three"] == pytest.approx(by_hand.mean())
     with pytest.raises(CoarticError, match="no column best_known"):
@@ -92,6 +93,42 @@ def small_frame(**changes):
 def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
     with pytest.raises(CoarticError, match=words):
         frames.ranking(small_frame(**changes))
+
+
+def test_a_run_is_told_apart_by_its_source():
+    """Of two folders whose runs count alike, whichever column tells them apart."""
+    first = small_frame(method="a", run=[0, 1])
+    second = small_frame(method="a", run=[0, 1], reward=-293)
+    both = pd.concat([first, second], ignore_index=True)
+    for compute in (frames.ranking, frames.by_task, lambda frame: frames.ecdf(frame, [0.01])):
+        with pytest.raises(CoarticError, match="a run is there twice .*seed, folder or run_id"):
+            compute(both)
+    due = (frames.ecdf(first, [0.01]).share.iloc[-1] + 1) / 2
+    for source in ("seed", "folder", "run_id"):
+        told = both.assign(**{source: [0, 0, 1, 1] if source != "run_id" else list("abcd")})
+        assert frames.ranking(told).runs["a"] == 4
+        assert frames.ecdf(told, [0.01]).share.iloc[-1] == due
+    assert frames.ranking(both.drop(columns="run")).runs["a"] == 4  # nothing is said of runs
+
+
+def test_the_rewards_of_a_run_rise():
+    frame = small_frame(method="a", trials=[1, 9], reward=[-300, -301])
+    with pytest.raises(CoarticError, match="or its reward falls"):
+        frames.ecdf(frame, [0.1])
+    for same in (frame.assign(reward=-300), frame.assign(reward=-300, trials=9)):
+        assert frames.ecdf(same, [0.1]).share.tolist() == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("status", "reward"), [("crashed", -300), ("ok", np.nan), (None, -300), ("OK", -300)]
+)
+def test_a_status_that_contradicts_the_reward_is_refused(status, reward):
+    """By every function of rewards; without a status the reward says it."""
+    frame = small_frame(reward=[reward, -300], corrective_best=-400)
+    for compute in (frames.gaps, frames.shares, frames.ranking, lambda of: frames.ecdf(of, [0.1])):
+        compute(frame)
+        with pytest.raises(CoarticError, match="column status has .* in row 0: a run has a reward"):
+            compute(frame.assign(status=pd.array([status, "ok"], "string")))
 
 
 LACKING = pd.DataFrame({"best_known": [-292]})
@@ -139,7 +176,7 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
         ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
         ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
         *(("targets are", frames.ecdf, {}, (gaps,))
-          for gaps in ([], 0.1, [-0.1], ["a"], [np.nan], [50])),
+          for gaps in ([], 0.1, [-0.1], ["a"], [np.nan], [50], [1.001], [-300])),
     ],
 )  # fmt: skip
 def test_arguments_that_cannot_be_meant_are_refused(words, compute, changes, arguments):
@@ -158,7 +195,7 @@ def test_tasks_are_names_numbers_tuples_or_categories(tasks):
 
 def test_a_method_with_several_settings_has_a_row_for_each():
     frame = small_frame(method="a", setting=["", "h=2"])
-    frame = pd.concat([frame, small_frame(method=["b", "a"], setting=["h=1", None])])
+    frame = pd.concat([frame, small_frame(method=["b", "a"], setting=["h=1", None], run=1)])
     ranked = frames.ranking(frame.reset_index(drop=True))
     assert ranked.gap.round(4).to_dict() == {"b": 0.0274, "a": 0.0445, "a h=2": 0.0616}
     assert ranked.runs.to_dict() == {"b": 1, "a": 2, "a h=2": 1}

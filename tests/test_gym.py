@@ -230,12 +230,31 @@ def test_what_else_is_refused():
         (ValueError, r"shape \(1, 3\); it must be \(1, 6\)", lambda: single.step(np.zeros(3))),
         (ValueError, "did you mean 'coartic/Ascending-v2'", lambda: score("coartic/Ascending-v1")),
         (TypeError, "must be an environment of coartic or its id", lambda: score(no_environment)),
+        *((TypeError, "task is missing: give task=", partial(make, "coartic/Task-v2"))
+          for make in (gymnasium.make, gymnasium.make_vec, score)),
+        (ValueError, "it must be 'rgb_array'",
+         lambda: TaskVectorEnv(2, "ascending", render_mode="human")),
         (TypeError, "policy is 0; it must be a function of observations", lambda: score(TWO, 0)),
         (TypeError, "returned a tuple of 2; needed are the actions alone",
          lambda: score(TWO, lambda seen: (seen, None))),
     ):  # fmt: skip
         with pytest.raises(error, match=words):
             call()
+
+
+def test_robots_side_by_side_have_the_pictures_of_each():
+    """Before a goal is hit, after it, and when trials have begun again."""
+    one = gymnasium.make(TWO, render_mode="rgb_array")
+    many = gymnasium.make_vec(TWO, num_envs=2, render_mode="rgb_array")
+    assert gymnasium.make_vec(TWO, num_envs=2).render() is None
+    action = np.zeros(one.action_space.shape, np.float32)
+    begun = one.reset()[0], many.reset()
+    assert begun[0].shape == one.observation_space.shape
+    for hit in (0, 1):
+        first, second = many.render()
+        assert (first == second).all()
+        assert (one.render() == first).all(), hit
+        one.step(action), many.step(np.tile(action, (2, 1)))
 
 
 @pytest.mark.parametrize("number", [None, 3])
@@ -387,6 +406,9 @@ def test_an_agent_is_scored_as_it_was_trained():
     }
     rewards = score(TWO, policies, episodes=1).reward
     assert rewards["agent"] == rewards["by hand"] != rewards["as seen"]
+    of_norm = score(norm, {"agent": agent, "by hand": policies["as seen"]}, episodes=1).reward
+    assert of_norm["agent"] == of_norm["by hand"] == rewards["agent"]
+    assert score(robots(), policies, episodes=1).reward.equals(rewards)
     score(TWO, sb3.PPO("MlpPolicy", gymnasium.make(TWO), **small), episodes=1)
     for env in (vec_env.VecFrameStack(robots(), 2), made):
         agent = sb3.PPO("MlpPolicy", env, **small)

@@ -1,11 +1,24 @@
 """Verdicts on planted findings, and tests of planted means over tasks."""
 
+import numpy as np
 import pytest
 
-from coartic.analysis.judging import all_of, judge
+from coartic import CoarticError
+from coartic.analysis.judging import all_of, judge, mean_beyond
 from tests.support.made_up import found
 
 NAN = float("nan")
+
+
+@pytest.mark.parametrize("sentence", ["It saves ticks", "{} {}", "It saves {:d}", "{mean}"])
+def test_a_sentence_has_one_place_for_the_mean(sentence):
+    with pytest.raises(CoarticError, match="needs one {}, for the mean"):
+        mean_beyond(sentence, [4.0, 5.0, 6.0])
+
+
+def test_other_braces_are_text():
+    found = mean_beyond("Goals {a, b} save {} {1} ticks {", [4.0, 5.0, 6.0])
+    assert found.evidence.startswith("Goals {a, b} save 5.00 [4.00, 6.00] {1} ticks { (3")
 
 
 def test_joined_findings_have_the_opposites_of_all():
@@ -62,3 +75,18 @@ def test_opposites_are_corrected_over_the_claims_too():
     entries = judged(*(found(False, p) for p in (0.96, 0.975, 0.999)))
     assert entries.verdict.tolist() == ["undecided", "undecided", "not supported"]
     assert entries.opposite_p_holm.tolist() == pytest.approx([0.0502, 0.0502, 0.0033])
+
+
+def test_each_bound_of_a_verdict_on_both_sides():
+    """5 % does not support, and does not refute; two tasks are too few, three are judged."""
+    seen = mean_beyond("{}", [4.0, 5.0, 6.0])
+    unseen = mean_beyond("{}", [-4.0, 5.0, -6.0])
+    below = np.nextafter(0.05, 0)
+    assert [seen.verdict(p, NAN) for p in (below, 0.05)] == ["supported", "undecided"]
+    assert [unseen.verdict(NAN, p) for p in (below, 0.05)] == ["not supported", "undecided"]
+    assert [mean_beyond("{}", [4.0] * n).holds for n in (2, 3)] == [None, True]
+    assert [mean_beyond("{}", [1.0, 2.0, 3.0], bound).holds for bound in (1.99, 2.0, 2.01)] == [
+        True, False, False,
+    ]  # fmt: skip
+    below_two = [mean_beyond("{}", [1.0, 2.0, 3.0], bound, "less").holds for bound in (2.0, 2.01)]
+    assert below_two == [False, True]

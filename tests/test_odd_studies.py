@@ -97,7 +97,7 @@ def test_names_of_tasks_may_end_as_columns_of_intervals_do():
     table = TABLES["ranking"]
     frame = table(study)
     assert {f"on {name}" for name in names} <= columns_of(table, frame).keys()
-    assert texts_of(table, frame, "on reach") == ["1.1", "3.2"]
+    assert texts_of(table, frame, "on reach") == ["3.2", "1.1"]
 
 
 def test_a_learner_over_all_tasks_has_the_gap_of_its_own_conditions():

@@ -1,15 +1,19 @@
 """The objective function: costs, hands, budgets, histories, and examples of methods that use it."""
 
 import copy
+import importlib
 import multiprocessing
 import pickle
 import re
 import runpy
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import numpy as np
+import pandas as pd
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -168,6 +172,7 @@ def test_the_objective_ends_with_the_trials(budget, trials, before):
 
 
 EXAMPLES = DOCS / "examples"
+PAGE = (DOCS / "howto" / "optimisers.md").read_text("utf-8")
 PROGRAMS = {"ioh_logger", "choose_hands", "catcma"}
 METHODS = [path for path in sorted(EXAMPLES.glob("*.py")) if path.stem not in PROGRAMS]
 
@@ -233,13 +238,69 @@ def test_runs_in_the_format_of_iohprofiler(monkeypatch, tmp_path):
         rows = read.filter(read["instance"] == number)
         steps = {*zip(rows["evaluations"], rows["raw_y"], strict=True)}
         better = cost.history.iloc[1:]  # than the corrective process alone, which is no point
-        assert {*zip(better.evaluations, better.cost, strict=True)} <= steps
-        assert len(better) or rows["raw_y"].min() >= cost.best_cost
+        gaps = better.cost / cost.best_known - 1
+        assert {*zip(better.evaluations, gaps.round(9), strict=True)} <= {
+            (made, round(gap, 9)) for made, gap in steps
+        }
+        assert len(better) or rows["raw_y"].min() >= cost.best_cost / cost.best_known - 1
+
+
+BOUNDS = re.findall(r"^\| (\w+) \| `(.*?)`", PAGE, re.MULTILINE)
+
+
+@pytest.mark.parametrize(("library", "line"), BOUNDS)
+def test_bounds_are_taken_by_each_library_of_the_page(library, line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # pycma writes a log
+    name = {"pycma": "cma", "IOHprofiler": "ioh"}.get(library, library.lower())
+    module, cost = pytest.importorskip(name), objective("ascending", budget=30)
+    names = {name: module, "cost": cost}
+    if library == "SciPy":
+        importlib.import_module("scipy.optimize")
+    elif library == "Optuna":
+        names["trial"] = module.create_study().ask()
+    elif library == "pymoo":
+        names["Problem"] = importlib.import_module("pymoo.core.problem").Problem
+    with suppress(coartic.BudgetError):
+        eval(line, names)
+
+
+def test_scipys_direct_takes_the_bounds_of_the_page():
+    cost = objective("ascending", budget=60)
+    assert (cost.lower.tolist(), cost.upper.tolist()) == tuple(cost.bounds.T.tolist())
+    with pytest.raises(coartic.BudgetError):
+        scipy.optimize.direct(cost, scipy.optimize.Bounds(cost.lower, cost.upper))
+    assert cost.evaluations > 0
+
+
+def test_what_was_found_cannot_be_set():
+    cost = objective("ascending")
+    for name in ("best_cost", "best_hands", "evaluations", "best_x", "budget"):
+        with pytest.raises(AttributeError):
+            setattr(cost, name, 0)
+
+
+def test_names_of_columns_are_not_left_out():
+    cost = objective("ascending")
+    frame = pd.DataFrame([cost.x0], columns=[f"x{n}" for n in range(cost.dim)])
+    for call, points in ((cost.many, frame), (cost, frame.iloc[0]), (cost.movements, frame.T)):
+        with pytest.raises(ValueError, match="has names of pandas: give .*to_numpy"):
+            call(points)
+    assert cost.many(frame.to_numpy()).shape == (1,)
+
+
+def test_points_in_degrees_get_a_hint():
+    """As targets of a solution do; points in rad get none, however costly."""
+    cost = objective("ascending")
+    for call in (cost, lambda x: cost.many([cost.x0, x])):
+        with pytest.warns(UserWarning, match="the target has the angle .* Did you mean"):
+            call(np.rad2deg(cost.x0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cost(cost.x0 + 15.0)
 
 
 def test_the_first_program_of_the_page(capsys):
-    page = (DOCS / "howto" / "optimisers.md").read_text("utf-8")
-    (program, *_) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    (program, *_) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     exec(program.replace('"seed": 1', '"seed": 1, "maxiter": 3'), {})
     shown = capsys.readouterr().out
     cost, reward = re.search(r"([0-9.]+) ticks", shown)[1], re.search(r"\n(-\d+)\n", shown)[1]
@@ -376,3 +437,11 @@ def test_a_method_cannot_see_its_task():
         cost.fresh()
     assert "best known" not in repr(cost)
     assert cost.hand_sequences == coartic.hand_sequences(FOUR)
+
+
+def test_targets_are_costs_from_zero_to_that_of_a_failure():
+    cost = objective("ascending")
+    assert cost.evaluations_to([0, FAILED]).tolist() == [np.inf, 0.0]
+    for target in (-1e-9, -1, FAILED + 1, np.nan):
+        with pytest.raises(ValueError, match="each must be a cost"):
+            cost.evaluations_to(target)

@@ -61,6 +61,9 @@ HANDLED = {
     "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 0.5 s exceeded"),
     "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
                        "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
+    "is_deaf": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
+                "        signal.signal(signal.SIGXCPU, signal.SIG_IGN)\n"
+                "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
     "exits": ("print('last', 'words', file=sys.stderr, flush=True); os._exit(7)",
               "crashed", "exit code 7): last words"),
     "forks": ("os.fork() or signal.pause(); return Result(corrected(session))", "ok", ""),
@@ -169,20 +172,27 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.isna().reward if status != "ok" else run.reward == HONEST
 
 
-def test_a_run_that_waits_is_no_result_and_is_performed_again(tmp_path):
-    """One that waits twice by the next command."""
+def test_a_run_that_waits_twice_is_stored_as_timed_out(tmp_path):
+    """In one command, which counts what it stored; a command with more time makes it again."""
     body = """if not os.path.exists(__file__ + '.NAME'):
             open(__file__ + '.once', 'w').close()
             time.sleep(999)
         return Result(corrected(session))"""
     once, twice = (body.replace("NAME", name) for name in ("once", "ready"))
     cells = cells_of(tmp_path, once=once, twice=twice)
-    options = {"executor": Local(1, timeout_s=0.5), "runs": 1, "time_limit_s": 0.3}
-    words = "run 0 of test/does what=twice on ascending is not kept: wall time limit of 1.4 s"
-    with pytest.warns(UserWarning, match=words), pytest.raises(CoarticError, match="has 1 of 2"):
-        run_and_write(tmp_path / "out", cells, **options)
+    executor, limits = Local(1, timeout_s=0.5), (0.3, 0.3, 0.31)
+    plans = [planned(cells, runs=1, time_limit_s=limit) for limit in limits]
+    said = [str(perform(plan, tmp_path / "out", executor=executor)) for plan in plans[:2]]
+    runs = load(tmp_path / "out").runs
+    assert runs.status.tolist() == ["ok", "timeout"]
+    assert runs.reason[1] == "wall time limit of 1.4 s exceeded twice: it waited"
+    assert said[0].startswith("2 runs in ")
+    assert "1 failed" in said[0]
+    assert said[1].startswith("2 runs (2 reused) in ")
+    assert "1 failed" in said[1]
     (tmp_path / "mine.py.ready").touch()
-    assert run_and_write(tmp_path / "out", cells, **options).runs.status.tolist() == ["ok"] * 2
+    assert perform(plans[2], tmp_path / "out", executor=executor).failed == 0
+    assert load(tmp_path / "out").runs.status.tolist() == ["ok"] * 2
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test chooses the core of processes")

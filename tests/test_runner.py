@@ -17,6 +17,7 @@ from coartic import (
     load_task,
 )
 from coartic.analysis.sections import TABLES
+from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
@@ -42,6 +43,13 @@ from tests.support.suites import (
 
 LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
 ALONE = cell_on(load_task("ascending"), KNOWN["corrective-alone/given"])
+
+
+class Silent(InProcess):
+    """Of jobs nothing but that they are infeasible."""
+
+    def perform(self, jobs):
+        yield from ((job, [Outcome("infeasible", "x") for _ in job.numbers]) for job in jobs)
 
 
 class Spoils(InProcess):
@@ -235,6 +243,10 @@ def test_ten_thousand_movements_are_not_too_many():
     task, move = load_task("ascending"), Movement(1, "right", "corrective")
     assert too_long(task, [move] * 10_000) is None
     assert "10001 movements" in str(too_long(task, [move] * 10_001))
+    still = [Movement(1, "right", "path", waypoints=np.tile(task.q0, (count, 1)))
+             for count in (39_999, 40_000)]  # fmt: skip
+    assert too_long(task, still[:1]) is None
+    assert "400010 numbers; at most 400000" in str(too_long(task, still[1:]))
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -276,6 +288,14 @@ def test_runs_of_a_method_file_warn_of_what_a_check_would_find(methods, name, tm
         progress = perform(plan, tmp_path, executor=InProcess())
         perform(plan, tmp_path, executor=InProcess())  # has nothing to perform
     assert (progress.done, progress.failed) == (progress.total, 0)
+    depends = DOUBTS[name].startswith("another result on")
+    study = load(tmp_path)
+    sentence = f"{name}: results depend on earlier runs (seen on ascending)"
+    assert study.marks == ({name: [sentence]} if depends else {})
+    assert study.methods.title[name].endswith(" ‡") == depends
+    changed = replace(methods[name], code="another")
+    perform(planned([cell_on(tasks[0], changed)]), tmp_path, executor=Silent())
+    assert load(tmp_path).marks == {}
     texts = [str(each.message) for each in said]
     assert len({*texts}) == len(texts)
     assert any(DOUBTS[name] in text for text in texts) == bool(DOUBTS[name])

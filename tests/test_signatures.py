@@ -292,22 +292,28 @@ FEW_CONTROLS = "undecided: too few runs of random search"
         # Methods without trials select nothing; of one that draws nothing there is no test.
         ("plan", 0.0, ONE, "the same posture", {}),
         ("plan", 0.5, ONE, "different postures", {}),
+        ("plan", 0.005, ONE, "different, negligible", {}),
         ("mine", 0.5, ONE, "too few runs", {}),
         # Of 41 divisions one is as far apart: below 5 %.
         ("mine", 0.5, (40, 1), "too few runs", {}),
         ("mine", 0.5, (9, 9), "different postures", {}),
         ("mine", 0.0, (9, 9), "no significant difference", {}),
+        # With a hundredth of the noise the 90 % interval is below the bound of sameness.
+        ("mine", 0.0, (9, 9), "the same posture", {"noise": 0.001}),
+        ("mine", 0.005, (9, 9), "different, negligible", {"noise": 0.001}),
+        ("mine", 0.009, (9, 9), "different postures", {"noise": 0.005}),
+        ("mine", 0.0, (9, 9), "no significant difference", {"noise": 0.02}),
     ],
 )
 def test_verdicts_on_postures_at_a_shared_goal(method, difference, runs, verdict, control):
     """Bases differ so much at goal 1 by the next goal, in so many runs on each of two tasks."""
-    planted = {"difference": 0.5, "runs": MANY, "trials": 10} | control
+    planted = {"difference": 0.5, "runs": MANY, "trials": 10, "noise": 0.1} | control
     cells = [
         posed(load_task(name), label, [posture(x + each) for each in noise[:count]])
         for label, shift, counts in (
             (method, difference, runs), (RANDOM_SEARCH, planted["difference"], planted["runs"])
         )
-        for noise in [0.1 * rng(2).standard_normal(40)]
+        for noise in [planted["noise"] * rng(2).standard_normal(40)]
         for name, x, count in zip(ONE_ARMED, (0.0, shift), counts, strict=True)
     ]  # fmt: skip
     study = study_of_solutions(cells, deterministic=["plan"])

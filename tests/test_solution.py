@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from coartic import (
+    CONDITIONS,
     PAPER,
     CoarticError,
     Movement,
     SolutionError,
     corrective_trial,
     execute,
+    learn,
     load_task,
     movements_of,
+    trajectory,
 )
 from coartic.method import Information, Session
 from coartic.motion.trial import reach_kernel
@@ -134,3 +137,27 @@ def test_what_is_no_field_of_a_movement_is_named(field, sentence, value):
     movements = corrective_trial("ascending", "RRR").movements
     with pytest.raises(CoarticError, match=sentence):
         execute("ascending", [replace(movements[0], **{field: value}), *movements[1:]])
+
+
+def test_equal_contents_are_equal_before_and_after_use():
+    """Whatever an object has computed and kept; arrays by their entries."""
+    made = [
+        (
+            tiny_task(),
+            corrective_trial(tiny_task(), "RR"),
+            learn("ascending", CONDITIONS["EC1"], seed=0, trials=5),
+        )
+        for _ in "ab"
+    ]
+    (task, execution, run), others = made
+    path = trajectory(task, execution.movements)
+    assert (others[0].q0.shape, others[0].goal_array.shape) == ((10,), (2, 2))  # kept by one alone
+    assert (task, execution, run) == others
+    assert path == trajectory(others[0], others[1].movements)
+    assert execution.movements == others[1].movements
+    moved = replace(execution.movements[0], target=execution.movements[0].target + 1e-12)
+    assert moved != execution.movements[0]
+    assert moved != replace(moved, target=None)
+    assert moved != "a movement"
+    assert run != learn("ascending", CONDITIONS["EC1"], seed=1, trials=5)
+    assert task != tiny_task(radius=0.2)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from coartic.analysis.report import about, render
 from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
 from coartic.analysis.statistics import running_times
+from coartic.analysis.study import Study
 from coartic.analysis.words import number
 from tests.support.golden import golden
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
@@ -192,12 +194,75 @@ ON_ONE = {("ascending", "mine"): [-300, -301, -302]}
 def test_what_a_method_did_not_run_on_leaves_it_its_gap_there():
     seen = study(LEARNER | CMA | ON_ONE)
     ranked = TABLES["ranking"](seen)
-    assert ranked.index.tolist()[:2] == ["mine", "cma-es/bandit"]
+    assert ranked.index.tolist()[:2] == ["cma-es/bandit", "dual-process (EC1, EC4)"]
     assert ranked.gap["mine"] == pytest.approx(9 / 292)
-    assert ranked.tasks[:3].tolist() == [1, 2, 2]
+    assert ranked.tasks[["cma-es/bandit", "mine"]].tolist() == [2, 1]
+    assert ranked.ranked[["cma-es/bandit", "mine"]].tolist() == [True, False]
     (axes,) = FIGURES["ranking"](seen).figure.axes
     assert "mine (1 of 2 tasks)" in [text.get_text() for text in axes.get_yticklabels()]
     assert TABLES["runtimes"](seen).tasks[["mine", "cma-es/bandit"]].tolist() == [1, 2]
+
+
+def with_trials(seen, by_method, suite_trials=None):
+    """The study, its methods asked for numbers of trials, 10 for others than are named."""
+    plan = []
+    for job in seen.plan:
+        asked = {"trials": by_method.get(job.cell.method.name, 10)}
+        method = replace(job.cell.method, defaults=asked)
+        cell = replace(job.cell, method=method, parameters=asked)
+        plan.append(replace(job, cell=cell, suite_trials=suite_trials))
+    optima = made_up_optima("ascending", "two-armed-1")
+    parts = {"optima": optima, "rewards": lambda: iter(())}
+    return MadeUp(Study(seen.folder, plan, seen.made_with, seen.runs), **parts)
+
+
+BEST = {("ascending", "mine"): [-292] * 3, ("two-armed-1", "mine"): [-465] * 3}
+
+
+@pytest.mark.parametrize(
+    ("trials", "by_suite", "equal", "is_ranked"),
+    [
+        ({"mine": 40}, None, 10, False),
+        ({"mine": 40}, 10, 10, False),
+        ({"mine": 40}, 40, 40, True),  # which the suite asks for
+        ({"mine": 40, "cma-es/bandit": 40}, 99, 40, True),  # most algorithms have it
+        ({"mine": 4}, None, 10, True),
+        ({}, None, 10, True),
+    ],
+)
+def test_a_method_with_more_trials_stands_below(trials, by_suite, equal, is_ranked):
+    seen = with_trials(study(LEARNER | CMA | BEST), trials, by_suite)
+    assert standings.equal_trials(seen) == equal
+    board = standings.board(seen)
+    assert board.ranked["mine"] == is_ranked
+    assert board.index.tolist().index("mine") == (0 if is_ranked else len(board) - 1)
+    assert TABLES["ranking"](seen).index[0] == board.index[0]
+    unlike = {name for name in board.index if trials.get(name, 10) != equal}
+    unlike |= {"dual-process (EC1, EC4)"} if equal != 10 else set()
+    named = {name for name in board.index if "trials)" in standings.shown_name(seen, name)}
+    assert named == unlike
+    first, *others = said(seen, "ranking")
+    assert ("not with equal trials" in first) == bool(unlike)
+    assert ("mine 0.0 %" in first.replace("\xa0", " ").replace(" (4 trials)", "")) == is_ranked
+    below = "mine 0.0 % is not ranked: 40 trials, not 10; on these CMA-ES has"
+    assert any(each.replace("\xa0", " ").startswith(below) for each in others) != is_ranked
+
+
+def test_one_more_task_unranks_nobody():
+    more = study(LEARNER | CMA | BEST | {("two-armed-2", "mine"): [-310]})
+    assert standings.board(more).ranked.all()
+    assert next(iter(standings.board(more).index)) == "mine"
+
+
+def test_what_was_asked_for_has_a_row_below():
+    seen = study(LEARNER | CMA)
+    also = frozenset({"dual-process/EC4"})
+    assert "dual-process/EC4" not in standings.board(seen).index
+    board = standings.board(seen, also)
+    assert not board.ranked["dual-process/EC4"]
+    assert board.index[-1] == "dual-process/EC4"
+    (sentence,) = standings.not_ranked(seen, also)
+    assert "is not ranked: 1 of 2 tasks; on it CMA-ES has" in sentence
 
 
 def test_an_own_method_is_compared_on_the_tasks_that_it_solved():

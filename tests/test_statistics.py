@@ -94,6 +94,7 @@ def test_smallest_p():
     [
         ([[0.0, 1.0, 2.5, 4.2, 9.1, 17.3]], [1]),
         ([[0.0, 2.1, 5.3, 12.7], [3.0, 4.6, 5.9, 9.2]], [1, -1]),
+        ([[0.0, 1.0, 2.5, 4.2, 9.1, 13.3], [0.3, 1.6, 5.9]], [1, -1]),  # of unequal sizes
     ],
 )
 def test_bca_interval_against_all_resamples(samples, weights):
@@ -123,6 +124,16 @@ def test_intervals_of_many_normal_values_are_the_usual_ones():
     alone = statistics.mean(a)
     half = 1.96 * a.std() / math.sqrt(len(a))
     assert (alone.low, alone.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
+
+
+def test_an_interval_of_very_many_values_is_the_normal_one():
+    """At the bound the bootstrap's percentiles are the same, to a tenth of the width."""
+    values = np.random.default_rng(0).exponential(size=50_001)
+    for sample, near in ((values, 1e-12), (values[:-1], 0.1)):
+        found = statistics.mean(sample)
+        width = stats.norm.ppf(0.975) * sample.std(ddof=1) / math.sqrt(len(sample))
+        for end, sign in ((found.low, -1), (found.high, 1)):
+            assert end == pytest.approx(sample.mean() + sign * width, abs=near * width)
 
 
 def test_degenerate_samples():
@@ -228,3 +239,14 @@ def test_procedures_are_calibrated_on_rewards_with_a_known_truth(population):
     rates = np.mean([right_of_rewards(rng, draw, mean) for _ in range(100)], axis=0)
     assert (rates >= 0.8).all(), rates
     assert not right_of_rewards(rng, draw, 5.0)[0]
+
+
+def test_the_least_number_of_values_on_both_sides():
+    two, three = [1.0, 4.0], [1.0, 2.0, 4.0]
+    assert [math.isnan(statistics.mean(of).low) for of in (two, three)] == [True, False]
+    for first, second, none in ((two, three, True), (three, two, True), (three, three[::-1], True),
+                                (three, [5.0, 6.0, 9.0], False)):  # fmt: skip
+        tested = hypotheses.exchange_test(first, second)
+        assert math.isnan(tested.p) == (none and min(len(first), len(second)) < 3)
+    assert math.isnan(hypotheses.bootstrap_test([1.0], 0).p)
+    assert not math.isnan(hypotheses.bootstrap_test(two, 0).p)

@@ -34,6 +34,7 @@ from tests.support.suites import (
     InProcess,
     cell_on,
     edit,
+    edit_plan,
     moved,
     paper_cells,
     planned,
@@ -257,6 +258,20 @@ def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lo
         perform(PLAN, tmp_path / "out", executor=InProcess(2), watch=watch)
 
 
+def test_an_error_of_the_watch_ends_no_run(tmp_path):
+    def watch(progress, _):
+        seen.append(progress.done)
+        if progress.done == 1:
+            raise OSError(28, "No space left on device")
+
+    seen = []
+    with pytest.warns(UserWarning, match="watch is not called again: OSError.*No space left"):
+        progress = perform(PLAN, tmp_path, executor=InProcess(), watch=watch)
+    assert (progress.done, seen) == (9, [0, 1])
+    with open_store(tmp_path) as store:
+        assert len(store.ids()) == 9
+
+
 class TooSlow(InProcess):
     def perform(self, jobs):
         for job in jobs:
@@ -434,7 +449,9 @@ def test_a_value_that_no_run_can_have(copied, tmp_path, change):
         "cells SET method = 'other'",
         "cells SET trial_budget = 5",
         "environments SET content = json_set(content, '$.packages', 1)",
-        "environments SET content = 'x'",
+        "environments SET content = 'x' || rowid",
+        "movements SET path = path || hex(zeroblob(3000000))",
+        "movements SET path = path || hex(zeroblob(26000000))",
         "results SET environment = 99",
         "suite SET name = NULL",
         "suite SET date = NULL",
@@ -466,6 +483,38 @@ def test_content_of_another_kind_is_one_sentence(copied, tmp_path, change):
     assert len(str(caught.value).splitlines()) == 1
     assert (wrong := check_runs(tmp_path).wrong)
     assert not any(words in each for each in wrong for words in ("Error -3", "zlib", "object"))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("environments SET content = '{}'", "processor is missing"),
+        ("environments SET content = json_set(content, '$.commit', 'x')", "commit"),
+        ("environments SET content = '[]'", "coartic is missing"),
+        ("suite SET command = '1'", "command"),
+        ("suite SET seed = 'x'", "the seed is 'x'; it must be a whole number from 0"),
+        ("suite SET time_limit_s = 'x'", "the time limit is 'x'; it must be a number"),
+        ("plan SET runs = 0", "the number of runs is 0; it must be a whole number from 1"),
+        ("plan SET runs = 10000000", "the number of runs is 10000000"),
+        ("cells SET task = 'other'", "is not the cell that was run"),
+        ("cells SET definition = hex(zeroblob(60000))", "120000 characters is too long"),
+    ],
+)
+def test_a_plan_that_coartic_did_not_write_is_found_where_it_is_read(
+    copied, tmp_path, change, words
+):
+    """Though its hash is right."""
+    edit_plan(tmp_path, f"UPDATE {change}")
+    with pytest.raises(CoarticError, match="holds what coartic does not write") as caught:
+        load(tmp_path)
+    assert words in str(caught.value)
+
+
+def test_a_run_that_coartic_did_not_write_is_found_where_it_is_read(copied, tmp_path):
+    for change in ("environments SET content = '[1]'", "results SET details = '[1]'"):
+        sql(f"UPDATE {change}")(copied)
+        with open_store(tmp_path) as store, pytest.raises(CoarticError, match="does not write"):
+            store.run(store.ids()[0])
 
 
 def test_a_folder_that_only_its_owner_can_put_right(tmp_path):

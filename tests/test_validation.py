@@ -233,6 +233,28 @@ def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
     assert len(line) < 700
 
 
+@pytest.mark.parametrize("read", [load_task, read_family, plan_suite])
+def test_toml_is_bounded_before_it_is_read(read, tmp_path):
+    """Python takes the square of the number of parts of a name; texts may have as many dots."""
+    path, parts = tmp_path / "mine.v1.toml", ".".join(["a", '"b"', "'c'", "d"] * 250)
+    hidden = [f"x = {mark}{parts}{mark}" for mark in ('"""', "'''")] + [f'x = "\\"{parts[8:]}"']
+    few = ".".join("a" * 100)
+    for text in (f"{few} = 1", f"[{few}]", f"# {parts}", f"x = '{few}.{few}'", *hidden):
+        path.write_text(text)
+        with pytest.raises(CoarticError) as caught:
+            read(path)
+        assert "parts" not in str(caught.value), text
+    begun = """x = '''''' # '\ny = "\\\\" # "\n"""
+    for text in (f"{few}.a = 1", f"[ {few} . 'a' ]", f"{parts} = 1", f"x = {{ {parts} = 1 }}"):
+        path.write_text(begun + text)
+        with pytest.raises(CoarticError, match="mine.v1.toml: the name .* has more than 100 parts"):
+            read(path)
+    for size, words in ((1_000_000, "unknown key|title"), (1_000_001, "1000001 bytes; .* 1000000")):
+        path.write_text("x = 1 #".ljust(size, "."))
+        with pytest.raises(CoarticError, match=words):
+            read(path)
+
+
 @pytest.mark.parametrize("what", [*TABLES.values(), *FIGURES.values()])
 def test_tables_and_figures_are_of_a_study(what):
     with pytest.raises(CoarticError, match="needed is a study, as .* returns it, not a str"):
@@ -293,11 +315,10 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         ),
         (["run"], "name a suite: ablations, "),
         (["run", "paper", "--family-file", TASK_FILE], "is a task: coartic run SUITE --tasks"),
-        (["run", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
+        (["run", FAMILY_FILE], "is a family: coartic run SUITE --tasks"),
         (["check", "quick"], "quick is a suite: coartic run quick"),
-        (["check", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
+        (["check", FAMILY_FILE], "is a family: coartic run SUITE --tasks"),
         (["check", "two-armed"], "is a shipped family: coartic list two-armed"),
-        (["list", FAMILY_FILE], "is a family: coartic run SUITE --family-file"),
         (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
         (["draw", ".", "--run", "CMA-ES", "--out", "x.gif"], "column run_ids of a report's"),
         (["draw", "ascending", "--out", "x.gif"], "the name must end in .svg"),

@@ -68,9 +68,9 @@ Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 DrawsFigure = Callable[..., Plot | None]
 """A figure of the report, as a function of a study; None if the folder has no runs for it.
 
-Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks`` as
-:meth:`.Study.only` takes them; ``style``: settings of Matplotlib that count more than the
-project's, as ``matplotlib.style.use`` takes them.
+Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks``, labels and
+names of the only ones to draw (:meth:`.Study.only`); ``style``: settings of Matplotlib that count
+more than the project's, in a form of ``matplotlib.style.use``.
 """
 
 
@@ -166,13 +166,13 @@ def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
 
 
 def for_page(plot: Plot) -> str:
-    """A figure as one ``<svg>`` element of the page.
+    """Return a figure as one ``<svg>`` element for a page of HTML.
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
     one, its grey is ``--grey``, its blue ``--blue``, and colours of methods have their names. Marks
-    with a :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a
-    page. Looks that several elements have are classes, named by their hashes.
+    with a :func:`~.style.tip` show its text. Ids begin with the plot's id, so that several figures
+    can share a page. Every ``style`` attribute becomes a class, named by a hash of the style.
     """
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point

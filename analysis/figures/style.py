@@ -70,14 +70,16 @@ def look_of(names: tuple[str, str], bold: bool) -> Look:
 
 
 def grid(panels: int) -> tuple[int, int]:
-    """Return the numbers of rows and columns for some panels, with three columns at most."""
+    """Return the numbers of rows and columns for a number of panels: two columns for up to six
+    panels, three for more; one for a single panel."""
     columns = min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
 
 
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
-    """Within this block, let :func:`panels` make figures of a width, inches; None: as they ask."""
+    """Let :func:`panels` make figures of a width, inches, in the block of this context; with None,
+    figures have the width that is asked of :func:`panels`."""
     before = _width.set(width)
     try:
         yield
@@ -86,7 +88,8 @@ def drawn_at(width: float | None) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Return whether figures are now drawn at less than five inches (:func:`drawn_at`)."""
+    """Return whether the width chosen by :func:`drawn_at` is below five inches; False without a
+    chosen width."""
     return (_width.get() or TWO) < 5
 
 
@@ -97,8 +100,8 @@ def panels(
     least: float = LEAST_PANEL,
     **subplots: Any,
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure with panels; in a block of :func:`drawn_at`, of the width chosen there, with
-    fewer panels side by side, and taller, where they would be too narrow.
+    """Return a figure with panels. In a block of :func:`drawn_at` the figure has the width chosen
+    there, and, if panels would be too narrow, fewer panels side by side and a larger height.
 
     Parameters
     ----------
@@ -108,7 +111,8 @@ def panels(
         Width and height, inches: ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
-        Number of panels used, the first ones; the others stay empty. By default all.
+        Number of panels used, the first ones, by default all. Further panels stay empty; in a block
+        of :func:`drawn_at` there are none, except empty ones that fill the last row.
     least : float
         Least width of a panel next to another one in a figure of chosen width, inches.
     **subplots
@@ -172,8 +176,8 @@ def means(
     axes : matplotlib.axes.Axes
         Axes to draw on.
     frame : DataFrame
-        A row for each mean, as :func:`coartic.analysis.means` returns it: columns ``x`` and ``y``,
-        and for intervals the columns of ``y`` with ``_low`` and ``_high``.
+        A row for each mean, such as the table of :func:`coartic.analysis.means`: columns ``x`` and
+        ``y``, and for intervals the columns of ``y`` with ``_low`` and ``_high``.
     x, y : str
         Columns of the places and of the means.
     by : str
@@ -183,7 +187,7 @@ def means(
     shift : float
         Distance by which each line is moved to the right of the line before, in units of ``x``.
     bars : float, optional
-        Line width of the intervals, points; None is Matplotlib's line width and hides nothing.
+        Line width of the intervals, points; None for Matplotlib's line width.
     **line
         Look of the line and its marks: arguments of Matplotlib's ``plot``.
 

@@ -6,16 +6,25 @@ import math
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
-from coartic.analysis.method_frame import GROUPS, joined_label
+from coartic.analysis.method_frame import GROUPS, joined_label, without_settings
 from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH, title_of
 from coartic.analysis.sections import SECTIONS, Section
-from coartic.analysis.standings import common_tasks, reference
+from coartic.analysis.standings import (
+    board,
+    common_tasks,
+    equal_trials,
+    not_ranked,
+    reference,
+    trials_of,
+)
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import is_setting
 from coartic.analysis.words import (
@@ -31,7 +40,6 @@ from coartic.analysis.words import (
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
-from coartic.runs.record import late_import
 
 Made = TypeVar("Made")
 RUNS = 20
@@ -68,16 +76,23 @@ def attempt(
 
 
 def finding(study: Study, section: Section) -> list[str]:
-    """Return the lines of a section's sentence, filled in; none without sentence or rows for it."""
+    """Return the lines of a section's sentence, a template, filled in from its tables; an empty
+    list if the section has no sentence, or its first table no rows."""
     if not section.sentence or not len(frame := section.tables[0](study)):
         return []
     rows, *others = (
-        each.assign(title=each.method.map(study.methods.title))[~is_setting(each)]
+        each.assign(title=each.method.map(each.attrs["titles"]))[~is_setting(each)]
         for each in (table(study) for table in section.tables)
     )
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "counts": lambda each: tally(Counter(each))}
+    standings, asked = without_settings(board(study)), trials_of(study)
+    below = standings.index[~standings.ranked.astype(bool)]
+    is_unequal = [asked[label] != equal_trials(study) for label in standings.index]
+    unequal = standings[np.array(is_unequal, dtype=bool)]
+    rows = rows[~rows.method.isin(below)]
     environment.globals |= {
+        "not_ranked": not_ranked(study), "unequal": {*unequal.information},
         "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
         "uses": GROUPS, "titles": study.methods.title,
         "reference": reference(study, common_tasks(study)),
@@ -87,15 +102,17 @@ def finding(study: Study, section: Section) -> list[str]:
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the first two rows of a table, and the rows of the paper's learner (EC1, EC4) and of
-    random search, each row a dict."""
-    kept = rows.method.isin([*rows.method[:2], joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH])
-    return rows[kept].to_dict("records")
+    """Return the first two rows of a table, and the rows of the paper's learner (EC1, EC4), of
+    random search and of methods from files, each row a dict."""
+    always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH, *rows.attrs.get("own", [])]
+    return rows[rows.method.isin([*rows.method[:2], *always])].to_dict("records")
 
 
 @cached
 def limits(study: Study) -> dict[str, Any]:
-    """Return facts that limit conclusions from a study's runs, by name, for the page's template."""
+    """Return facts that limit conclusions from a study's runs, by name, for the page's template:
+    numbers of ``runs`` and of ``failed`` runs, their ``reasons``, ``reconstructed`` tasks, and so
+    on; an empty list or 0 for a limit that does not apply."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
@@ -128,7 +145,7 @@ def limits(study: Study) -> dict[str, Any]:
                 if m.code != m.version
             }
         ),
-        "late": [late_import(*each) for each in study.late_imports.items()],
+        "late": [*chain.from_iterable(study.marks.values())],
         "cores": made_with["cores"],
     }
 

@@ -26,11 +26,12 @@ from coartic.analysis.report.render import (
 )
 from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.study import Study, cached
-from coartic.analysis.table import Table, is_setting
+from coartic.analysis.table import Table, caption_of, is_setting
 from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of
+from coartic.runs.store import lock
 
 HERE = Path(__file__).parent
 
@@ -58,6 +59,18 @@ def write_report(
             "of its own."
         )
     make_folder(folder, ["report.html"])
+    with lock(folder, command="coartic report"):
+        return _write_locked(study, folder, for_paper, width, watch)
+
+
+def _write_locked(
+    study: Study,
+    folder: Path,
+    for_paper: bool,
+    width: float | None,
+    watch: Callable[[str], object],
+) -> tuple[list[str], dict[str, str]]:
+    """Write a report as :func:`write_report` does into a folder that this process has locked."""
     home, report = os.path.relpath(study.folder, folder), folder / "report.html"
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)
@@ -84,19 +97,23 @@ def write_report(
 
 
 def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
-    """Return files of a table by path: CSV, ``for_paper`` also ``IN_LATEX``; none without rows."""
+    """Return files of a table, contents by path: CSV, and ``for_paper`` LaTeX, if the table is in
+    ``IN_LATEX``; an empty dictionary for a table without rows."""
     frame = table(study)
     if not len(frame):
         return {}
     files = {f"tables/{table.id}.csv": table_csv(frame).encode()}
     if for_paper and table.id in IN_LATEX:
-        text = latex_table(table, frame, table.caption, about.notes_of(study, frame.columns))
+        text = latex_table(
+            table, frame, caption_of(table, frame), about.notes_of(study, frame.columns)
+        )
         files[f"tables/{table.id}.tex"] = text.encode()
     return files
 
 
 def _files_of_figures(study: Study, section: Section, width: float | None) -> dict[str, bytes]:
-    """Return the files of a section's figures of a width, inches, by path: SVG and PDF."""
+    """Return the files of a section's figures of a width, inches, contents by path: SVG and PDF of
+    each; None: as wide as on the page."""
     files = {}
     for plot in _plots_of(study, section, width):
         for ending in (".svg", ".pdf"):
@@ -113,7 +130,8 @@ def _plots_of(study: Study, section: Section, width: float | None = None) -> lis
 
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
-    """Return the values of a section for the template: finding, figures and tables.
+    """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
+    pairs of a plot and its SVG; ``shown``, a dictionary for each table with rows.
 
     Settings and ablations have rows in the ranking, in the table of contexts, whose verdicts are
     counted in a sentence, in the table of all methods, and in CSV files.
@@ -126,8 +144,8 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
         if len(frame):
             settings = sum("setting" in names for names in classes_of(table, frame))
             tables.append({
-                "id": table.id, "caption": table.caption, "rows": len(frame),
-                "settings": settings, "html": html_table(table, frame, table.caption),
+                "id": table.id, "caption": caption_of(table, frame), "rows": len(frame),
+                "settings": settings, "html": html_table(table, frame, caption_of(table, frame)),
             })  # fmt: skip
     return {
         "finding": about.finding(study, section),

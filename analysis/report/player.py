@@ -20,11 +20,12 @@ from coartic.robot import HANDS
 
 
 def player(study: Study) -> str:
-    """Return the figure as HTML; empty if no run has a solution.
+    """Return the interactive figure with the runs of a folder as HTML; empty if no run has a
+    solution.
 
     The figure has a preset for each task, with the run nearest the median reward of each method
-    that moves straight. The first preset is the goal that two tasks share, if two tasks do, with
-    the standardised posture difference of random search there. The method shown first is the method
+    that moves straight. If two tasks share goal 1, the first preset is this goal, with the
+    standardised posture difference of random search there. The method shown first is the method
     from a file with the smallest gap, or else the method at the shared goal, or the first one.
     """
     presets, first = [], ""
@@ -90,7 +91,8 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """Return the run of a cell nearest the median reward, in the form of ``model.js``.
+    """Return the run of a cell (task, label) nearest the median reward, in the form of
+    ``model.js``: ``run``, the beginning of its id, ``ticks`` and ``movements``.
 
     Empty if the cell has no solution, or a solution that follows a path.
     """

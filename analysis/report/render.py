@@ -50,7 +50,8 @@ def table_csv(frame: pd.DataFrame) -> str:
 
 
 def _guarded(value: Any) -> Any:
-    """Return a value; text that a spreadsheet would take for a formula behind an apostrophe."""
+    """Return a value unchanged, or, for text that a spreadsheet would take for a formula, the text
+    behind an apostrophe."""
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
@@ -79,7 +80,8 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
 
 
 def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
-    """Return whether a frame has a column that is the end of an interval, or the SD, of another."""
+    """Return whether ``name`` is a column of a frame that has the end of an interval, or the SD, of
+    another of its columns: ``gap_low``, ``gap_high``, ``reward_sd``."""
     start = re.sub("_(low|high|sd)$", "", name)
     both = start != name and {start, name} <= {*frame.columns}
     return both and table.column(start).ending in ("[]", "±", "[*]")
@@ -116,9 +118,9 @@ def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
 def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
     """Return a table in HTML.
 
-    Its first column stays while the others scroll. Rows have links and the classes of
-    :func:`classes_of`. A text that is the same in all rows moves to the caption. Cells without a
-    value are empty.
+    Its first column stays while other columns scroll. Rows have links, and the classes ``own`` and
+    ``setting`` (:func:`classes_of`). A text that is the same in all of three rows or more moves to
+    the caption. Cells without a value are empty.
     """
     slug = slugs(map(str, frame.index))
     cells: list[list[str]] = []
@@ -172,9 +174,10 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 
 
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return the columns of :data:`IN_LATEX` as a table in LaTeX, with booktabs and longtable.
+    """Return a table in LaTeX, with booktabs and longtable, in the columns that :data:`IN_LATEX`
+    has for its id.
 
-    ``notes`` are below the table, with the meaning of a dagger in it.
+    ``notes``, sentences, are below the table, with the meaning of a dagger in it.
     """
     frame = frame if table.id in ("contexts", "methods") else frame[~is_setting(frame)]
     columns = columns_of(table, frame)

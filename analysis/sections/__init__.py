@@ -25,6 +25,7 @@ class Section:
     id: str
     title: str
     tables: tuple[Table, ...]
+    """Tables of the section, functions of a study."""
     figures: tuple[DrawsFigure, ...] = ()
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
     folds all figures but the first."""
@@ -52,10 +53,14 @@ SECTIONS = (
 {% for use in uses %}
 {% for row in leading(complete[complete.information == use]) %}
 {% if loop.first %}
-Gap to the {{ reference }}, {{ use }}: \
+Gap to the {{ reference }}, {{ use }}{{ ", not with equal trials" if use in unequal }}: \
 {% endif %}
 {{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
 {%- endfor %}
+
+{% endfor %}
+{% for sentence in not_ranked %}
+{{ sentence }}
 
 {% endfor %}
 {% for own, group in others[0].groupby("own", sort=False) %}
@@ -74,8 +79,9 @@ tasks that it solved ({{ group.tasks.iloc[0] }}): \
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
-        "against-learner). Empty: the runs are too few, or too alike, to tell. A method with "
-        "missing tasks or failed runs has no gap over all tasks. What an own method uses is as its "
+        "against-learner). Empty: the runs are too few, or too alike, to tell. Ranked are methods "
+        "that solved all tasks in at most as many trials as the others; own methods that did not "
+        "stand below. What an own method uses is as its "
         "author declares; own methods are bold.",
         single=False,
     ),

@@ -27,7 +27,7 @@ from coartic.analysis.method_frame import headline_methods
 from coartic.analysis.methods import LEARNERS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
-from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
+from coartic.analysis.signatures.two_contexts import SAME, TwoContexts, context_pairs
 from coartic.analysis.statistics.hypotheses import exchange_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
@@ -36,7 +36,7 @@ from coartic.estimates import LEVEL, difference_of_means, mean
 from coartic.pictures.drawing import MARKERS
 from coartic.robot import HANDS
 
-SAME = 1e-9
+ROUNDING = 1e-9
 """Largest posture difference that counts as rounding, length unit and rad mixed."""
 
 
@@ -56,8 +56,9 @@ def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
 
 @cached
 def shared_goal(study: Study) -> TwoContexts | None:
-    """Return the runs at the first goal that two tasks share, of the first of these methods: the
-    paper's learner, methods from files, methods that represent their algorithms, other methods.
+    """Return the runs at the first goal that two tasks share, of the first method with such runs,
+    in this order: the paper's learner, methods from files, methods that represent their algorithms,
+    other methods.
 
     None if no method has solved runs on two such tasks.
     """
@@ -120,11 +121,11 @@ def list_contexts(study: Study) -> Rows:
     ),
 )
 def list_signatures(study: Study) -> Rows:
-    """List the signatures of every method on every task, next to those of random search.
+    """List the signatures of every method on every task, next to the signatures of random search.
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
-    the choice of hands (``hands`` empty). Means over runs; p is one-tailed and uncorrected.
-    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
+    the choice of hands (``hands`` empty). Means over runs; p is of the one-tailed exchange test and
+    uncorrected. ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
@@ -157,8 +158,10 @@ def verdict_of(
 ) -> str:
     """Return in words whether the posture at a shared goal depends on the next goal.
 
-    For stochastic methods by the permutation test; methods that select their solution from trials
-    are compared with random search, too. ``control`` is the result of :func:`_beside_control` for
+    Of stochastic methods, the permutation test distinguishes postures, and the 90 % interval of the
+    difference, below :data:`.SAME`, shows that they are the same; of others the difference itself
+    does both. Methods that select their solution from trials are compared with random search, too.
+    ``control`` is the result of :func:`_beside_control` for
     ``shared``; None: computed here. ``p`` is the p-value corrected for all shared goals of the
     method; NaN: that of ``shared`` alone.
     """
@@ -166,9 +169,15 @@ def verdict_of(
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
     if method.stochastic and not can_tell:
         return "too few runs"
-    if not method.stochastic and shared.posture_difference <= SAME:
-        return "the same posture"
-    if method.stochastic and not (shared.p if math.isnan(p) else p) < LEVEL:
+    if method.stochastic:
+        differs = (shared.p if math.isnan(p) else p) < LEVEL
+        is_same = shared.p_same < LEVEL
+    else:
+        differs = shared.posture_difference > ROUNDING
+        is_same = shared.posture_difference < SAME
+    if is_same:
+        return "different, negligible" if differs else "the same posture"
+    if not differs:
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"
@@ -181,8 +190,8 @@ def verdict_of(
 
 def _beside_control(study: Study, shared: TwoContexts) -> Row:
     """Return the posture difference of random search in the same two contexts (``control``), the
-    number of its runs (``control_runs``), and the p-value of the test that the method's difference
-    exceeds it (``p_random_search``); empty without such a control."""
+    number of its runs (``control_runs``), and the p-value of the permutation test that the method's
+    posture difference exceeds this difference (``p_random_search``); empty without such runs."""
     control = contexts_of_control(study, shared)
     if control is None:
         return {}
@@ -200,7 +209,8 @@ def _beside_control(study: Study, shared: TwoContexts) -> Row:
     "to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw postures at a goal before two different next goals, and those of random search."""
+    """Draw a method's postures at a goal before two different next goals, and the postures of
+    random search there."""
     shared = shared_goal(study)
     if shared is None:
         return None
@@ -227,8 +237,9 @@ def draw_postures(study: Study) -> Parts | None:
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
-    """Draw the postures of runs at a shared goal, runs thin and their means thick; return a frame
-    of the postures, a row for each run, for each of the two tasks."""
+    """Draw the postures of runs at a shared goal, runs thin and their means thick; return two
+    frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``, ``hand`` and
+    the posture, a column for each joint."""
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius

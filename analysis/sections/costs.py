@@ -51,8 +51,9 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 
 def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
-    """Return the best reward after numbers of trials, shape as of ``trials``, for a run of
-    :func:`improvements`; NaN before its first reward."""
+    """Return the best reward after numbers of trials, ticks, in the shape of ``trials``; NaN before
+    the first reward. ``steps``: the trials of a run with a new best reward, from 1, and these
+    rewards (:func:`improvements`)."""
     numbers, rewards = steps
     return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
 
@@ -74,14 +75,15 @@ def spans(study: Study) -> dict[str, tuple[float, int]]:
 def times_of(
     study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
-    """Return the cost ``spend``, one of :data:`SPENDS`, at which each run of a method on a task of
-    :func:`spans` reached each target, shape ``(runs, targets)``.
+    """Return the cost ``spend`` (``trials``, ``forward_kinematics`` or ``solve_s``) at which each
+    run of a method on a task of :func:`spans` reached each target, shape ``(runs, targets)``.
 
-    ``shares`` are the targets, as in :data:`TARGETS`. Infinite for a target that the run did not
-    reach; a solved run without a known cost has no row. A planner reaches its targets at its end.
-    Forward-kinematics evaluations and time (:func:`solve_times`) are totals of a run, spread evenly
-    over its trials, an approximation: over the first 10 to 1000 of 10 000 trials, evaluations were
-    0.6 to 1.5 times their even share, 3.4 times for the first 10 of CMA-ES on two-armed 1.
+    ``shares`` are the targets, as shares of the distance from the corrective process alone to the
+    optimum. Infinite for a target that the run did not reach; a solved run without a known cost has
+    no row. A planner reaches its targets at its end. Forward-kinematics evaluations and time
+    (:func:`solve_times`) are totals of a run, spread evenly over its trials, an approximation: over
+    the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times their even share, 3.4
+    times for the first 10 of CMA-ES on two-armed 1.
     """
     initial, optimum = spans(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
@@ -116,8 +118,8 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 @cached
 def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return the runs of each compared method on the tasks of :func:`.common_tasks` that have
-    targets, by label.
+    """Return the runs of each compared method on the common tasks of methods
+    (:func:`.common_tasks`) that have targets (:func:`spans`), by label.
 
     A method that did not run on all these tasks is left out; a method from a file then has its runs
     on all its tasks with targets.
@@ -136,7 +138,8 @@ def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
 def _times_on_tasks(
     study: Study, runs: pd.DataFrame, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> list[Array]:
-    """Return a list of :func:`times_of`, for each cell of runs of a method, in their order."""
+    """Return a list of the costs at which targets were reached, shape ``(runs, targets)`` each
+    (:func:`times_of`), for each cell of ``runs``, runs of a method, in their order."""
     return [times_of(study, *cell, spend, shares) for cell in standings.cells_of(runs)]
 
 
@@ -146,8 +149,8 @@ def runtimes(
     """Return the share of reward targets that methods reach within a budget: the ECDF of running
     times.
 
-    For the methods that the report compares and that ran on all tasks; methods from files that did
-    not are taken on the tasks on which they ran. Tasks have the same weight.
+    Methods are those that the report compares and that ran on all tasks, and methods from files
+    that did not, each on the tasks on which it ran. Tasks have the same weight.
 
     Parameters
     ----------

@@ -20,7 +20,8 @@ def list_methods(study: Study) -> Rows:
     """List every method on every task: mean reward, gap, hands and costs (medians).
 
     Within a task, searches for the optimum come first, then methods from the highest mean reward
-    on. ``median_run`` is the beginning of the id of the run with the reward nearest to the median.
+    on. ``median_run`` is the beginning of the id of the run with the reward nearest to the median;
+    None without a solved run.
     """
     places, rows = {task: place for place, task in enumerate(one_by_one(study))}, []
     for (task, label), runs in study.cells.items():

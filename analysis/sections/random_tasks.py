@@ -44,8 +44,9 @@ def on_instances(study: Study) -> pd.DataFrame:
 
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
-    """Return the gaps of a method's runs on each instance, by family, of the families whose every
-    instance is among the runs, as of :func:`on_instances`."""
+    """Return the gaps of a method's runs on each instance, shape ``(n,)`` each, by family.
+    ``runs`` are rows of :func:`on_instances`; families that lack an instance there are left
+    out."""
     return {
         str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
         for family, of_family in runs.groupby("family", sort=False)
@@ -62,9 +63,9 @@ def list_family_gaps(study: Study) -> Rows:
     intervals about other tasks.
 
     A method that did not solve every run of every instance of a family has gap NaN in the family,
-    and over families with two arms if the family has two, as in the ranking.
-    ``instances``: on how many it solved every run, and ``missing``: how many others there are, of
-    families with two arms, or of all families on which it ran if they have one arm.
+    and over families with two arms if the family has two, as in the ranking. ``instances`` is the
+    number of instances on which it solved every run, ``missing`` the number of other instances, of
+    families with two arms, or, for a method that ran on families with one arm alone, of these.
     """
     every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}

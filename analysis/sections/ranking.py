@@ -47,10 +47,10 @@ _EARLY = 1_000
 def list_against_learner(study: Study) -> Rows:
     """List the mean rewards of every method and of the learner (EC1, EC4 on two arms), by task.
 
-    For methods that solved every run; p is corrected over the tasks of a method (Holm). The reward
-    of a deterministic method counts as exact. The test takes samples as independent, though runs
-    have the same seeds: with 100 runs of the learner and 20 of the other method, pairs would leave
-    out 80.
+    For methods that solved every run; p is two-sided, of the exchange test, or, for a deterministic
+    method, whose reward counts as exact, of the bootstrap test, and is corrected over the tasks of
+    a method (Holm). The exchange test takes samples as independent, though runs have the same
+    seeds: with 100 runs of the learner and 20 of the other method, pairs would leave out 80.
     """
     for label, method in study.methods[~study.methods.is_search].iterrows():
         cells, tests = [], []
@@ -77,8 +77,9 @@ def list_against_learner(study: Study) -> Rows:
 
 
 def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
-    """Return a copy of runs with the best ``reward`` of the first ``trials`` trials of each, NaN if
-    none succeeded; runs without trials keep their reward. Column ``gap`` stays as it is."""
+    """Return a copy of runs whose ``reward`` is the best of their first ``trials`` trials, NaN if
+    none of these succeeded; runs without trials keep their reward. Column ``gap`` stays as it
+    is."""
     learned, best = improvements(study), list[float]()
     rewards = runs.reward.to_numpy(np.float64, na_value=math.nan)
     for run_id, reward in zip(runs.run_id, rewards, strict=True):
@@ -88,23 +89,23 @@ def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
 
 
 @table(
-    "Gap and share of the possible gain, over all tasks, and gap on each",
+    "Gap and share of the possible gain, means over {tasks}, and gap on each",
     "method; gap[]: gap (%) .1; share[]: share of the gain (%) .0; information: use of the reward; "
     "better: better than the learner on (tasks); worse: worse on (tasks); "
-    "gap_early: -; on *: {} (%) .1; tasks; missing: -; without_gain: -; "
+    "gap_early: -; ranked: -; on *: {} (%) .1; tasks; missing: -; without_gain: -; "
     "forward_kinematics: -; cpu_s: -; runs; failed: -",
 )
 def list_ranking(study: Study) -> Rows:
-    """List gaps and shares over all tasks, and gaps on each, methods from files first, settings
-    after their method.
+    """List gaps and shares over all tasks, and gaps on each, in the order of :func:`.board`,
+    settings after their method.
 
     ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
-    them, over the ``tasks`` that it solved. Also the gap after a thousand trials, and means of what
-    a run costs.
+    them, which is not ``ranked``, over the ``tasks`` that it solved. Also the gap after a thousand
+    trials, and means of what a run costs.
     """
     tested, runs = list_against_learner(study), common_runs(study)
     scores = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
-    wide = board(study).reindex(columns=[*scores, "tasks", "without_gain"])
+    wide = board(study).reindex(columns=[*scores, "tasks", "without_gain", "ranked"])
     if len(runs):
         wide["gap_early"] = ranking(_after(study, runs, _EARLY)).gap
     wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
@@ -129,15 +130,11 @@ def list_ranking(study: Study) -> Rows:
 
 
 def _ranked(study: Study) -> list[str]:
-    """Return the labels of the methods of the ranking: methods from files, then built-in ones.
-
-    In both groups the smallest mean gap is first, and methods without a gap follow in the
-    order of :attr:`.Study.methods`. But a setting or an ablation stands after its method, if
-    that method is in the list.
-    """
+    """Return the labels of the methods of the ranking, in the order of :func:`.board`; methods
+    without a gap follow in the order of :attr:`.Study.methods`. But a setting or an ablation stands
+    after its method, if that method is in the list."""
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
-    names.sort(key=lambda method: bool(study.methods.built_in[method]))
     under = study.methods.under
 
     def with_settings(first: str) -> Iterator[str]:
@@ -160,7 +157,7 @@ def list_differences(study: Study) -> Rows:
     """List for each method from a file the built-in methods with the same use of the reward, with
     their gaps less its gap, on the tasks on which it solved every run; the smallest gap first.
 
-    Built-in methods are those that solved every run there, without settings and ablations.
+    Only built-in methods that solved every run there are listed, without settings and ablations.
     Intervals are for other runs on the same tasks.
     """
     methods = study.methods
@@ -178,8 +175,8 @@ def list_differences(study: Study) -> Rows:
 
 
 def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
-    """Return the mean gap of the ``first`` method less that of the ``second``, each a mean over
-    ``tasks``.
+    """Return the mean gap of the ``first`` method (a label) less the mean gap of the ``second``,
+    each a mean over ``tasks``.
 
     Tasks are not matched. Gaps of deterministic methods are taken as exact. The interval is for
     other runs on these tasks; two exact gaps have no interval.

@@ -23,7 +23,8 @@ IN_MEMORY = 500
 
 
 def _groups(*groups: Numbers) -> list[Array]:
-    """Return groups of runs. Raises ValueError where not all are of shape ``(runs, dof)``."""
+    """Return groups of runs as arrays of float64. Raises ValueError unless all have shape ``(runs,
+    dof)``, with the same ``dof`` and a run at least."""
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
         raise ValueError(f"runs have shapes {shapes}; needed is (runs, dof) of each")
@@ -40,7 +41,8 @@ def distance_of_means(first: Array, second: Array) -> float:
 
 
 def standardised_posture_difference(first: Array, second: Array) -> float:
-    """Return :func:`distance_of_means` in pooled standard deviations within contexts, 0 to ∞.
+    """Return the distance of the mean configurations of two contexts, ``(runs, dof)`` each, in
+    pooled standard deviations within contexts, 0 to ∞.
 
     d = ‖m₁ − m₂‖ / s, s² = (Σ‖x − m₁‖² + Σ‖x − m₂‖²) / (n₁ + n₂ − 2),
 
@@ -63,14 +65,16 @@ def posture_difference_below(
     bound: float,
     rng: np.random.Generator,
     *,
+    standardised: bool = True,
     resamples: Resamples = RESAMPLES,
 ) -> float:
-    """Test that the standardised posture difference is below a bound, by the bootstrap.
+    """Test that the posture difference is below a bound, by the bootstrap.
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, the share of bootstrap samples,
     with runs drawn within each context, whose :func:`standardised_posture_difference` is at least
-    ``bound`` (in SDs); the observed sample counts, too. Noise adds to distances, so that p is
-    rather too large. NaN if a context has a single run.
+    ``bound`` (in SDs), or if not ``standardised`` whose :func:`distance_of_means` is; the observed
+    sample counts, too. Noise adds to distances, so that p is rather too large. NaN if a context has
+    a single run.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -82,7 +86,7 @@ def posture_difference_below(
             drawn = group[rng.integers(len(group), size=(rows.stop - rows.start, len(group)))]
             means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
-    pooled = np.sqrt(squares / (sum(map(len, groups)) - 2))
+    pooled = np.sqrt(squares / (sum(map(len, groups)) - 2)) if standardised else 1.0
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
     return float(1 + reached.sum()) / (resamples + 1)
 
@@ -90,7 +94,8 @@ def posture_difference_below(
 def permutation_p(
     first: Array, second: Array, rng: np.random.Generator, *, resamples: Resamples = RESAMPLES
 ) -> float:
-    """Test that :func:`distance_of_means` exceeds chance, by a one-sided permutation test of runs.
+    """Test that the distance of the mean configurations of two contexts exceeds chance, by a
+    one-tailed permutation test of runs.
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if all
     permutations are no more than ``resamples``, 1 if all runs are equal, NaN if a context has a
@@ -118,7 +123,8 @@ def permutation_p(
 
 
 def smallest_p(first: int, second: int, resamples: Resamples = RESAMPLES) -> float:
-    """Return the smallest p of :func:`permutation_p` for the numbers of runs in two contexts."""
+    """Return the smallest p that the permutation test of runs (:func:`permutation_p`) can give, for
+    the numbers of runs in two contexts."""
     return 1 / min(math.comb(first + second, first), 1 + resamples)
 
 

@@ -33,7 +33,8 @@ def _other(hand: Hand) -> Hand:
 def isolated_reaches(
     task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
 ) -> tuple[Array, Array]:
-    """Return r(q, g, h) and R(q, g, h), the ticks and ends of reaches by the corrective process.
+    """Return r(q, g, h) and R(q, g, h), the ticks and the configurations at the end of reaches from
+    q to goal g with hand h by the corrective process.
 
     Parameters
     ----------
@@ -71,7 +72,8 @@ def isolated_reaches(
 
 @checked_arguments
 def gain_at_next(runs: Solutions) -> Array:
-    """Return the ticks that the posture at each goal saves on the way to the next, (n, G − 1).
+    """Return the ticks that the posture at each goal saves on the way to the next goal, shape
+    ``(n, G − 1)``: positive where the movement to the next goal is shorter.
 
     r(q', g + 1, h(i, g + 1)) − r(q'', g + 1, h(i, g + 1)),
 
@@ -114,15 +116,17 @@ def ticks_slower(runs: Solutions) -> Array:
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """Return the share of the way to its next goal that the idle hand covers, shape ``(G,)``.
+    """Return the share of the way to its next goal that the idle hand covers, shape ``(G,)``, for a
+    completed ``run``.
 
     (d_held(g) − d(g)) / d_initial(g),
 
     where d(g) is the distance of the idle hand to the next goal of this hand at the hit of goal g;
     d_held(g) is this distance if the idle arm had kept its joints since its own last hit (or the
-    start); and d_initial(g) is the distance at goal g in ``initial``, the corrective process alone
-    with the task's hands. 0 if the arm keeps still, whatever the base does (always under
-    exploration conditions 1 and 3). NaN if the idle hand hits no later goal, or d_initial(g) is 0.
+    start); and d_initial(g) is the distance of the same hand to the same goal at the hit of goal g
+    in ``initial``, a completed run of the corrective process alone with the task's initial hands.
+    NaN if the idle hand hits no later goal (always under exploration condition 1), or d_initial(g)
+    is 0; else 0 if the idle arm keeps still, whatever the base does (always under condition 3).
     """
     now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
@@ -146,11 +150,12 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
 @dataclass(frozen=True)
 class Signature:
-    """A signature of coarticulation, and what it measures, in ``words``."""
+    """A signature of coarticulation."""
 
     each: Callable[[Solutions], Array]
     """Function that returns the signature of each run, shape ``(n,)``, NaN for runs without it."""
     words: str
+    """The quantity that the signature measures, in words with its unit."""
 
 
 @checked_arguments
@@ -176,8 +181,8 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 @checked_arguments
 def other_arm(runs: Solutions) -> Array:
-    """Return for each run the mean of :func:`preshaping` over the goals after which the idle hand
-    hits a later goal.
+    """Return for each run, shape ``(n,)``, the share of the way to its next goal that the idle hand
+    covers, a mean of :func:`preshaping` over the goals after which the idle hand hits a later goal.
 
     Negative where the idle hand moves away. NaN on a task for one hand, without an initial
     solution, and for a run whose idle hand never hits a later goal.
@@ -193,9 +198,9 @@ def other_arm(runs: Solutions) -> Array:
 
 @checked_arguments
 def arm(runs: Solutions) -> Array:
-    """Return for each run the ticks that the postures of base and chosen arm save on the way to the
-    next goal: the mean of :func:`gain_at_next` over goals g < G; NaN if it is NaN for one of them,
-    and on a task with one goal."""
+    """Return for each run, shape ``(n,)``, the ticks that the postures of base and chosen arm save
+    on the way to the next goal: the mean of :func:`gain_at_next` over goals g < G; NaN if a gain of
+    the run is NaN, and on a task with one goal."""
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
     return np.asarray(gain_at_next(runs).mean(axis=1))

@@ -21,12 +21,17 @@ from coartic.analysis.signatures.context_tests import (
     beyond_p,
     distance_of_means,
     permutation_p,
+    posture_difference_below,
     standardised_posture_difference,
 )
 from coartic.analysis.solutions import Solutions
 from coartic.estimates import SEED
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import KEPT
+
+SAME = 0.01
+"""Posture difference, length unit and rad mixed, below which postures are the same: the robot's
+step."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -44,7 +49,8 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
 
 
 def movable(task: Task, hand: Hand) -> Array:
-    """Return the indices in a configuration that move a hand: free base coordinates and its arm."""
+    """Return the indices in a configuration that move a hand, shape ``(k,)``: of base coordinates
+    that are not locked, and of the joints of its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
@@ -115,7 +121,7 @@ class TwoContexts:
 
     @property
     def in_both(self) -> bool:
-        """True if each context has a run that hits ``goal`` with ``hand``, without which posture
+        """True if each context has a run that hits ``goal`` with ``hand``; if False, posture
         differences and p raise ValueError."""
         return all(map(len, self.configurations))
 
@@ -136,7 +142,8 @@ class TwoContexts:
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Motor-equivalent and other part of the posture difference (:func:`motor_equivalence`)."""
+        """Motor-equivalent part of the posture difference, which leaves the hand where it is, and
+        the other part, each per dimension (:func:`motor_equivalence`)."""
         task, joints = self.first.task, movable(self.first.task, self.hand)
         posture = np.concatenate(self.configurations).mean(axis=0)
         first, second = (configurations.mean(axis=0) for configurations in self.configurations)
@@ -145,12 +152,21 @@ class TwoContexts:
 
     @cached_property
     def p(self) -> float:
-        """P-value of the permutation test of runs; NaN if a context has a single run."""
+        """P-value of the one-tailed permutation test that the posture difference exceeds chance
+        (:func:`.permutation_p`); NaN if a context has a single run."""
         return permutation_p(*self.configurations, self._rng("context dependence"))
 
+    @cached_property
+    def p_same(self) -> float:
+        """P-value of the test that the posture difference is below :data:`SAME`, by the bootstrap:
+        below 5 % if its 90 % interval is. NaN if a context has a single run."""
+        rng = self._rng("sameness")
+        return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
+
     def p_beyond(self, other: TwoContexts) -> float:
-        """Return the p-value of the test that the posture difference exceeds that of ``other``,
-        another method at the same goal (:func:`.beyond_p`); NaN if a context has a single run."""
+        """Return the p-value of the permutation test that the posture difference exceeds the
+        posture difference of ``other``, another method at the same goal: twice the upper tail
+        (:func:`.beyond_p`); NaN if a context has a single run."""
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:

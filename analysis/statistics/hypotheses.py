@@ -130,8 +130,9 @@ def exchange_test(
 
 
 def _statistics(pool: Array, places: NDArray[np.intp], n: int) -> Array:
-    """Return the difference of means over its standard error for each row of ``places``: in the
-    pool the places of the first sample, of ``n`` values, or of the second if that is smaller."""
+    """Return the difference of means (first less second sample) over its standard error for each
+    row of ``places``, shape ``(rows,)``. A row has the places in ``pool`` of the first sample, of
+    ``n`` values, or, with fewer places, of the second sample."""
     few = places.shape[1]
     values = pool[places]
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
@@ -150,7 +151,7 @@ def _statistics(pool: Array, places: NDArray[np.intp], n: int) -> Array:
 
 def _studentised(differences: Array, variances: Array, size: float) -> Array:
     """Return differences over the roots of variances, 0 for no difference and infinite without
-    variance. Rounding is neither, of values of this ``size``."""
+    variance. Differences and variances that are rounding of values of ``size`` count as 0."""
     differences = np.where(np.abs(differences) < NEGLIGIBLE * size, 0.0, differences)
     variances = np.where(variances < (NEGLIGIBLE * size) ** 2, 0.0, variances)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -158,7 +159,9 @@ def _studentised(differences: Array, variances: Array, size: float) -> Array:
 
 
 def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
-    """Return how many statistics are at least as extreme as the observed one."""
+    """Return how many statistics in ``null``, ``(n,)``, are at least as extreme as ``observed``, up
+    to rounding: as high for ``"greater"``, as low for ``"less"``, as far from 0 for
+    ``"two-sided"``."""
     if alternative == "two-sided":
         null, observed = np.abs(null), abs(observed)
     extreme = null <= observed if alternative == "less" else null >= observed
@@ -166,8 +169,9 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 
 
 def _places(size: int, resamples: int) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Yield a slice of the resamples and the places of the values that these draw, shape ``(size,
-    length of the slice)``. Equal arguments give equal places."""
+    """Yield pairs that together cover all resamples of a sample of ``size`` values: a slice of the
+    resamples, and the indices of the values that these resamples draw, shape ``(size, length of the
+    slice)``. Equal arguments give equal indices."""
     rng = np.random.default_rng(SEED)
     for part in slices(resamples, max(1, IN_CACHE // size)):
         places = rng.integers(size, size=(part.stop - part.start, size))
@@ -176,7 +180,9 @@ def _places(size: int, resamples: int) -> Iterator[tuple[slice, NDArray[np.int64
 
 @lru_cache(maxsize=16)  # most samples have as many values as another
 def _kept_places(size: int, resamples: int) -> list[tuple[slice, NDArray[np.int64]]]:
-    """Return all of :func:`_places`, kept for further samples of the size: do not change it."""
+    """Return a list of pairs of a slice of the resamples and the places that these draw, ``(size,
+    length of the slice)`` (:func:`_places`). It is kept for further samples of this size: do not
+    change it."""
     return [*_places(size, resamples)]
 
 
@@ -186,9 +192,9 @@ def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> N
 
 
 def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.intp]]:
-    """Yield parts of ``count`` exchanges, all of them if ``exact``: in a pool of ``n + m`` values
-    the places of the sample of ``n`` values, or of the other if that is smaller, a row for each.
-    Equal arguments give equal places."""
+    """Yield parts of ``count`` exchanges, all possible ones if ``exact``: arrays ``(rows, min(n,
+    m))``, with a row for each exchange, the places in a pool of ``n + m`` values that become the
+    smaller sample (of two equal ones the first). Equal arguments give equal places."""
     rng, few = np.random.default_rng(SEED), n if n <= m else m
     every = combinations(range(n + m), few)
     for part in slices(count, max(1, IN_CACHE // (n + m))):
@@ -198,7 +204,8 @@ def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.i
 
 @lru_cache(maxsize=16)
 def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.intp]]:
-    """Return all of :func:`_exchanges`, kept for further samples: do not change it."""
+    """Return a list of the parts of ``count`` exchanges, arrays of places ``(rows, min(n, m))``
+    (:func:`_exchanges`). It is kept for further samples of these sizes: do not change it."""
     return [*_exchanges(n, m, count, exact)]
 
 
@@ -206,7 +213,8 @@ def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.
 def share_test(count: _Count, total: _Count, share: _Share, alternative: Alternative) -> Estimate:
     """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
-    The value of the estimate is the difference ``count / total - share``.
+    The value of the estimate is the difference ``count / total - share``, its ``p`` one-tailed for
+    ``"greater"`` and ``"less"``.
     """
     p = float(scipy.stats.binomtest(count, total, share, alternative).pvalue)
     return Estimate(count / total - share, p=p, n=(total,))

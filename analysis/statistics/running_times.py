@@ -23,8 +23,8 @@ RunningTimes = Sequence[Array]
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the finite running times in ascending order, the weight of each, and the number of its
-    run, from 0 through all tasks.
+    """Return the finite running times in ascending order, and for each its weight and the number of
+    its run, from 0 through all tasks; shape ``(k,)`` each.
 
     The weights of all pairs of run and target, also of pairs that are not reached, sum to 1; each
     task has the same weight and needs a run.
@@ -38,9 +38,10 @@ def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Return the budgets at which the share of reached targets rises, and the shares from there on.
+    """Return the budgets at which the share of reached targets rises, ``(k,)``, and the share from
+    each budget on, ``(k,)``.
 
-    An infinite budget and a share of 0 if no target is reached.
+    If no target is reached, one infinite budget with a share of 0.
     """
     values, weights, _ = _pairs(times)
     if not len(values):
@@ -78,7 +79,8 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
 
 
 def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Array]:
-    """Return low and high ends of the interval of the share of targets reached within each budget.
+    """Return low and high ends, ``(budgets,)`` each, of the 95 % interval of the share of targets
+    reached within each budget.
 
     The percentile interval is of the bootstrap over runs within tasks; NaN if a task has fewer than
     three runs.

@@ -23,7 +23,7 @@ import coartic
 from coartic.cli import draw, read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.text import LONGEST_LINE, error_line, plain
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -111,4 +111,10 @@ def main() -> None:
     except OSError as error:
         place = f": {plain(str(error.filename), LONGEST_LINE)}" if error.filename else ""
         complain("Error", f"{error.strerror or error}{place}")
+        sys.exit(1)
+    except ModuleNotFoundError:
+        raise
+    except (MemoryError, ImportError) as error:  # a library that finds no room is not loaded
+        words = "Is memory limited (`ulimit -v`)? What was written is kept; repeat the command"
+        complain("Error", f"{error_line(error)}. {words}")
         sys.exit(1)

@@ -23,12 +23,14 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for a file or a folder, by its flags ``names``; ``what`` is its help."""
+    """Return an option for a file or a folder, by its flags ``names``; ``metavar`` names its value
+    in the help, ``what`` is its help."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
 def option(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for text, or for files that are read later; see :func:`file_or_folder`."""
+    """Return an option for text, or for files that are read later, by its flags ``names``;
+    ``metavar`` names its value in the help, ``what`` is its help."""
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
@@ -119,8 +121,8 @@ def method_names(registered: Registry) -> Mapping[str, str]:
 
 
 def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = True) -> list[str]:
-    """Return the ids of methods from names and wildcards that users write; wildcards themselves
-    without ``expand``.
+    """Return the ids of methods from names and wildcards that users write; without ``expand`` a
+    wildcard for several methods is returned unchanged.
 
     Raises CoarticError for an unknown name.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,33 +66,38 @@ def report(
         sys.exit(1)
 
 
-def say_ranking(study: Study, *more: tuple[str, str]) -> None:
+def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
     """Print a table, then pairs of a word and a text.
 
     The table has at most ten methods of the ranking, without settings and ablations: those
-    with the smallest gaps and, wherever they rank, the learner and random search. The pairs
-    are the findings on coarticulation and on cost, numbers of runs and trials that are not
-    those of the paper, the failed runs, and ``more``.
+    with the smallest gaps and, wherever they rank, the learner and random search; and all methods
+    from files and of the labels ``asked``, also below the ranking. The pairs are the reasons why
+    these are not ranked, the findings on coarticulation and on cost, numbers of runs and trials
+    that are not those of the paper, the failed runs, and ``more``.
     """
+    from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
-    from coartic.analysis.sections import SECTIONS, TABLES
+    from coartic.analysis.sections import SECTIONS
+    from coartic.analysis.standings import board, not_ranked, shown_name
     from coartic.analysis.words import interval, number
     from coartic.learner.learning import TRIALS
 
-    rows = TABLES["ranking"](study).dropna(subset="gap").sort_values("gap", kind="stable")
-    rows = rows[~rows.method.isin(study.methods.index[study.methods.under != ""])]
-    named = [row["method"] for row in leading(rows)]
-    rows = rows[rows.method.isin([*rows.method[: 12 - len(named)], *named])]
+    also = frozenset(asked)
+    rows = without_settings(board(study, also)).reset_index(names="method")
+    named = [row["method"] for row in leading(rows[rows.ranked])]
+    first = rows.method[rows.ranked][: 12 - len(named)]
+    rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
     say_table(
         ("method", "gap (%)", "share of the gain (%)", "runs"),
         [
-            (study.methods.title[row["method"]], interval(row, "gap", scale=100),
+            (shown_name(study, row["method"]), interval(row, "gap", scale=100),
              interval(row, "share", 0, 100), number(row["runs"]))
             for row in rows.to_dict("records")
         ],
     )  # fmt: skip
+    pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
-    pairs = [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
+    pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
     unlike = [f"{what['few']} runs, not {RUNS}"] * bool(what["few"])
     unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
@@ -145,8 +151,8 @@ def verify(
 def _perform_again(
     folder: Path, count: int, run_id: str | None, method_file: list[Path] | None
 ) -> int:
-    """Perform a run of a folder again, or without ``run_id`` so many of its runs; print what
-    differs and return the number of runs that do."""
+    """Perform a run of a folder again, or, without ``run_id``, ``count`` of its runs; print the
+    differences from the stored runs and return the number of runs with another result."""
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
     from coartic.runs.store import open_store
@@ -175,8 +181,8 @@ def _perform_again(
 
 
 def _describe_run(run: Run, code: str) -> None:
-    """Print id, seed, parameters and result of a run, and that its method is known by another
-    ``code`` here, if it is."""
+    """Print id, seed, parameters and result of a run, and, if ``code``, the version or code of its
+    method here, is another one than the run's, a sentence that says so."""
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.runs.plan import in_words

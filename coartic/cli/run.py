@@ -1,9 +1,10 @@
-"""Commands that run suites, list what there is, and begin your own method."""
+"""Commands that run suites, list tasks, suites and methods, and begin your own method."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ import typer
 
 from coartic.cli import arguments as given
 from coartic.cli.read import say_ranking
-from coartic.cli.terminal import Display, say, say_pairs
+from coartic.cli.terminal import Display, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
@@ -86,59 +87,64 @@ def run(
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.runner import perform
     from coartic.benchmarks.suites import load_suite, suites
+    from coartic.runs.store import open_store
 
     if suite is None:
         raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
-    chosen, registered = load_suite(suite), registry(method_file or ())
-    names = given.methods_meant(given.names_in(methods), registered, expand=False)
-    if include and not names:  # the user's own methods alone
-        names = [name for name, info in registered.items() if info.where.endswith(".py")]
-    request = request_for(
-        tasks=given.tasks_meant(given.names_in(tasks)),
-        methods=names,
-        family_files=family_file or (),
-        **{"runs": runs, "trials": trials, "seed": seed},
-        **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
-    )
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
+    chosen, display = load_suite(suite), Display()
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    asked, display = plan(chosen, request, registered), Display()
 
     def saved() -> str:
-        done = counted(display.done, "finished run")
+        there = "no run yet"
+        with suppress(CoarticError), open_store(out) as store:
+            there = counted(len(store.present()), "run")
         others = f" To report {display.others} there, repeat the earlier command."
         kept = others if display.others else ""
-        return one_line(f"Saved in {out}: {done}; repeat the command to resume.{kept}")
+        return one_line(f"Saved in {out}: {there}; repeat the command to resume.{kept}")
 
     with interruptible(saved), display:
+        registered = registry(method_file or ())
+        names = given.methods_meant(given.names_in(methods), registered, expand=False)
+        if include and not names:  # the user's own methods alone
+            names = [name for name, info in registered.items() if info.where.endswith(".py")]
+        request = request_for(
+            tasks=given.tasks_meant(given.names_in(tasks)),
+            methods=names,
+            family_files=family_file or (),
+            **{"runs": runs, "trials": trials, "seed": seed},
+            **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
+        )
+        asked = plan(chosen, request, registered)
+        labels = {job.cell.label for job in asked}
         if include:
-            asked = include_folders(asked, include, out)
+            only = {job.cell.task.name for job in asked} if tasks else None
+            asked = include_folders(asked, include, out, only)
             display.line(f"Included the runs of {' and '.join(include)}.")
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
     if isinstance(runs, range):
-        named = quote(str(out))
-        part = f"{out} has a part of the runs: --include {named}, with all other parts, joins them"
-        say_pairs([("Next", part)])
+        part = f"--include {quote(str(out))}, with all other parts, joins them"
+        say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
-        say_ranking(load(out), ("Next", f"coartic report {quote(str(out))}"))
+        say_ranking(load(out), labels, ("Next", f"coartic report {quote(str(out))}"))
     if progress.crashed:
         sys.exit(1)
 
 
 def list_(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Task, suite, method or family.")
+        str | None, typer.Argument(metavar="NAME", help="Task, suite, method, family or results.")
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """List tasks, suites and methods, or describe one of them."""
+    """List tasks, suites and methods, describe one of them, or list the runs of a folder."""
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
-    from coartic.tasks.families import shipped_families
+    from coartic.tasks.families import load_family, shipped_families
     from coartic.tasks.task import address_of
 
     registered, families = registry(method_file or []), shipped_families()
@@ -158,14 +164,19 @@ def list_(
         )
     (name,) = given.tasks_meant([name])
     if name.endswith(".toml"):
-        check_kind(name, "suite", "task")
+        check_kind(name, "suite", "task", "family")
     kind, methods = kind_of(name), list[str]()
     if kind == "suite":
         pairs = _describe_suite(name, load_suite(name))
-    elif name in builtin_tasks() or address_of(name) or name.endswith(".toml"):
+    elif kind == "results folder":
+        return _list_runs(Path(name))
+    elif kind == "family":
+        pairs = _describe_family(load_family(name), name)
+    elif name in builtin_tasks() or address_of(name) or ".toml" in name:
         pairs = _describe_task(name, load_task(name))
     elif kind == "shipped family":
-        pairs = _describe_family(families.get(name) or families[f"{name}/v1"])
+        family = families.get(name) or families[f"{name}/v1"]
+        pairs = _describe_family(family, family.name)
     else:
         try:
             methods = given.methods_meant([name], registered)
@@ -180,7 +191,8 @@ def list_(
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, size, tasks, methods of a suite, by its name or file."""
+    """Yield pairs of word and text: title, description, numbers of runs and trials, tasks and
+    methods of a suite, and the command that runs it. ``name``: its name or file."""
     from coartic import builtin_tasks
     from coartic.analysis.words import number
 
@@ -207,15 +219,28 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
         yield "Goals are", "reconstructed" if task.reconstructed else "published in the paper"
 
 
-def _describe_family(family: Family) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: description and instances of a family."""
-    yield "Family", f"{family.name}: {family.description}"
-    yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
-    yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
+def _list_runs(folder: Path) -> None:
+    """Print a line for each run of the plan that a results folder has, with the id by which other
+    commands name the run."""
+    from coartic.runs.store import open_store
+
+    with open_store(folder) as store:
+        runs = store.runs()
+    columns = ["run_id", "task", "method", "setting", "run", "reward", "status"]
+    say_table(columns, runs[columns].astype("string").fillna("").to_numpy().tolist())
+    say(f"{folder}: {counted(len(runs), 'run')}.")
+
+
+def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
+    """Yield pairs of word and text: description and instances of a family, by its name or file."""
+    yield "Family", f"{name}: {family.description}"
+    yield "Instances", f"{name}/i000, ... (test); {name}/d000, ... (development)"
+    yield "Draw some", f"coartic draw {quote(name)}/i000..i003 --out FOLDER"
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, declaration, parameters, tasks, source of a method."""
+    """Yield pairs of word and text: title, name, information, parameters and tasks of a method,
+    whether its runs differ by seed, and its citation."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words
@@ -274,7 +299,8 @@ def check(
 
 
 def _show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print the findings and return the number of broken laws."""
+    """Print the finding of each law of ``name``, a method or a task file, and how many hold; return
+    the number of broken laws."""
     for law in laws:
         first, *more = law.finding.splitlines() or [""]
         say(

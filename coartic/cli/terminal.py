@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import os
 import shutil
 import sys
 import textwrap
@@ -10,6 +11,7 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, TextIO
 
+from coartic.errors import CoarticError
 from coartic.internal.text import counted, one_line, plain
 
 if TYPE_CHECKING:
@@ -17,11 +19,12 @@ if TYPE_CHECKING:
     from coartic.runs.plan import Cell
 
 _READABLE = 24  # least width of a column of text, characters
-_ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\u202f": " ", "\xa0": " "}
+_ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\xa0": " "}
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    """Return characters of ASCII for what a terminal lacks: - for a minus sign, ? for others."""
+    """Return ASCII for the characters that a terminal lacks, ``-`` for a minus sign, ``?`` for one
+    without a counterpart, and the place after them, as an error handler of ``codecs`` does."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lacking = error.object[error.start : error.end]
@@ -33,11 +36,22 @@ codecs.register_error("replaced", _replaced)
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print lines; characters that do not print, such as line breaks in names, are replaced, and
-    those that the terminal lacks (:func:`_replaced`)."""
+    those that the terminal lacks (:func:`_replaced`). Raises CoarticError if the standard output
+    cannot be written; where standard error cannot, the lines are lost."""
     stream = stream or sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
-    text = "\n".join(map(one_line, lines)).encode(encoding, "replaced").decode(encoding)
-    print(text, file=stream, end=end, flush=True)
+    text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
+    text = text.encode(encoding, "replaced").decode(encoding)
+    try:
+        print(text, file=stream, end=end, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # such as a full device
+        with open(os.devnull, "w", encoding="utf-8") as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())  # what is left to be written
+        if stream is sys.stdout:
+            words = f"the standard output cannot be written: {error.strerror or error}"
+            raise CoarticError(words) from None
 
 
 def complain(kind: str, text: str) -> None:
@@ -61,8 +75,8 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text below their headings, the first column to the left; nothing without
-    rows."""
+    """Print rows of text below their headings, the first column to the left, other columns to the
+    right; nothing without rows."""
     if rows:
         widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
         for first, *others in (headings, *rows):
@@ -71,10 +85,11 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def say_part(name: str) -> None:
-    """Show on a terminal what is being made, in one line that changes; an empty name ends it."""
+    """Show the name of the part that is being made on a terminal, in one line that changes; an
+    empty name ends the line."""
     if sys.stderr.isatty():
         width = shutil.get_terminal_size().columns - 1
-        print("\r", end="", file=sys.stderr)
+        say("", stream=sys.stderr, end="\r")
         say(f"{plain(name, width):{width}}", stream=sys.stderr, end="" if name else "\r")
 
 
@@ -85,8 +100,6 @@ class Display:
     EVERY_S = 30.0
 
     def __init__(self) -> None:
-        self.done = 0
-        """Runs performed now."""
         self.others = ""
         """Number and seeds of the runs of earlier commands in the folder, in words."""
         self._is_live = sys.stderr.isatty()
@@ -97,15 +110,14 @@ class Display:
         return self
 
     def __exit__(self, *_: object) -> None:
-        print(end=self._end, file=sys.stderr, flush=True)
+        say("", stream=sys.stderr, end=self._end)
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress and the last run; before the first run (``cell`` None) what the folder
-        holds already."""
+        """Show the progress and the cell of the last run; before the first run (``cell`` None) show
+        which runs the folder has already."""
         from coartic.analysis.methods import title_of
-        from coartic.runs.record import late_import
 
-        self.done, total = progress.done, progress.total
+        total = progress.total
         if cell is None:
             for sentence in progress.unused:
                 self.line(sentence)
@@ -117,8 +129,8 @@ class Display:
             if progress.present:
                 coming = counted(total - progress.present, "run")
                 self.line(f"Already there: {progress.present} of {total}; to come: {coming}.")
-                for each in progress.late.items():
-                    self.line(f"{late_import(*each)}.")
+                for sentences in progress.marks.values():
+                    self.line(f"{'; '.join(sentences)}.")
         if progress.present == total:
             return
         there, seconds, left = progress.present + progress.done, progress.time_left, ""
@@ -132,12 +144,12 @@ class Display:
                 last = f"{cell.task.label}, {title_of(cell.method.name)}"
             say_part(f"{text}  {last}")
             self._end = "\n"
-        elif there == total or (self.done and time.monotonic() - self._last >= self.EVERY_S):
+        elif there == total or (progress.done and time.monotonic() - self._last >= self.EVERY_S):
             self._last = time.monotonic()
             self.line(f"Runs: {text}")
 
     def line(self, text: str) -> None:
         """Print a line; the progress continues below the line."""
-        print(end=self._end, file=sys.stderr)
+        say("", stream=sys.stderr, end=self._end)
         self._end = ""
         say(text, stream=sys.stderr)

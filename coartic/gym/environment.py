@@ -1,4 +1,4 @@
-"""One robot that makes one trial after another, and what environments are known by."""
+"""An environment of one robot that makes one trial after another, and ids of environments."""
 
 from __future__ import annotations
 
@@ -40,14 +40,13 @@ class TaskEnv(Recorded, gymnasium.Env):
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
 
     def __init__(
-        self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
+        self,
+        task: Task | str | Path | None = None,
+        *,
+        render_mode: str | None = None,
+        **options: Any,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode is {brief_value(render_mode)}; it must be 'rgb_array' or None. "
-                "gymnasium.make knows others, such as 'human' for a window"
-            )
-        self.robots = TaskVectorEnv(1, task, **options)
+        self.robots = TaskVectorEnv(1, task, render_mode=render_mode, **options)
         self.action_space = self.robots.single_action_space
         self.observation_space = self.robots.single_observation_space
         self.render_mode = render_mode
@@ -57,7 +56,8 @@ class TaskEnv(Recorded, gymnasium.Env):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial, of the task or of a random instance of the family; return observation
         ``(O,)`` and info. With ``seed`` None the generator goes on. Raises ValueError for any
-        option, and for a seed that is no whole number from 0."""
+        option, and for a seed that is no whole number from 0. The info has ``task``, the task's
+        name, and ``is_success``, True if the trial has hit all goals."""
         super().reset(seed=whole_seed(seed))
         check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
@@ -67,8 +67,9 @@ class TaskEnv(Recorded, gymnasium.Env):
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Reach for the next goal by an action ``(A,)``; return observation ``(O,)``, reward (ticks
-        below 0), whether the trial has ended, False (no trial is truncated) and info. Raises
-        ResetNeeded if the trial had ended before or no trial was begun."""
+        below 0), whether the trial has ended, False (no trial is truncated) and info (``task`` and
+        ``is_success``). Raises ResetNeeded if the trial had ended before or no trial was begun, and
+        ValueError for an action of another shape or that is not finite."""
         state = self.robots.state
         if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
@@ -78,23 +79,7 @@ class TaskEnv(Recorded, gymnasium.Env):
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture of the robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
         so far are filled; None if the environment was made without ``render_mode``."""
-        if self.render_mode is None:
-            return None
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals
-
-        robots, state = self.robots, self.robots.state
-        task = robots.task_at(state.task.item())
-        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
-        figure = Figure(figsize=(6, 4))
-        canvas: Any = FigureCanvasAgg(figure)
-        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-        draw_robot(axes, task, state.q[0, robots._places_of(task.robot)], weight=1.5)
-        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[0])
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        return None if self.render_mode is None else self.robots.picture(0)
 
     def _info(self) -> dict[str, Any]:
         state, number = self.robots.state, self.robots.state.task.item()
@@ -111,18 +96,24 @@ def options_of(env: Any) -> dict[str, Any]:
         if env not in IDS:
             raise ValueError(unknown("environment", env, IDS))
         return IDS[env]
-    if not isinstance(getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
+    envs = getattr(env, "unwrapped", env)
+    if not isinstance(getattr(envs, "robots", envs), TaskVectorEnv):
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
-    env = without_wrappers(env, "env")
-    options: dict[str, Any] = (env.robots if isinstance(env, TaskEnv) else env).options
+    env = without_wrappers(env, "env", normaliser_of(env))
+    options: dict[str, Any] = getattr(env, "robots", env).options
     return options
 
 
+def normaliser_of(env: Any) -> Any:
+    """Return the environment itself if it is a ``VecNormalize`` of Stable-Baselines3, or None."""
+    return env if type(env).__name__ == "VecNormalize" else None
+
+
 def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
-    """Return the environment inside its wrappers: those that Gymnasium and Stable-Baselines3 add by
-    themselves (:data:`ADDED`), and the wrapper ``known``, the object itself, if given. Raises
+    """Return the environment inside its wrappers: wrappers that Gymnasium and Stable-Baselines3 add
+    by themselves (:data:`ADDED`), and ``known``, a wrapper, the object itself, if given. Raises
     TypeError for any other wrapper, whose changes would be left out; the message calls the
     environment ``name``."""
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):

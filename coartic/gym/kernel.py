@@ -35,7 +35,7 @@ class VectorState(NamedTuple):
     goal: Numbers
     """Index of the next goal, from 0, shape ``(N,)``."""
     q: Configs
-    """Configurations, shape ``(N, dof)``."""
+    """Configurations, shape ``(N, dof)``, length unit and rad."""
     going: NDArray[np.bool_]
     """True where the trial goes on, shape ``(N,)``."""
     actions: Array
@@ -45,7 +45,7 @@ class VectorState(NamedTuple):
     seen: NDArray[np.float32]
     """Observations, shape ``(N, O)`` (:func:`observe`)."""
     parameters: NDArray[np.void]
-    """Robot parameters of each kind of robot, locks and radius."""
+    """Robot parameters of each kind of robot (links, locks and radius), shape ``(K,)``."""
     kinds: Numbers
     """Index in ``parameters`` of each task's robot, shape ``(T,)``; -1 for a task that is not
     loaded."""
@@ -58,7 +58,7 @@ class VectorState(NamedTuple):
     joints: Numbers
     """Indices in a configuration of the joints that are seen and moved, shape ``(E,)``."""
     sides: Hands
-    """The hands that all robots have, shape ``(H,)``."""
+    """The hands that all robots have, 0 left or 1 right, shape ``(H,)``."""
     ahead: int
     """Number of goals that are seen beyond the next one."""
     reach: float
@@ -66,9 +66,11 @@ class VectorState(NamedTuple):
     runs: NDArray[np.void]
     """Runs of a lot of robots with each hand, shape ``(H, SLOTS)``."""
     at: NDArray[np.void]
-    """Rows of their slots, and those that a correction and a movement need, as in a batch."""
+    """Rows of the slots of these robots (:class:`Batch`)."""
     corrected: Array
+    """The rows in ``at`` that a correction needs, shape ``(rows, SLOTS)``."""
     moved: Array
+    """The rows in ``at`` that a movement needs, shape ``(rows, SLOTS)``."""
     accounts: NDArray[np.void]
     """Accounts of the goals of the robots of a lot, shape ``(SLOTS,)``."""
     indices: Numbers
@@ -128,12 +130,14 @@ def _squared_distance(run: Any) -> float:
 
 @inlined
 def _aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
-    """Set hand and target of ``run``, in place, from an action: phase 2, *aim*.
+    """Set ``hand``, ``target``, ``converged`` and ``action`` (MOVE) of ``run``, in place, from an
+    action, shape ``(A,)``: phase 2, *aim*.
 
     ``run`` and, with two hands, ``other`` have the solutions of the corrective process with one
-    hand each. The hand is the one whose solution is nearer in joint space; with ``action[0] > 0.5``
-    it is the other hand. The target is the solution of this hand, or, if the process failed, the
-    present posture, plus ``state.reach`` times the entries of the joints, clipped to ±1.
+    hand each. The hand is the hand whose solution is nearer in joint space, or, with two hands and
+    ``action[0] > 0.5``, the other one. The target is the solution of this hand, or, if the process
+    failed, the present posture, plus ``state.reach`` times the last E entries of the action, one
+    for each of ``state.joints``, clipped to ±1, where ``movable``, bool ``(E,)``, is True.
     """
     if len(state.sides) > 1:
         is_nearer = _squared_distance(other) < _squared_distance(run)
@@ -183,9 +187,10 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
 
 @entry
 def observe(*fields: Any) -> None:
-    """Fill in ``seen``, in place, of the :class:`VectorState` with entries ``fields``: for each
-    robot 1 where a next goal exists, x and y of these goals from the base, the joints, and, if
-    observations are long enough, 1 for each joint that can move."""
+    """Fill in ``seen``, ``(N, O)``, in place, of the :class:`VectorState` with entries ``fields``:
+    for each robot 1 where a goal exists (the next one and those ahead), x and y of these goals from
+    the base, length unit, the joints, and, if observations are long enough, 1 for each joint that
+    can move."""
     state = VectorState(*fields)
     goals, joints = state.ahead + 1, len(state.joints)
     for n in range(len(state.task)):

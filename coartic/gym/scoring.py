@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.estimates import Estimate, mean
-from coartic.gym.environment import options_of, without_wrappers
+from coartic.gym.environment import normaliser_of, options_of, without_wrappers
 from coartic.gym.vector import TaskVectorEnv
 from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
@@ -23,7 +24,7 @@ from coartic.method.optimisers import FAILED
 from coartic.model import PAPER, MotionModel
 from coartic.motion.solution import execute, initial_reward
 from coartic.robot import Array
-from coartic.tasks.families import shipped_families
+from coartic.tasks.families import is_family
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import Task
 
@@ -42,9 +43,9 @@ def score(
 
     Parameters
     ----------
-    env : str, Env or VectorEnv
-        An environment of this package without wrappers, or its id. Of a family the instances of
-        the test split are scored, or of the ``split`` that is given here.
+    env : str, Env, VectorEnv or VecEnv
+        An environment of this package without wrappers, except ``VecNormalize``, or its id. Of a
+        family the instances of the test split are scored, or of the ``split`` that is given here.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
@@ -54,9 +55,9 @@ def score(
     episodes : int
         Trials of random actions on each task.
     seed : int
-        Of random actions and of methods.
+        Seed of random actions and of methods.
     **options
-        Those of :class:`TaskVectorEnv`.
+        Options of :class:`TaskVectorEnv`.
 
     Returns
     -------
@@ -78,7 +79,7 @@ def score(
     check_limits("episodes", episodes, 1, MOST_CELLS)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
     given = options_of(env) | options
-    if given.get("task") in [*shipped_families()]:  # a Task has no hash
+    if isinstance(task := given.get("task"), str | Path) and is_family(str(task)):
         given = {"split": "test", **given}
     setting = TaskVectorEnv(1, **given)
     model, shape = setting.model, setting.single_action_space.shape
@@ -89,7 +90,7 @@ def score(
         if isinstance(each, Method):
             rewards[name] = column(_reward_of(each, task, seed, model) for task in tasks)
         elif each is not None:
-            rewards[name] = _rollout(_acting(each), given, len(tasks))
+            rewards[name] = _rollout(_acting(each, normaliser_of(env)), given, len(tasks))
     rng = np.random.default_rng(seed)
     rewards["random actions"] = _rollout(
         lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), given, len(tasks), episodes
@@ -104,17 +105,18 @@ def column(rewards: Iterable[float | None]) -> Array:
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
 
 
-def _acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
+def _acting(policy: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
     """Return a function from observations to actions for a policy, a function or an agent with
-    ``predict``; an agent that was trained in ``VecNormalize`` gets observations normalised as
-    there. Raises TypeError for any other object and for an agent trained in another wrapper."""
+    ``predict``; one that was trained in ``VecNormalize``, or is given with it (``normal``), gets
+    observations normalised as there. Raises TypeError for any other object and for an agent
+    trained in another wrapper."""
+    normal = getattr(policy, "get_vec_normalize_env", lambda: None)() or normal
+    see = normal.normalize_obs if normal else np.asarray
     if hasattr(policy, "predict"):
-        normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
         get_env = getattr(policy, "get_env", lambda: None)
         env = without_wrappers(get_env(), "the agent's environment", normal)
         for each in getattr(env, "envs", ()):
             without_wrappers(each, "the agent's environment")
-        see = normal.normalize_obs if normal else np.asarray
         return lambda seen: policy.predict(see(seen), deterministic=True)[0]
     if not callable(policy):
         raise TypeError(
@@ -123,7 +125,7 @@ def _acting(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
         )
 
     def act(seen: NDArray[np.float32]) -> Any:
-        if isinstance(actions := policy(seen), tuple):
+        if isinstance(actions := policy(see(seen)), tuple):
             raise TypeError(
                 f"the policy returned a tuple of {len(actions)}; needed are the actions alone, "
                 "which are the first entry of what an agent's predict returns"
@@ -156,10 +158,10 @@ def _rollout(
 
 @checked_arguments
 def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
-    """Return a table with reward, gap and share of completed trials, a row for each policy and one
-    for the best known (:func:`score`). ``rewards``, by policy, have shapes ``(K, trials)`` for K
-    tasks, NaN where a trial failed; ``best`` has the best known rewards, shape ``(K, 1)``, NaN
-    where none is known. Raises ValueError for other shapes."""
+    """Return a table with a row for each policy and one for the best known, columns ``reward``,
+    ``gap``, ``gap_low``, ``gap_high`` and ``completed`` (:func:`score`). ``rewards``, by policy,
+    have shapes ``(K, trials)`` for K tasks, NaN where a trial failed; ``best`` has the best known
+    rewards, shape ``(K, 1)``, NaN where none is known. Raises ValueError for other shapes."""
     optimum = np.asarray(best)
     earnings = {name: np.asarray(each) for name, each in rewards.items()} | {"best known": optimum}
     shapes = [earned.shape for earned in earnings.values()]

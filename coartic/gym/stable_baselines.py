@@ -18,10 +18,11 @@ class RobotEnvs(VecEnv):
 
     Actions are clipped to the box. A trial that has ended starts again in the same step;
     ``terminal_observation`` in its info is what was seen last, and ``episode`` has its reward in
-    ticks. Rewards are ticks as a share of what the corrective process takes for the whole trial
-    with the task's initial hands: all rewards of a trial that is like it add up to -1. No step
-    loses more than 2, such as one in which the corrective process fails. On a task that the
-    corrective process cannot do alone, they are shares of ``coartic.method.optimisers.FAILED``.
+    ticks. Rewards are minus the ticks, as a share of the ticks that the corrective process alone
+    takes for the whole trial with the task's initial hands: the rewards of a trial with as many
+    ticks add up to -1. No step loses more than 2, not even a step in which the corrective process
+    fails. On a task that the corrective process cannot complete alone, rewards are shares of
+    ``coartic.method.optimisers.FAILED``, 1,000,000 ticks.
 
     Parameters
     ----------
@@ -31,20 +32,20 @@ class RobotEnvs(VecEnv):
 
     def __init__(self, envs: Any) -> None:
         self.render_mode = envs.render_mode
-        self._envs, self._lost = envs, np.zeros(envs.num_envs)
+        self.robots, self._lost = envs, np.zeros(envs.num_envs)
         self._steps = np.zeros(envs.num_envs, dtype=np.int64)
         self._costs: dict[int, float] = {}
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
         """Begin a trial in each of N environments; return the first observations, ``(N, O)``.
-        Raises ValueError for options (``set_options``), of which there are none."""
+        Raises ValueError if ``set_options`` has set options: the environments take none."""
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
         options = next(filter(None, self._options), None)
         self._reset_seeds()
         self._reset_options()
         self._lost[:], self._steps[:] = 0, 0
-        observations: NDArray[np.float32] = self._envs.reset(seed=seeds, options=options)[0]
+        observations: NDArray[np.float32] = self.robots.reset(seed=seeds, options=options)[0]
         return observations
 
     def step_async(self, actions: Array) -> None:
@@ -54,13 +55,13 @@ class RobotEnvs(VecEnv):
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
         """Let all N robots reach for their next goal by the actions of :meth:`step_async`.
 
-        Returns observations ``(N, O)``; rewards ``(N,)``, minus the ticks as a share of what the
-        corrective process takes for the whole trial; True for trials that have ended, ``(N,)``;
+        Returns observations ``(N, O)``; rewards ``(N,)``, minus the ticks as a share of the ticks
+        of the corrective process for the whole trial; True for trials that have ended, ``(N,)``;
         and N dictionaries. A trial that has ended starts again at once: its observation is the
         first of the next trial, and its dictionary has ``terminal_observation`` and ``episode``.
         """
-        costs = np.array([self._cost(task) for task in self._envs.state.task.tolist()])
-        observations, rewards, ended, _, seen = self._envs.step(self._actions)
+        costs = np.array([self._cost(task) for task in self.robots.state.task.tolist()])
+        observations, rewards, ended, _, seen = self.robots.step(self._actions)
         self._lost += rewards
         self._steps += 1
         infos: list[dict[str, Any]] = [{} for _ in costs]
@@ -94,6 +95,6 @@ class RobotEnvs(VecEnv):
         """Return the ticks of the corrective process alone on task ``number`` (from 0), at least 1;
         ``FAILED`` if the process fails."""
         if number not in self._costs:
-            reward = initial_reward(self._envs.task_at(number), self._envs.model)
+            reward = initial_reward(self.robots.task_at(number), self.robots.model)
             self._costs[number] = float(FAILED if reward is None else max(-reward, 1))
         return self._costs[number]

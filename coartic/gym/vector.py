@@ -24,7 +24,7 @@ from coartic.motion.batch import robot_parameters
 from coartic.motion.trial import count_trials
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
-from coartic.tasks.families import LOCKED, instance_names, shipped_families
+from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
 from coartic.tasks.task import MOST_GOALS, Split, Task, parse_task
 
 REACH = 0.5
@@ -54,30 +54,35 @@ class Recorded:
 
 
 class TaskVectorEnv(Recorded, VectorEnv):
-    """Let N robots act side by side, in a fraction of the time of N :class:`TaskEnv`.
+    """Vector environment: N robots act side by side, in a fraction of the time of N
+    :class:`TaskEnv`.
 
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
     process fails, which costs ``coartic.method.optimisers.FAILED``. A trial that has ended starts
     again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info``
-    are what it ended with. Nothing is random but which instance of a family is drawn.
+    have its last observation and infos. Only the draw of an instance of a family is random.
 
     Parameters
     ----------
     num_envs : int
         Number of robots.
     task : Task, str or Path
-        The task; or a family, ``"two-armed/v1"``: each trial has an instance of the family.
+        The task; or a family, ``"two-armed/v1"`` or the path of its file: each trial has an
+        instance of the family.
     split : {"development", "test", "fresh"}, optional
-        Instances to train on (by default), to report on, or those of a ``year``. They never mix.
+        Instances of the family: to train on (``"development"``, the default), to report on
+        (``"test"``), or of a ``year`` (``"fresh"``). They never mix.
     count : int, optional
-        How many instances of the split, from its first; by default 1,000 of the development split
-        and 10 of the others.
+        How many instances of the split, from its first; by default 1,000 of the development split,
+        10 of the test and fresh splits.
     year : int, optional
-        Of fresh instances.
+        Year of fresh instances, such as 2027.
     ahead : int
         Goals in view beyond the next one.
     model : MotionModel
         Constants of movement.
+    render_mode : {"rgb_array"}, optional
+        With it ``render`` returns a picture of each robot.
 
     Raises
     ------
@@ -95,36 +100,52 @@ class TaskVectorEnv(Recorded, VectorEnv):
     it.
 
     An action has an entry for the hand, where the robot has two, and one for each joint. The box is
-    from -1 to 1; what is beyond is clipped. Up to 0.5 the hand is the one that the corrective
-    process brings to the goal by the shorter path in joint space, above 0.5 the other one. The
-    target is where the corrective process would bring it, plus :data:`REACH` times the entries of
-    the joints: zeros do what the corrective process does. Where it would fail, the present posture
-    takes the place of its result. Entries of joints that a robot does not have do nothing.
+    from -1 to 1; entries beyond are clipped. With an entry up to 0.5 the hand is the one that the
+    corrective process brings to the goal by the shorter path in joint space, above 0.5 the other
+    hand. The target is the posture that the corrective process finds for this hand, or, where the
+    process fails, the present posture, plus :data:`REACH` times the entries of the joints: zeros do
+    what the corrective process does. Entries of joints that a robot does not have do nothing.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}
+    metadata: ClassVar[dict[str, Any]] = {
+        **{"render_modes": ["rgb_array"], "render_fps": 4},
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
 
     def __init__(
         self,
         num_envs: int,
-        task: Task | str | Path,
+        task: Task | str | Path | None = None,
         *,
         split: Split | None = None,
         count: int | None = None,
         year: int | None = None,
         ahead: int = 1,
         model: MotionModel = PAPER,
+        render_mode: str | None = None,
     ) -> None:
+        if task is None:
+            raise TypeError(
+                "task is missing: give task=, a task, its name or file, or a family, such as "
+                "task='two-armed/v1'"
+            )
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode is {brief_value(render_mode)}; it must be 'rgb_array' or None. "
+                "gymnasium.make knows others, such as 'human' for a window"
+            )
         check_limits("num_envs", num_envs, 1, 1_000_000)
         check_limits("ahead", ahead, 0, MOST_GOALS)
         # As a specification has them.
         task = parse_task(task, "task") if isinstance(task, dict) else task
         model = MotionModel(**model) if isinstance(model, dict) else model
         self.num_envs, self.model = num_envs, check_model(model)
+        self.render_mode = render_mode
         self.options = {"task": task, "ahead": ahead, "model": model}
         self.tasks: list[Task | str]  # or names of instances
-        if isinstance(task, str) and task in shipped_families():
-            family = shipped_families()[task]
+        if isinstance(task, str | Path) and is_family(str(task)):
+            task = str(task)
+            family = load_family(task)
             self.tasks = [*instance_names(task, split or "development", count, year)]
             locked = set.intersection(*({*LOCKED[base]} for base in family.base))
             (fewest, links), hands, goals = family.links, family.hands, family.goals[1]
@@ -205,7 +226,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def _move(self, actions: Array, rows: RowIndex = slice(None)) -> None:
         """Let all robots whose trial goes on reach for their next goal; the results go into the
-        state, in place. ``actions`` ``(N, A)`` are of robots ``rows``; others keep their actions.
+        state, in place. ``actions``, shape ``(n, A)``, are of the n robots ``rows``; other robots
+        keep their actions.
 
         Raises ValueError for actions of another shape, or that are not finite.
         """
@@ -222,7 +244,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
     def infos(self) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
         and ``is_success``, True where the robot has hit all goals of its trial. After :meth:`step`
-        a trial that ended has started again: what it ended with is in the step's ``final_info``."""
+        a trial that ended has started again: its last infos are in ``final_info`` of the step."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
@@ -260,8 +282,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
         Returns observations ``(N, O)``, rewards ``(N,)``, ticks below 0, True where the trial has
         ended, ``(N,)``, False for each (none is truncated), ``(N,)``, and a dictionary of infos. A
         trial that has ended starts again in this step: its observation is the first of the next
-        trial; ``final_obs`` of the infos has its last. Raises ResetNeeded before the first reset,
-        and ValueError for actions of another shape or that are not finite.
+        trial; ``final_obs`` of the infos has the last observation of the trial that ended. Raises
+        ResetNeeded before the first reset, and ValueError for actions of another shape or that are
+        not finite.
         """
         state = self.state
         if not state.going.all():
@@ -277,6 +300,30 @@ class TaskVectorEnv(Recorded, VectorEnv):
             self._begin_anew(ended)
         infos = self._masked_infos() | final
         return state.seen.copy(), state.rewards.copy(), ended, np.zeros_like(ended), infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of each robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
+        so far are filled; None if the environment was made without ``render_mode``."""
+        if self.render_mode is None:
+            return None
+        return tuple(map(self.picture, range(self.num_envs)))
+
+    def picture(self, row: int) -> NDArray[np.uint8]:
+        """Return a picture of robot ``row``, from 0, as :meth:`render` does of all."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals
+
+        task, state = self.task_at(self.state.task.item(row)), self.state
+        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+        figure = Figure(figsize=(6, 4))
+        canvas: Any = FigureCanvasAgg(figure)
+        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        draw_robot(axes, task, state.q[row, self._places_of(task.robot)], weight=1.5)
+        fill_goals(circle_goals(axes, task), np.arange(len(task.goals)) < state.goal[row])
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _begin_anew(self, ended: NDArray[np.bool_]) -> None:
         number, rows = len(self.tasks), np.flatnonzero(ended)

@@ -28,8 +28,8 @@ class ArgumentError(CoarticError, ValueError, TypeError):
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
     """Return a wrapper of the function that raises ArgumentError, before the call, for an argument
-    that its type hint excludes. Scalars of NumPy count as numbers of Python, but neither text nor
-    True and False do."""
+    that its type hint excludes. Scalars of NumPy count as numbers of Python; text, True and False
+    are no numbers."""
     names = [*inspect.signature(function).parameters]
 
     @cache  # hints are read at the first call: most commands make none

@@ -32,7 +32,8 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write ``files``, contents by path below the folder, which is made if it is missing. Files
     that an earlier call wrote there are replaced, or removed if they are not among ``files``.
 
-    Raises CoarticError, before a file is written, if a file of another origin has such a path.
+    Raises CoarticError, before a file is written, if a file that no earlier call wrote has such a
+    path or if the folder cannot be written, and if writing fails.
     """
     before = make_folder(folder, files)
 
@@ -93,7 +94,8 @@ def check_inside(folder: Path, path: Path) -> None:
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
     """Write one file, whole or not at all; over a file of that name only with ``replace``. Raises
-    CoarticError if the file may not be written (:func:`check_output`) or writing fails."""
+    CoarticError if there is such a file without ``replace``, if its folder is missing or not
+    writable, if it is a folder, a link or a device, and if writing fails."""
     check_output(path, replace=replace)
     with errors_in_words(path):
         write_atomically(path, data)

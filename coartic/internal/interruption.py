@@ -84,8 +84,9 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 
 
 def end_if_interrupted() -> None:
-    """Exit if a signal has interrupted this process: print the sentences on stderr, and exit with
-    code 130 after Ctrl-C, else 143. From now on signals are ignored: the command has ended."""
+    """Exit if a signal has interrupted this process: print ``Interrupted.`` and the sentences of
+    :func:`interruptible` on stderr, and exit with code 130 after Ctrl-C, else 143. From now on
+    signals are ignored: the command has ended."""
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     if _heard:

@@ -30,6 +30,7 @@ def import_lazily(
 
 
 def moved(old: str, new: str) -> None:
-    """Put module ``new`` in the place of module ``old``, its name up to the version before."""
+    """Put module ``new`` in the place of module ``old``, its former name, with a
+    DeprecationWarning."""
     warnings.warn(f"{old} is {new} now", DeprecationWarning, stacklevel=3)
     sys.modules[old] = import_module(new)

@@ -31,7 +31,7 @@ WIDTHS = (1e-9, 100.0)
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
     """Raise ValueError, which calls the value ``name``, unless it is a number from ``least`` to
-    ``most``, both included; if ``least`` is an ``int``, unless it is such a whole number."""
+    ``most``, both included, and whole if ``least`` is an ``int``. True and False are no numbers."""
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
@@ -43,7 +43,8 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Return real numbers as :func:`real_numbers` does; the ValueError calls the value ``name``."""
+    """Return real numbers as an array of float64 of their shape (:func:`real_numbers`). Raises
+    ValueError, which calls the value ``name``, for anything else."""
     try:
         return real_numbers(value)
     except ValueError as error:

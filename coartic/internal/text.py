@@ -38,10 +38,10 @@ def error_line(error: BaseException) -> str:
 
 
 def one_line(text: str) -> str:
-    """Return text as one printable line; a printable line stays as it is.
+    """Return text as one printable line; a printable line is returned unchanged.
 
-    Lines are joined by `` | ``; what else does not print (control characters, escape sequences,
-    marks that turn the direction of writing) is shown as its escape, such as ``\\x1b``.
+    Lines are joined by `` | ``; other characters that do not print (control characters, escape
+    sequences, marks that turn the direction of writing) become escapes, such as ``\\x1b``.
     """
     if text.isprintable() or all(map(prints, text)):
         return text
@@ -50,7 +50,8 @@ def one_line(text: str) -> str:
 
 
 def prints(c: str) -> bool:
-    """Return whether a character is printable; every kind of blank counts as printable."""
+    """Return whether a character is printable, or a space of any width (Unicode category Zs); tabs
+    and line ends are not printable."""
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
@@ -136,7 +137,8 @@ FOREIGN = (
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
     """Return a sentence that coartic does not read a file of another program, known by its ending
-    (:data:`FOREIGN`); empty for any other path. ``wanted``: end of the sentence, what is read."""
+    (:data:`FOREIGN`); empty for any other path. ``wanted`` is the end of the sentence, on files
+    that are read."""
     if not path.lower().endswith(FOREIGN):
         return ""
     ending = path.lower().rpartition(".")[2]
@@ -145,8 +147,8 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
-    ``names``, or, if none is near, with all names, or the first 12; for a file of another program
-    return the sentence of :func:`foreign_file`."""
+    ``names``, or, if none is near, with all names, or the first 12 of more than 13; for a file of
+    another program return a sentence that coartic does not read it."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)

@@ -84,8 +84,9 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables in the block of this context, for processes that start in it; reset
-    them to what they were before, or remove them, at its end."""
+    """Set environment variables in the block of this context, for processes that start in it; at
+    the end of the block reset them to their former values, or remove variables that were not
+    set."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:

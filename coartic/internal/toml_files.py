@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import stat
 import tomllib
 from pathlib import Path
@@ -13,14 +14,29 @@ from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_BYTES
 from coartic.internal.text import LONGEST_LINE, plain
 
+_MOST_TOML = 1_000_000  # bytes: ten times the largest file shipped
+_TEXTS = re.compile(
+    r'"{3}(?:\\.|[^\\])*?(?:"{3}|\Z)|"(?:\\.|[^"\\\n])*"?'
+    r"|'{3}.*?(?:'{3}|\Z)|'[^'\n]*'?|#[^\n]*",
+    re.DOTALL,
+)
+"""Texts and comments of TOML."""
+_MANY_PARTS = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){100}")
+"""A name of more than 100 parts, which takes Python minutes to read, in TOML without texts."""
+
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
     """Return the content of a TOML file as a dictionary. Raises ``error``, which names the file, if
-    it cannot be read, is too large (:func:`check_file`), or is not TOML in UTF-8."""
-    check_file(path, error=error)
+    it cannot be read, has more than 1,000,000 bytes or a name of more than 100 parts, or is not
+    TOML in UTF-8."""
+    check_file(path, error=error, most=_MOST_TOML)
     shown = plain(str(path), LONGEST_LINE)
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+        text = Path(path).read_text(encoding="utf-8-sig")
+        if many := _MANY_PARTS.search(_TEXTS.sub("text", text)):
+            name = plain(many[0], 30)
+            raise error(f"{shown}: the name {name} has more than 100 parts, divided by dots")
+        return tomllib.loads(text)
     except UnicodeDecodeError:
         raise error(f"{shown}: is not a text file in UTF-8") from None
     except OSError as failure:
@@ -29,9 +45,11 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
         raise error(f"{shown}: is not valid TOML: {plain(str(failure), 80)}") from None
 
 
-def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) -> None:
+def check_file(
+    path: str | Path, *, error: type[CoarticError] = CoarticError, most: int = MOST_BYTES
+) -> None:
     """Raise ``error``, which names the file, if it is missing, may not be read, is a folder, a pipe
-    or a device, or has more than :data:`MOST_BYTES` bytes (10 million)."""
+    or a device, or has more than ``most`` bytes."""
     shown = plain(str(path), LONGEST_LINE)
     try:
         found = Path(path).stat()
@@ -43,5 +61,5 @@ def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) ->
     if not stat.S_ISREG(found.st_mode):
         kind = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
         raise error(f"{shown}: cannot be read: it is {kind}, not a file")
-    if found.st_size > MOST_BYTES:
-        raise error(f"{shown}: has {found.st_size} bytes; it may have {MOST_BYTES} at most")
+    if found.st_size > most:
+        raise error(f"{shown}: has {found.st_size} bytes; it may have {most} at most")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -79,11 +80,33 @@ def changed_values(thing: Any) -> dict[str, Any]:
     }
 
 
+def equal_contents(a: Any, b: Any) -> Any:
+    """Return whether two objects are of one class and equal in all fields, arrays by their entries,
+    NaN as NaN: the ``__eq__`` of classes with arrays. What they keep besides does not count."""
+    import numpy as np
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            numbers = np.ma.filled(np.ma.asarray(value).astype(np.float64), np.nan)
+            return value.shape, [None if x != x else x for x in numbers.ravel().tolist()]
+        return value
+
+    if type(a) is not type(b):
+        return NotImplemented
+    named = (
+        [*type(a).model_fields]
+        if isinstance(a, BaseModel)
+        else [field.name for field in fields(a) if field.compare]
+    )
+    return all(plain(getattr(a, name)) == plain(getattr(b, name)) for name in named)
+
+
 @in_sentences
 class FileData(BaseModel):
     """Content of a file, which cannot be changed and has known keys only."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+    __eq__ = equal_contents
 
     def __repr__(self) -> str:
         """Return the class with the values that differ from the defaults, in one line."""
@@ -113,8 +136,9 @@ def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
 
 
 def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | str, Any]) -> str:
-    """Return sentences as :func:`explain_inline` does, but one alone for an argument that is of
-    none of several kinds. ``given`` are the arguments, by place from 0 or by name."""
+    """Return a sentence for each of the first 20 wrong arguments of a call, joined by semicolons;
+    an argument that may be of several kinds has one sentence. ``keys`` are the names of the
+    arguments in order, ``given`` the arguments, by place from 0 or by name."""
     problems: dict[tuple[int | str, ...], ErrorDetails] = {}
     for detail in error.errors(include_url=False):
         place = detail["loc"]
@@ -129,7 +153,7 @@ def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | 
 
 def _explain_first(details: list[ErrorDetails], keys: Sequence[str]) -> tuple[list[str], int]:
     """Return a list of sentences on the first 20 problems, each sentence once, and the number of
-    further problems. ``keys``: known keys (:func:`_explain_problem`)."""
+    further problems. ``keys``: names of the keys that a file has, or of arguments in order."""
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
     sentences = (plain(_explain_problem(detail, keys)) for detail in details[:_SHOWN])
@@ -142,8 +166,9 @@ def sentence_error(text: str) -> PydanticCustomError:
 
 
 def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
-    """Return one sentence about a problem, with its key. ``keys``: the known keys, among them the
-    one meant by an unknown key; argument k (from 0) without a name has the name ``keys[k]``."""
+    """Return one sentence about a problem, with its key. ``keys``: the known keys, in the order of
+    arguments; the sentence names the known key nearest to an unknown key, and calls argument k
+    (from 0) without a name ``keys[k]``."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and part < len(keys):

@@ -72,9 +72,9 @@ Drifts = Annotated[
 class ExplorationCondition:
     """Exploration of the learner. Source: paper, section *Experiments*.
 
-    ``CONDITIONS`` has the paper's four, ``ABLATIONS`` those without a part of the learner,
-    ``INFORMED`` those with more information; ``dataclasses.replace`` makes others of them. Raises
-    ValueError for fields that are out of range or contradict each other.
+    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` conditions without a part of the
+    learner, ``INFORMED`` conditions with more information; ``dataclasses.replace`` changes fields.
+    Raises ValueError for fields that are out of range or contradict each other.
     """
 
     id: str
@@ -207,7 +207,8 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
     """Return the exploration condition with an id such as ``"EC4"`` or ``"dual-process/EC4"``; a
     condition is returned itself.
 
-    Raises CoarticError for an unknown id, and TypeError for what is neither id nor condition.
+    Raises CoarticError for an unknown id, and TypeError for an object that is neither a text nor a
+    condition.
     """
     if isinstance(condition, ExplorationCondition):
         return condition

@@ -88,16 +88,25 @@ class LearnerParameters(NamedTuple):
     explored: Flags
     """True where a joint is perturbed, shape ``(2, width)``, for each chosen hand."""
     exploration: int
+    """Exploration of the hand: 0 none, 1 random, 2 closest, 3 nearest posture."""
     epsilon: float
+    """ε: probability with which the hand for a goal is explored."""
     noise_sd: float
+    """Standard deviation of the noise η, length unit and rad."""
     corrects: bool
+    """True if **A** corrects a goal that a movement to a stored target misses."""
     by_subtask: bool
+    """True if a goal is credited with its own return, not with the reward of the trial."""
     discount: float
+    """γ of the return of a goal."""
     counts_earlier: bool
+    """True if earlier goals count in the return of a goal, too."""
     drifts: Array
     """Values of κ, shape ``(K,)``; of several each trial draws one."""
     pull: float
+    """β: share of the way to the preferred posture that an iteration of **A** adds."""
     direction: int
+    """Preferred posture: 0 next goal, 1 stay, 2 start."""
 
 
 class Results(NamedTuple):
@@ -141,7 +150,7 @@ def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
 ) -> LearnerParameters:
     """Return a task and a condition as the learner's kernel reads them; ``first`` has a movement
-    for each goal, the movements of trial 0."""
+    for each goal, the movements of trial 0; a movement without a target stands for **A**."""
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(first), width), np.nan)
     for target, movement in zip(first_targets, first, strict=True):
@@ -180,7 +189,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``.
 
     By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q (-inf), and
-    ``target``, q*, ``dof`` entries of NaN and then zeros up to :func:`width_of`.
+    ``target``, q*, ``dof`` entries of NaN and then zeros up to the width of kernel records.
     """
     learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), learned)
@@ -292,7 +301,8 @@ def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
     """Set the preferred posture p of a run, in place, once its hand for goal ``number`` (from 0) is
     chosen: the present posture q (*stay*), the start of the trial (*start*), or (*next goal*)
     (q + t') / 2, with the target t' stored for the next goal and the hand of highest value there
-    after this hand; q for joints that the movement to it would not explore, and if none is stored.
+    after this hand; q for joints that the movement to t' would not explore, and if no target is
+    stored. ``table``: Q and q* of the run, shape ``(G, 3, 2)``.
     """
     if run.drift == 0.0 and run.pull == 0.0:
         return
@@ -312,7 +322,8 @@ def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
 @inner
 def drift(run: Any, robot: Any, learner: Any, workspace: Any) -> None:
     """Move the mean t of exploration, the run's ``target``, in place, by κ N(t) (p − t), and an
-    idle arm that is explored by κ (p − t); p is the preferred posture."""
+    idle arm that is explored by κ (p − t); p is the preferred posture, N projects onto the null
+    space of the hand's Jacobian. Without a drift κ nothing changes."""
     if run.drift == 0.0:
         return
     x, y, v = workspace.jacobian
@@ -350,9 +361,10 @@ def aim(
     rng: Any,
     workspace: Any,
 ) -> None:
-    """Choose the hand of run ``n`` for goal ``number`` (from 0) after hand ``before`` (2: none);
-    if a target q*(s, a) is stored, set the run's target to the mean of exploration plus noise η,
-    without ``explore`` to q* alone: phase 2, *aim*."""
+    """Choose the hand of run ``n`` for goal ``number`` (from 0) after hand ``before`` (0 left, 1
+    right, 2 none); if a target q*(s, a) is stored, set the run's target to the mean of exploration
+    plus noise η, without ``explore`` to q* alone: phase 2, *aim*. ``table``: Q and q* of the run,
+    shape ``(G, 3, 2)``."""
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
@@ -380,7 +392,8 @@ def make_trial(
 ) -> None:
     """Make one trial in each of N runs, up to the first goal missed; fill in ``trial``, the
     accounts of the goals, shape ``(N, G)``, and the counts in ``workspace``. ``first`` makes trial
-    0, with given hands and targets; without ``explore`` a trial is greedy and has no noise."""
+    0, with hands and targets of ``learner``; without ``explore`` a trial is greedy and has no
+    noise. ``tables``: Q and q* of the runs, ``(N, G, 3, 2)``; ``rngs``: addresses ``(N, 3)``."""
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
@@ -417,8 +430,8 @@ def make_trial(
 
 @inlined
 def _find_returns(trial: Any, learner: Any, returns: Any) -> None:
-    """Fill ``returns``, in place, with the return of each goal of a completed trial, ticks below 0:
-    the discounted sum of the goals' rewards (:class:`ExplorationCondition`)."""
+    """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial,
+    ticks below 0: Σ γ^|h − g| r_h over goals h from g on, or over all; r_h is minus the ticks."""
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
         returns[number] = earlier
@@ -431,8 +444,9 @@ def _find_returns(trial: Any, learner: Any, returns: Any) -> None:
 
 @inlined
 def _copy_accounts(source: Any, destination: Any) -> None:
-    """Copy the accounts of the goals of a trial over those in ``destination``, in place, word by
-    word: LLVM copies records byte by byte, which takes long to compile."""
+    """Copy the accounts of the goals of a trial, ``source``, shape ``(G,)``, over the accounts in
+    ``destination``, in place, word by word: LLVM copies records byte by byte, which takes long to
+    compile."""
     words, given = destination.view(np.int64), source.view(np.int64)
     for k in range(len(given)):
         words[k] = given[k]
@@ -481,7 +495,8 @@ def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
     """Make all trials of N runs, each with its own generator, and then in each a greedy trial
-    without noise, the replay; fill in ``tables`` (:func:`empty_tables`) and ``results``."""
+    without noise, the replay; fill in ``tables``, Q and q*, shape ``(N, G, 3, 2)``, and
+    ``results`` (:class:`Results`)."""
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         first, explore, made = number == 0, number < trials, results.last

@@ -115,8 +115,8 @@ def learn(
     SolutionError
         The first solution breaks the task's rules.
     ValueError
-        The seed is no whole number from 0, there is no trial, no movement can be made with the
-        model, or the task was changed so that it contradicts itself.
+        The seed is no whole number from 0, there is no trial, a constant of the model is out of
+        bounds, or the task was changed so that it contradicts itself.
 
     Notes
     -----
@@ -161,7 +161,7 @@ def learn_many(
     trials : int
     model : MotionModel
     start : sequence of Movement
-        All but the seeds as of :func:`learn`; every run begins with the first solution.
+        Arguments of :func:`learn`, the same for every run.
     jobs : int
         Number of threads; -1 for one a core.
 
@@ -173,10 +173,10 @@ def learn_many(
     Raises
     ------
     TaskError, NotApplicableError, CoarticError, SolutionError
-        As :func:`learn` raises them.
+        Task, condition or first solution cannot be used, as in :func:`learn`.
     TypeError, ValueError
-        Likewise; also for seeds that are no list or too many, and ``jobs`` that is neither -1 nor
-        at least 1.
+        An argument is refused by :func:`learn`, seeds are no list or too many (the rewards of at
+        most 200,000,000 trials are kept), or ``jobs`` is neither -1 nor at least 1.
     """
     task = as_task(task)
     condition = load_condition(condition)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
 from coartic.internal.text import counted, short_repr
+from coartic.internal.validation import equal_contents
 from coartic.learner.conditions import ExplorationCondition
 from coartic.method import Meter
 from coartic.model import MotionModel
@@ -18,10 +19,10 @@ from coartic.robot import Array
 from coartic.tasks.task import Task
 
 CORRECTIONS_BY_TENTH = "corrections"
-"""Detail of a stored run: corrective movements in trial 0 and in each tenth of the others."""
+"""Detail of a stored run: corrective movements in trial 0 and in each tenth of later trials."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LearningRun:
     """Run of the learner, with everything that was learned (:func:`learn`)."""
 
@@ -56,11 +57,12 @@ class LearningRun:
     """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
     -inf."""
     corrections: NDArray[np.int64]
-    """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
+    """Corrective movements made in trial 0 and in each tenth of later trials, shape ``(11,)``."""
     counters: Meter
     """Counts of the run, without its replay."""
-    wall_s: float
+    wall_s: float = field(compare=False)
     """Share of this run in the time of the runs made together, s."""
+    __eq__ = equal_contents
 
     def __repr__(self) -> str:
         return short_repr(
@@ -77,8 +79,8 @@ class LearningRun:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """True for the trials that hit every goal, bool, shape ``(trials,)``. The others failed:
-        they changed neither ``values`` nor ``targets``.
+        """True for the trials that hit every goal, bool, shape ``(trials,)``. Other trials failed,
+        and changed neither ``values`` nor ``targets``.
         """
         return ~np.ma.getmaskarray(self.rewards)
 

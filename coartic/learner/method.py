@@ -44,7 +44,8 @@ class DualProcessParameters(Parameters):
 
 
 class CustomParameters(DualProcessParameters):
-    """Any exploration condition: one of the paper's, and the fields that are other than there."""
+    """Any exploration condition: a condition of the paper, ``base``, with other values of some
+    fields."""
 
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
     """The paper's condition that is changed."""
@@ -91,7 +92,8 @@ class DualProcess(Method):
         return result
 
     def most_together(self) -> int:
-        """Return the largest number of runs that one job performs (:func:`runs_at_once`)."""
+        """Return the largest number of runs that one job performs: 72, or fewer if they have more
+        than 4,000,000 trials together; at least 1."""
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
@@ -125,8 +127,9 @@ class DualProcess(Method):
 
 
 def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
-    """Return a new subclass of :class:`DualProcess`: the learner under a condition, with noise, ε
-    and what else the condition uses as parameters."""
+    """Return a new subclass of :class:`DualProcess`: the learner under a condition. Parameters are
+    noise and ε; of an informed condition also drift, pull and direction; with credit for subtasks
+    also discount and counted."""
     names, citation = ["epsilon", "noise_sd"], DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.is_informed:  # to move in the null space of a hand, where paths are short

@@ -31,15 +31,17 @@ class Parameters(BaseModel):
 
 @dataclass(frozen=True)
 class Result:
-    """A solution, with what else a method returns."""
+    """A solution, with further data that a method returns."""
 
     solution: tuple[Movement, ...]
+    """Movements, at least one for each goal, in the order of the goals."""
     details: dict[str, Any] = field(default_factory=dict)
     """Plain data to be stored with the solution. Never its score."""
     initial: tuple[Movement, ...] = ()
     """Movements of a learner's first trial; empty if it failed, and for other methods."""
     replay: tuple[Movement, ...] = ()
-    """Movements of a learner's noiseless greedy trial after learning; empty likewise."""
+    """Movements of a learner's noiseless greedy trial after learning; empty if that trial failed,
+    and for other methods."""
 
 
 class Outline(NamedTuple):
@@ -48,11 +50,13 @@ class Outline(NamedTuple):
     name: str
     """Name of the task, for the sentence."""
     goals_count: int
+    """Number of goals."""
     dof: int
+    """Number of degrees of freedom of the robot."""
     hands: tuple[Hand, ...]
-    """Hands the robot has."""
+    """Hands that the robot has, of ``"left"`` and ``"right"``."""
     initial_hands: str
-    """Hand sequence, or policy, that the task names for a first solution."""
+    """Hand sequence, such as ``"RRRR"``, or policy that the task names for a first solution."""
 
     @property
     def initial_is_policy(self) -> bool:
@@ -62,7 +66,7 @@ class Outline(NamedTuple):
     @property
     def too_many_sequences(self) -> str | None:
         """A sentence that the task has more than 4096 hand sequences, too many to try one by one;
-        None if it has not."""
+        None for fewer."""
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
@@ -80,7 +84,7 @@ class Method(ABC):
     citation: ClassVar[str]
     information: ClassVar[frozenset[Information]]
     secondary: ClassVar[tuple[str, ...]] = ()
-    """Its secondary objectives, in words."""
+    """Objectives beyond hitting the goals, such as smoothness, in words."""
     tuned_on: ClassVar[str] = ""
     """Tasks on which its parameters were chosen, and among how many; empty: not said. Readers judge
     by it whether its results are of new tasks; runs are not known by it."""
@@ -88,13 +92,13 @@ class Method(ABC):
     """True if the seed matters; other methods are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
     version: ClassVar[int] = 1
-    """Raised by whoever changes what its runs give, by a default as well: no run of an earlier
-    version goes with later ones."""
+    """Version of the method's results, raised with every change of them, a default's as well: runs
+    of two versions are not compared."""
     later: ClassVar[frozenset[str]] = frozenset()
-    """Parameters that it got after runs of it were out. While one has its default, it is left out
-    of what a run is known by, so that earlier runs stay runs of the same method."""
+    """Names of parameters that the method got after runs of it were published. While such a
+    parameter has its default, the identity of a run leaves it out: earlier runs stay valid."""
     files: ClassVar[tuple[str, ...]] = ()
-    """Data files in the folder of the method's file. They count as its code."""
+    """Names of data files in the folder of the method's file. They count as its code."""
     quick: ClassVar[Mapping[str, Any]] = {}
     """Parameters for a check in seconds, where the defaults take longer than that."""
 

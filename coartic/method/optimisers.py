@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from abc import abstractmethod
 from collections.abc import Sequence
 from contextlib import suppress
@@ -34,7 +35,13 @@ from coartic.method import (
 )
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.motion.solution import Movement, corrective_trial, movements_of
+from coartic.motion.solution import (
+    WHOLE_TURNS,
+    Movement,
+    corrective_trial,
+    hint_of,
+    movements_of,
+)
 from coartic.motion.trial import (
     Accounts,
     HandSequences,
@@ -94,6 +101,14 @@ def sequences_of(session: Session) -> list[str]:
     return sorted(sequences, key=lambda hands: hands != session.initial_hands)
 
 
+def _entries_of(name: str, points: ArrayLike) -> Array:
+    """Return points as an array (:func:`real_array`). Raises ValueError for a frame or a series of
+    pandas, whose names of columns could say another order."""
+    if hasattr(points, "iloc"):
+        raise ValueError(f"{name} has names of pandas: give {name}.to_numpy(), in order of entries")
+    return real_array(name, points)
+
+
 class Objective:
     """Cost of a trial, its ticks, as a function of its target configurations.
 
@@ -108,8 +123,8 @@ class Objective:
 
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
     hand sequence; the best sequence is kept. A point has these hands, unless others are given
-    with it: the lowest cost is that of the best solution with these hands, which other hands may
-    better.
+    with it: the lowest cost of points is the cost of the best solution with these hands; solutions
+    with other hands may cost less.
 
     Threads can share an objective, which makes their trials one after the other. A copy is refused,
     in another process as well: it would not count for the budget.
@@ -118,8 +133,18 @@ class Objective:
     """
 
     __slots__ = (
-        *("joints", "configurations", "dim", "bounds", "evaluations", "best_cost", "best_hands"),
-        *("_asked", "_best_targets", "_best_x", "_better", "_codes", "_end", "_entries", "_hands"),
+        *("joints", "configurations", "dim", "bounds"),
+        *(
+            "_asked",
+            "_best_cost",
+            "_best_hands",
+            "_best_targets",
+            "_best_x",
+            "_better",
+            "_codes",
+            "_end",
+        ),
+        *("_entries", "_evaluations", "_hands"),
         *("_process", "_session", "_targets", "_task"),
     )  # no others are set by mistake, such as a budget
 
@@ -160,15 +185,12 @@ class Objective:
         """Number of parameters."""
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
-        self.evaluations = 0
-        """Number of points evaluated; the first trials are not among them."""
-        self.best_cost = float(-alone.rewards[best])
-        """Cost of the best trial so far, ticks; at first that of the corrective process alone."""
-        self.best_hands = self.hands
-        """Hand sequence of the best trial so far."""
+        self._evaluations = 0
+        self._best_cost = float(-alone.rewards[best])
+        self._best_hands = self.hands
         self._best_x: Array = np.full(self.dim, np.nan)
         self._best_targets = alone.targets[best].copy()
-        self._better = [(0, self.best_cost)]
+        self._better = [(0, self._best_cost)]
 
     def __reduce__(self) -> Any:
         raise CoarticError(NO_COPIES)
@@ -192,7 +214,8 @@ class Objective:
 
     @property
     def task(self) -> Task:
-        """The task. Raises UndeclaredError in a method, which cannot see it."""
+        """The task. Raises UndeclaredError if the objective was made without ``task``, as it is in
+        a method: a method cannot see its task."""
         if self._task is None:
             raise UndeclaredError("a method cannot see its task, nor what is known of the task")
         return self._task
@@ -205,7 +228,7 @@ class Objective:
     @property
     def best_known(self) -> int | None:
         """Lowest cost known of the task, ticks: of any hand sequence, also with goals that are hit
-        without a movement. Raises UndeclaredError in a method, which cannot see its task.
+        without a movement. Raises UndeclaredError in a method, as :attr:`task` does.
 
         None where no cost is shipped: for a task of your own, for instances of a family except the
         first 40 of its test split, and for another model than the paper's.
@@ -215,7 +238,8 @@ class Objective:
 
     @property
     def proven(self) -> bool:
-        """True if it is proven that no solution costs less than ``best_known``; False without."""
+        """True if it is proven that no solution costs less than ``best_known``; False without such
+        a proof. Raises UndeclaredError in a method, as :attr:`task` does."""
         known = self._known
         return known is not None and known.proven
 
@@ -227,6 +251,31 @@ class Objective:
         return sequences_with(session.hands, session.goals_count, session.task_name)
 
     # What was found so far.
+
+    @property
+    def evaluations(self) -> int:
+        """Number of points evaluated; the first trials are not among them."""
+        return self._evaluations
+
+    @property
+    def best_cost(self) -> float:
+        """Cost of the best trial so far, ticks; at first that of the corrective process alone."""
+        return self._best_cost
+
+    @property
+    def best_hands(self) -> str:
+        """Hand sequence of the best trial so far."""
+        return self._best_hands
+
+    @property
+    def lower(self) -> Array:
+        """Lower ends of ``bounds``, shape ``(dim,)``, a copy."""
+        return self.bounds[:, 0].copy()
+
+    @property
+    def upper(self) -> Array:
+        """Upper ends of ``bounds``, shape ``(dim,)``, a copy."""
+        return self.bounds[:, 1].copy()
 
     @property
     def history(self) -> pd.DataFrame:
@@ -276,12 +325,12 @@ class Objective:
         takes as many ticks as the point costs. No trial is counted.
 
         ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
-        default ``hands`` of this problem. A movement has a target of all joints (a joint that has
+        default :attr:`hands` of this objective. A movement has a target of all joints (one that has
         no entry in the point has the value at which it keeps still), or none where the entries of
         its goal are NaN. Goals that are missed are corrected by ``execute``. Raises UndeclaredError
-        in a method, which has :attr:`solution`, and ValueError if point or hands do not fit.
+        in a method, which can use :attr:`solution`, and ValueError if point or hands do not fit.
         """
-        task, point = self.task, real_array("x", x)
+        task, point = self.task, _entries_of("x", x)
         if point.shape != (self.dim,):
             raise ValueError(f"x has shape {point.shape}; needed is ({self.dim},)")
         self._check(point[None])
@@ -313,7 +362,7 @@ class Objective:
         """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
         columns as scipy has them. Raises ValueError for shape ``(dim, dim)``, in which points may
         be rows: :meth:`many` takes rows. Other errors are those of :meth:`many`."""
-        point = real_array("x", x)
+        point = _entries_of("x", x)
         if point.ndim == 2 and len(point) == self.dim:
             if point.shape[1] == self.dim:
                 raise ValueError(
@@ -333,9 +382,10 @@ class Objective:
             self._targets.put(self._entries, point)
             made = self._session._make_trials(self._codes, self._targets)
             cost = float(min(-made.rewards.item(), FAILED))
-            self.evaluations += 1
-            if cost < self.best_cost:
-                self._keep(cost, self.evaluations, point, self._codes, made, 0)
+            self._evaluations += 1
+            if cost < self._best_cost:
+                self._keep(cost, self._evaluations, point, self._codes, made, 0)
+            self._warn_of_degrees(cost, made, 0)
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
@@ -345,13 +395,13 @@ class Objective:
         Entries are finite, or NaN for all joints of a goal (the corrective process alone); an entry
         beyond 100,000 makes the trial fail. Joints that have no entry in a point keep still.
         ``hands`` is one hand sequence for all points (``"RRLR"``), or a sequence for each point; by
-        default ``hands`` of this problem.
+        default :attr:`hands` of this objective.
 
         Raises BudgetError if fewer trials are left than there are points: the trials that are left
         are made, for the first points. Raises ValueError for another shape, for infinite entries,
         for a goal that is NaN in part, and for hands that do not fit the task.
         """
-        array = real_array("points", points)
+        array = _entries_of("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
             raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
         self._check(array)
@@ -367,25 +417,36 @@ class Objective:
         return costs
 
     def _evaluate(self, points: Array, codes: Hands, costs: Array) -> None:
-        """Make a trial for each point ``(N, dim)`` with hands ``codes`` ``(N, G)``; write costs,
-        ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and note each new best."""
+        """Make a trial for each point ``(N, dim)`` with hands ``codes``, 0 left or 1 right, ``(N,
+        G)``; write costs, ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and keep
+        each point that is better than all before it."""
         made = self._session._make_trials(codes, self._targets_of(points))
         np.minimum(-made.rewards, FAILED, out=costs)
-        if costs.min() < self.best_cost:
-            before = np.minimum.accumulate(np.append(self.best_cost, costs))[:-1]
+        if costs.min() < self._best_cost:
+            before = np.minimum.accumulate(np.append(self._best_cost, costs))[:-1]
             for n in np.flatnonzero(costs < before).tolist():
-                at = self.evaluations + n + 1
+                at = self._evaluations + n + 1
                 self._keep(float(costs[n]), at, points[n], codes, made, n)
-        self.evaluations += len(points)
+        self._evaluations += len(points)
+        worst = int(costs.argmax())
+        self._warn_of_degrees(costs[worst], made, worst)
+
+    def _warn_of_degrees(self, cost: float, made: Accounts, trial: int) -> None:
+        """Warn, outside of a method, of a costly trial (row ``trial`` of ``made``) whose targets
+        may be meant in degrees, as :func:`coartic.execute` does."""
+        if self._task is not None and cost > WHOLE_TURNS / self._session.model.step:
+            targets = self._targets_in(made, trial)
+            if hint := hint_of(movements_of(self.hands, targets)):
+                warnings.warn(hint, stacklevel=4)
 
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
         """Note a point as the best so far, evaluated as number ``evaluations`` (from 1): ``trial``
         (from 0) is the row of its trial in ``codes`` and in ``made``."""
-        self.best_cost, self._best_x = cost, point.copy()
+        self._best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
-        self.best_hands = letters_of([HANDS[code] for code in codes[trial]])
+        self._best_hands = letters_of([HANDS[code] for code in codes[trial]])
         self._better.append((evaluations, cost))
 
     def _targets_in(self, made: Accounts, trial: int) -> Configs:
@@ -394,8 +455,8 @@ class Objective:
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
-        """Return the targets ``(N, G, dof)`` of points ``(N, dim)``; NaN for joints without an
-        entry."""
+        """Return the targets ``(N, G, dof)``, length unit and rad, of points ``(N, dim)``; NaN for
+        joints that have no entry in a point."""
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
         return targets
@@ -446,14 +507,14 @@ def objective(
     ----------
     task : Task, str or pathlib.Path
     hands : str, optional
-        A hand sequence (``"RRLR"``), by default the one with which the corrective process alone
-        does best. The optimum can have others: in ``two-armed-2`` no point with these hands is
-        known to come within 14 % of it.
+        A hand sequence (``"RRLR"``), by default the sequence with which the corrective process
+        alone gets the highest reward. The optimum can have other hands: in ``two-armed-2`` no point
+        with these hands is known to come within 14 % of the optimum.
     half_width : float
         Half the width of the bounds around ``x0``, length unit (base) and rad (joints).
     model : MotionModel
     budget : int, optional
-        Most trials, among them those by which hands are chosen; then BudgetError is raised.
+        Most trials, with the trials by which hands are chosen; then BudgetError is raised.
 
     Returns
     -------
@@ -470,7 +531,7 @@ def objective(
     TypeError
         The model is no MotionModel, or the task is neither a Task nor a text nor a path.
     MethodError
-        The corrective process completes no sequence, or there are too many to try.
+        The corrective process completes no sequence, or there are more than 4096 to try.
     """
     chosen = as_task(task)
     if budget is not None:
@@ -504,9 +565,9 @@ def problems(
     family : str
         Its name with its version, ``"two-armed/v1"``.
     split : {"test", "development"}
-        Instances to report on, or those to tune on.
+        Instances to report on (``"test"``), or to tune on (``"development"``).
     count : int
-        How many, from 1 to 10,000.
+        Number of instances, from 1 to 10,000.
     half_width : float
     model : MotionModel
     budget : int, optional
@@ -522,7 +583,10 @@ def problems(
     TaskError
         There is no such family.
     ValueError
-        The split or the count is another one.
+        The split is neither of these, the count is not from 1 to 10,000, or :func:`objective`
+        refuses an option.
+    MethodError
+        The corrective process completes no sequence of an instance, or there are more than 4096.
     """
     if not isinstance(split, str) or split not in ("test", "development"):
         raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
@@ -534,10 +598,10 @@ class OptimiserParameters(Parameters):
     """Parameters of every :class:`Optimiser`."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, those of the corrective process alone among them."""
+    """Trials of a run, with trials of the corrective process alone."""
     hands: str | None = None
-    """Hand sequence; by default the one with which the corrective process alone does best, or the
-    task's own where there are too many to try."""
+    """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
+    alone gets the highest reward, or the task's initial one where more than 4096 exist."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Half the width of the bounds, length unit (base) and rad (joints)."""
 

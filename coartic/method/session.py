@@ -114,6 +114,7 @@ class Meter:
     jacobians: int = 0
     """Jacobian evaluations; the corrective process makes one per iteration."""
     corrective_iterations: int = 0
+    """Iterations of the corrective process."""
     corrections: int = 0
     """Corrective movements made."""
     failed_trials: int = 0
@@ -121,7 +122,9 @@ class Meter:
     gradients: int = 0
     """Gradient evaluations of a solver."""
     hessians: int = 0
+    """Hessian evaluations of a solver."""
     solver_iterations: int = 0
+    """Iterations of a solver."""
     build_s: float = 0.0
     """Wall time of setting problems up, which is paid once."""
     solve_s: float = 0.0
@@ -160,8 +163,8 @@ def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
 class Session:
     """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced, and calls are counted: a call that *needs* information raises
-    UndeclaredError if ``information`` lacks it. This is no sandbox. ``trusted`` methods, this
+    The declaration is enforced, and calls are counted: a call that uses information which
+    ``information`` lacks raises UndeclaredError. This is no sandbox. ``trusted`` methods, this
     project's own, may also take the task to their compiled kernels and state the counts
     themselves. ``of_run`` marks the session of a run: trials that a process makes outside such
     sessions are counted apart (:func:`coartic.motion.trial.trials_outside`). ``trial_budget`` is
@@ -208,7 +211,7 @@ class Session:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Hands the robot has."""
+        """Hands that the robot has, of ``"left"`` and ``"right"``."""
         return self._task.hands
 
     @property
@@ -239,29 +242,32 @@ class Session:
 
     @property
     def goals(self) -> Array:
-        """Goal centres, shape ``(G, 2)``, length unit, a copy. Needs ``goals``."""
+        """Goal centres, shape ``(G, 2)``, length unit, a copy. Raises UndeclaredError without
+        ``Information.GOALS``."""
         self._use(Information.GOALS)
         return np.array(self._task.goal_array)
 
     @property
     def radius(self) -> float:
-        """θ^g: radius of every goal, length unit. Needs ``goals``."""
+        """θ^g: radius of every goal, length unit. Raises UndeclaredError without
+        ``Information.GOALS``."""
         self._use(Information.GOALS)
         return self._task.radius
 
     @property
     def robot(self) -> Robot:
-        """The robot, with lengths of links and places of shoulders. Needs ``kinematic model``.
+        """The robot, with lengths of links and places of shoulders. Raises UndeclaredError without
+        ``Information.KINEMATIC_MODEL``.
 
-        The method counts evaluations of it, or of another library's model, with :meth:`spend`.
+        The method itself counts evaluations of the robot's kinematics, with :meth:`spend`.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Return the position of a hand in ``q`` as a CasADi expression
-        (:meth:`Robot.symbolic_hand`). Needs ``kinematic model``. The method counts evaluations of
-        it with :meth:`spend`."""
+        """Return the position of a hand, x and y, as a CasADi expression, 2 x 1, length unit, for a
+        CasADi ``q``, dof x 1. Raises UndeclaredError without ``Information.KINEMATIC_MODEL``, and
+        ValueError for another size. The method itself counts evaluations, with :meth:`spend`."""
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot.symbolic_hand(q, hand)
 
@@ -274,8 +280,8 @@ class Session:
         """Note a use of the corrective process if a corrective movement of a solution has no
         target: the corrective process finds the target.
 
-        Raises UndeclaredError if the method does not declare it, and SolutionError if the solution
-        is no sequence. Nothing else is checked.
+        Raises UndeclaredError if the method does not declare the corrective process, and
+        SolutionError if the solution is no sequence. Nothing else is checked.
         """
         if not isinstance(solution, (tuple, list, Sequence)):  # in the order of their speed
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
@@ -299,25 +305,29 @@ class Session:
 
     def forward_kinematics(self, q: Any, hand: Hand) -> Array:
         """Return hand positions, ``(..., 2)``, length unit, for configurations ``(..., dof)``;
-        count an evaluation for each. Needs ``forward kinematics``."""
+        count an evaluation for each. Raises UndeclaredError without
+        ``Information.FORWARD_KINEMATICS``, and ValueError if ``q`` or ``hand`` does not fit."""
         self._use(Information.FORWARD_KINEMATICS)
         positions = self._task.robot.forward_kinematics(q, hand)
         self._meter.add(forward_kinematics=positions[..., 0].size)
         return positions
 
     def jacobian(self, q: Any, hand: Hand) -> Array:
-        """Return Jacobians, ``(..., 2, dof)``, for configurations ``(..., dof)``; count one for
-        each. Needs ``Jacobian``."""
+        """Return derivatives of a hand's x and y by each entry of ``q``, ``(..., 2, dof)``, for
+        configurations ``(..., dof)``; count a Jacobian for each. Raises UndeclaredError without
+        ``Information.JACOBIAN``, and ValueError if ``q`` or ``hand`` does not fit the robot."""
         self._use(Information.JACOBIAN)
         jacobians = self._task.robot.jacobian(q, hand)
         self._meter.add(jacobians=jacobians[..., 0, 0].size)
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
-        """Run the corrective process from ``q`` with a hand for a goal (from 1), and return the
-        configuration that it finds; if the result is not ``converged``, that is its last iterate,
-        and no error is raised. No movement is made. Count its iterations, Jacobians and
-        evaluations. Needs ``corrective process``."""
+        """Run the corrective process from ``q``, ``(dof,)``, with a hand for a goal (from 1); count
+        its iterations, Jacobians and evaluations. Return the configuration that it finds: the last
+        iterate, without an error, if the result is not ``converged``. No movement is made.
+
+        Raises UndeclaredError without ``Information.CORRECTIVE_PROCESS``, and ValueError for
+        arguments that do not fit the task."""
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
         correction = correct(
@@ -336,12 +346,14 @@ class Session:
         return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
-        """Make one physical trial of a solution; count it and what it takes; return the execution.
-        Needs ``reward by trial``.
+        """Make one physical trial of a solution; count the trial, its ticks and its evaluations;
+        return the execution.
 
         Goals that are missed are corrected, and the ticks count. Where the corrective process is
         not declared, the execution has the movements as given and no configurations. Raises
-        BudgetError if no trial is left, SolutionError for a solution that breaks the rules.
+        UndeclaredError without ``Information.REWARD_BY_TRIAL``, and without
+        ``Information.CORRECTIVE_PROCESS`` for a corrective movement without a target; BudgetError
+        if no trial is left; SolutionError for a solution that breaks the task's rules.
         """
         self._use(Information.REWARD_BY_TRIAL)
         self.check_solution(solution)
@@ -371,16 +383,17 @@ class Session:
         ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
         keeps its value, and for a goal without any target the corrective process acts alone, which
         has to be declared. Goals that are missed are corrected, and the ticks count. A trial with a
-        target beyond 100,000 fails without a movement. Needs ``reward by trial``.
+        target beyond 100,000 fails without a movement.
 
-        Where the budget has fewer trials left, only the first are made: what comes back is as
-        long as trials were made. With ``until``, shape ``(N,)``, the last trial is the first
-        whose reward exceeds its entry; those after it are not made.
+        Where the budget has fewer trials left, only the first are made: results have a row for each
+        trial made. With ``until``, rewards of shape ``(N,)``, trials end after the first whose
+        reward exceeds its entry of ``until``; no later trial is counted or returned.
 
-        Rewards and counts are those of single trials, except that a single trial spends one or two
-        more evaluations of forward kinematics per goal. Where the corrective process is not
+        Rewards and counts are the same as of single trials, except that a single trial spends one
+        or two more evaluations of forward kinematics per goal. Where the corrective process is not
         declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
-        Raises BudgetError where no trial is left, ValueError for arrays that do not fit the task.
+        Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError where no trial
+        is left, ValueError for arrays that do not fit the task.
         """
         self._use(Information.REWARD_BY_TRIAL)
         given = check_targets(self._task, targets)
@@ -428,9 +441,10 @@ class Session:
     def _make_trials(
         self, codes: Hands, targets: Configs, *, until: ArrayLike | None = None
     ) -> Accounts:
-        """Make and count N trials, with hands 0 or 1, ``(N, G)``, and targets ``(N, G, dof)``, and
-        return their accounts. ``until`` as in :meth:`trials`. Neither arguments nor the budget are
-        checked: the caller does so, and holds ``lock``."""
+        """Make and count N trials, with hands 0 (left) or 1 (right), ``(N, G)``, and targets ``(N,
+        G, dof)``, and return their accounts; with ``until``, rewards ``(N,)``, only up to the first
+        trial whose reward exceeds its entry. Neither arguments nor the budget are checked: the
+        caller checks them, and holds ``lock``."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]
@@ -442,13 +456,13 @@ class Session:
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """Return the hand sequence of the first trial, such as ``"RRRR"``: the sequence that the
-        task names, whatever ``hands``, or, if it names a policy (``"best-single-hand"`` or
-        ``"best-of-all"``), the sequence of ``hands`` (by default all of the robot) with which the
-        corrective process alone gets the highest reward. Needs ``corrective process`` and ``reward
-        by trial``.
+        task names, whatever ``hands``, or, if the task names a policy, the sequence of ``hands``
+        (by default all of the robot) with which the corrective process alone gets the highest
+        reward, among sequences of one hand (``"best-single-hand"``) or all (``"best-of-all"``).
 
         Trials of this search are counted as ``initial_trials``, not among the method's trials or in
-        its budget. Raises NotApplicableError if no sequence completes the task, or too many exist.
+        its budget. Raises NotApplicableError if no sequence completes the task, or more than 4096
+        exist; UndeclaredError without ``Information.CORRECTIVE_PROCESS`` and ``REWARD_BY_TRIAL``.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         chosen, spent = search_initial_hands(
@@ -466,7 +480,8 @@ class Session:
         corrections: int,
         failed: int,
     ) -> None:
-        """Add trials with these rewards (packed), and the sums of what they took, to the meter."""
+        """Add trials with these rewards (:data:`NO_REWARD` where a trial failed), and their sums of
+        ticks, evaluations, iterations, corrections and failures, to the meter."""
         before, meter = len(self._rewards), self._meter
         self._rewards.frombytes(rewards.tobytes())
         meter.trials += len(self._rewards) - before
@@ -504,7 +519,7 @@ class Session:
     def spend(self, **counts: int) -> None:
         """Add counts to the counters of these names: evaluations of a solver, and iterations of a
         corrective process that the method runs itself, which are Jacobians, too. A method may name
-        counters of :attr:`Meter.SOLVER`, a trusted method all.
+        counters of :attr:`Meter.SOLVER`, a trusted method all of :attr:`Meter.COUNTS`.
 
         Raises ValueError for another counter, for a negative count, and for a sum beyond 2^63 - 1.
         """
@@ -538,7 +553,7 @@ class Session:
     def reveal(self, *information: Information) -> Task:
         """Return the task itself, for compiled methods of this project that count by themselves,
         with :meth:`spend`. Note ``information``, at least one item, as used. Raises UndeclaredError
-        for any other method, and for information that the method does not declare.
+        for any other method, and without an item or for one that the method does not declare.
         """
         self._needs_trust("reveal")
         if not information:
@@ -548,8 +563,8 @@ class Session:
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
         """Add rewards of trials that a compiled method of this project made (None for a failed
-        trial) to :attr:`rewards`, and the time that it took, s, to ``solve_s``; no other count is
-        changed. Raises UndeclaredError for any other method."""
+        trial) to :attr:`rewards`, and ``solve_s``, the time that the method took, s, to the counter
+        of this name; no other count is changed. Raises UndeclaredError for any other method."""
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))
         self._meter.solve_s += solve_s

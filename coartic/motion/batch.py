@@ -35,7 +35,8 @@ GOING = 0.0
 
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which the kernels of a robot are compiled: 4 or 8 if
-    no arm has more, else those of the longer arm. So robots of a family share machine code."""
+    no arm has more, else the number of the arm with more links. So robots of a family share machine
+    code."""
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
@@ -77,8 +78,9 @@ def robot_parameters(
     """Return robot, constants and options for kernels as one record, in an array of shape ``(1,)``.
     The array is cached: copy it before you change it.
 
-    ``radius`` is the radius of the goals, length unit. ``checks`` says whether an arm without a
-    target may be in its goal already. Raises ValueError for a lock other than "x" and "y".
+    ``radius`` is the radius of the goals, length unit; ``locked_base`` has the base coordinates
+    that the corrective process leaves. ``checks`` says whether an arm without a target may be in
+    its goal already. Raises ValueError for a lock other than "x" and "y".
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
@@ -113,10 +115,11 @@ class Batch(NamedTuple):
     at: Any
     """The rows of the slots, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
     corrected: Any
-    """The rows of an arm that is corrected: the same memory, shape ``(rows, SLOTS)``. Only to be
-    copied: some are integers."""
+    """The rows in ``at`` that a correction needs, in the same memory, shape ``(rows, SLOTS)``. Only
+    to be copied: some rows are integers."""
     moved: Any
-    """The rows of an arm that moves."""
+    """The rows in ``at`` that a movement needs, in the same memory, shape ``(rows, SLOTS)``. Only
+    to be copied: some rows are integers."""
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
@@ -247,8 +250,8 @@ def compact(rows: Any, slot: int, last: int) -> None:
 
 @inner
 def padded_count(count: int) -> int:
-    """Return the number of slots to work on for ``count`` slots: 0 and 1 as they are, else rounded
-    up to whole vectors of 8 slots; the last slots may belong to no run.
+    """Return the number of slots to work on for ``count`` slots: ``count`` itself for 0 and 1, else
+    rounded up to whole vectors of 8 slots; the last slots may belong to no run.
 
     A loop over whole vectors leaves no slots over that would be worked on one by one.
     """
@@ -260,8 +263,8 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return a bound on the absolute angle of every link of the arm in a slot (column of ``q``),
-    rad: the sum of the absolute angles of its joints."""
+    """Return an upper bound on the absolute angle from +x of every link of the arm in a slot
+    (column of ``q``), rad: the sum of the absolute angles of its joints."""
     total = 0.0
     for k in range(len(q) - BASE_DOF):
         total += abs(q[BASE_DOF + k, slot])
@@ -271,7 +274,7 @@ def winding(q: Any, slot: int) -> float:
 @inner
 def are_near(at: Any, count: int) -> bool:
     """Return whether all link angles of the first ``count`` slots are certain to be below 1e5 rad,
-    the range of the fast cosine (:func:`winding`)."""
+    the range of the fast cosine: True if each arm's absolute joint angles have a lower sum."""
     far = 0
     for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1

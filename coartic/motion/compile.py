@@ -305,9 +305,9 @@ def _log_compilation() -> None:
 class _MachineCode:
     """Machine code of a function on disk, as Numba's dispatchers ask for it.
 
-    Of processes that lack the same code one compiles it and the others wait for it. A file that
-    cannot be read, such as one that a full disk has cut short, is dropped, and what cannot be kept
-    is compiled again in the next process.
+    Of processes that lack the same code one compiles the code and all others wait. A file that
+    cannot be read, such as a file that a full disk has cut short, is dropped, and code that cannot
+    be kept is compiled again in the next process.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:

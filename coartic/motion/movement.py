@@ -136,9 +136,12 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 @inner
 def set_off(at: Any, count: int, step: float) -> bool:
     """Set rates, bounds and number of steps, in place, of the movements loaded into the first
-    ``count`` slots, with steps of length ``step`` in joint space.
+    ``count`` slots, with steps of length ``step`` in joint space; ``distance``, a square before,
+    becomes its root, and the present step is set to 0.
 
-    Returns True if all angles stay below 1e5 rad, the range of the fast cosine.
+    Returns True only if all link angles are certain to stay below 1e5 rad, the range of the fast
+    cosine, by a bound: the sum of absolute joint angles. If False, angles may exceed this range or
+    not.
     """
     far = 0
     for i in range(padded_count(count)):
@@ -188,7 +191,7 @@ def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -
     Each slot gets a status; a slot that goes on gets the next step that can end it. A movement ends
     at its last step, with the hand at most ``rims[0]`` from the goal's centre, or, with
     ``stop_on_arrival``, at most ``rims[1]`` from where the target puts the hand, length unit.
-    ``squares`` are the squares of ``rims`` (:func:`largest_square`).
+    ``squares`` are the squares of ``rims``, as rounded by :func:`largest_square`.
     """
     ended = 0
     tip = len(at.length)
@@ -307,7 +310,7 @@ def move(
         Whether the movement also ends where the hand is near the place to which the target brings
         it. A corrective movement does not: it ends on hitting the goal, or at its target.
     model : MotionModel
-        The constants.
+        The constants; ``step`` and ``arrival_tolerance`` matter.
 
     Returns
     -------
@@ -357,7 +360,8 @@ def _find_statuses(at: Any, count: int, square: float) -> None:
 def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int, bool]:
     """Make an iteration of the corrective process **A**, q += α Jᵀ e, in every slot that goes on;
     with a kernel ``pull`` its rows are added (:func:`descend_to_goals`). Return how many of the
-    first ``count`` slots have ended, and the result of :func:`are_near` afterwards."""
+    first ``count`` slots have ended, and whether all link angles are certain to be below 1e5 rad
+    afterwards."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -535,9 +539,11 @@ def correct(
 
     Raises
     ------
+    TypeError
+        ``robot`` or ``model`` has another type.
     ValueError
         A shape is wrong, a figure is not finite or beyond 100,000, there is no such hand, or
-        ``locked_base`` has another entry.
+        ``locked_base`` has an entry other than ``"x"`` and ``"y"``.
 
     Notes
     -----
@@ -564,10 +570,10 @@ def explain_failure(
     """Return why the corrective process may have failed from ``q``, as the end of a sentence that
     begins with a colon; empty if there is no cause that users can mend.
 
-    One cause is a hand whose joints all lie on the line to the goal: none of them moves the hand
-    nearer. The others are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``,
-    with the singular values σ of the Jacobian J; so the descent is stable while gain × |J|² is
-    below 2, for the largest σ, which is that of the stretched arm, and slow where that is small.
+    One cause is a hand whose joints all lie on the line to the goal: no joint moves the hand
+    nearer. Other causes are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``,
+    with the singular values σ of the Jacobian J. So the descent is stable while gain × |J|² is
+    below 2 for the largest σ, the singular value of the stretched arm, and slow where it is small.
     """
     free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
     arm = robot.joints(hand)
@@ -604,9 +610,10 @@ def follow(
 ) -> MoveResult:
     """Move from ``q`` in steps along straight joint-space lines from waypoint to waypoint.
 
-    ``waypoints`` has shape ``(W, dof)``; the points of the path are those of :func:`path_points`.
-    The movement stops at the first point with the hand within ``radius`` of the goal's centre, or
-    at the last waypoint; k steps take k + 1 ticks. Raises ValueError for a wrong shape.
+    ``waypoints`` has shape ``(W, dof)``; points of the path lie ``model.step`` apart along these
+    lines (:func:`path_points`). The movement stops at the first point with the hand within
+    ``radius``, length unit, of the goal's centre, or at the last waypoint; k steps take k + 1
+    ticks. Raises ValueError for a wrong shape.
     """
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
@@ -619,7 +626,8 @@ def follow(
 
 def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
     """Return the configurations at the n steps of a straight movement from ``q`` to ``target``,
-    both included, shape ``(n + 1, dof)``, with the rounding of the kernels."""
+    ``(dof,)``, both included, shape ``(n + 1, dof)``, length unit and rad, with the rounding of the
+    kernels."""
     difference, square = target - q, 0.0
     for value in difference.tolist():
         square += value * value

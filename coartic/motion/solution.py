@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
+from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import width_of
 from coartic.motion.movement import LARGEST_ENTRY, configuration, correct, follow, move
@@ -42,13 +43,13 @@ from coartic.tasks.task import Task, check_hands, hands_of, letters_of
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
 WHOLE_TURNS = 20.0
-"""Angle of a target, rad, beyond which it may be meant in degrees."""
+"""Angle of a target, rad, beyond which the angle may be meant in degrees."""
 HELD = 1e-6
-"""How far from its value a target may have a locked base coordinate, length unit; solvers leave
-less."""
+"""Largest distance of a locked base coordinate of a target from its value at the start, length
+unit; solvers leave less."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Movement:
     """Movement of a solution (:func:`execute`).
 
@@ -64,7 +65,7 @@ class Movement:
     are straight in joint space and end on a hit or on arrival; a path follows its waypoints and
     ends on a hit or at the last of them; a corrective movement ends only on a hit and is made
     only if the goal is not hit. The first movement for a goal, unless corrective, is always made;
-    the others only while the goal is not hit."""
+    further movements are made only while the goal is not hit."""
     target: Array | None = None
     """Target configuration q^t, shape ``(dof,)``, length unit (base) and rad (joints); the last
     waypoint of a path. None in a corrective movement has the corrective process find it when the
@@ -74,6 +75,7 @@ class Movement:
     waypoints: Array | None = None
     """Configurations that a path passes through, shape ``(k, dof)``, from where the robot stands
     to ``waypoints[-1]``, length unit (base) and rad (joints); None for the other kinds."""
+    __eq__ = equal_contents
 
     def __post_init__(self) -> None:
         for name, given in (("target", self.target), ("waypoints", self.waypoints)):
@@ -86,7 +88,7 @@ class Movement:
         return short_repr(self, **{k: v for k, v in facts.items() if v is not None})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Execution:
     """An executed solution (:func:`execute`)."""
 
@@ -105,6 +107,7 @@ class Execution:
     """Forward-kinematics evaluations made."""
     reason: str = ""
     """Why the task was not completed; empty where it was."""
+    __eq__ = equal_contents
 
     def __repr__(self) -> str:
         names = ("hands", "reward", "ticks", "corrections")
@@ -181,7 +184,7 @@ def execute(
         not have a hand, a target has the wrong shape or is not finite, a locked base moves by more
         than 1e-6.
     ValueError
-        No movement can be made with the model.
+        A constant of the model is out of bounds.
 
     Notes
     -----
@@ -223,8 +226,8 @@ def execute_many(
     """Execute and score solutions of one task side by side, in a fraction of the time.
 
     Returns for each solution, in order, its execution, or the error that :func:`execute` would
-    raise, as an object; no such error is raised. ``outside`` as in
-    :func:`coartic.motion.trial.count_trials`.
+    raise, as an object; no such error is raised. Trials are counted as made outside the session of
+    a run if ``outside``.
     """
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
@@ -266,7 +269,7 @@ def _with_targets(movements: list[Movement]) -> list[Movement | None]:
 
 def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool) -> list[Execution]:
     """Execute plans (movements by goal) without paths side by side; return the executions in the
-    order of plans. ``outside`` as in :func:`coartic.motion.trial.count_trials`."""
+    order of plans. Trials are counted as made outside the session of a run if ``outside``."""
     if not plans:
         return []
     given = [[_with_targets(movements) for movements in plan] for plan in plans]
@@ -292,8 +295,9 @@ def movements_in(
     """Return a list of the movements made in each of N trials, up to the first goal missed, from
     the accounts of goals, shape ``(N, G, M)``.
 
-    ``given`` has the movements that were to be made, by trial and goal, as :func:`_with_targets`
-    returns them; they give the kinds. A goal hit without one has a corrective movement of 0 ticks.
+    ``given`` has the movements that were to be made, by trial and goal, with None for a check of
+    the hand without a movement (:func:`_with_targets`); the kinds come from these movements. A goal
+    hit without a movement has a corrective movement of 0 ticks.
     """
     names = ("hand", "hit", "ticks", "corrections")
     first = accounts[..., 0]
@@ -324,7 +328,7 @@ def movements_in(
 
 def _make_one_by_one(compiled: CompiledTask, plan: Plan, outside: bool) -> Execution:
     """Execute a plan (movements by goal) with paths, one movement after the other, and return the
-    execution. ``outside`` as in :func:`coartic.motion.trial.count_trials`."""
+    execution. The trial is counted as made outside the session of a run if ``outside``."""
     if outside:
         count_trials(1)
     task, q = compiled.task, compiled.starts[0]
@@ -368,7 +372,8 @@ def _execution_of(
     """Return the execution, with its totals and the reason of a failure, of a plan that was made.
 
     ``plan`` has the movements as given, by goal; ``movements`` has the movements as made, in order,
-    up to the goal that failed; ``goals`` are the accounts of the goals, shape ``(G,)``.
+    up to the goal that failed; ``goals`` are the accounts of the goals, shape ``(G,)``, records of
+    :func:`~coartic.motion.trial.account_type`.
     """
     hits = sum(goals["hit"].tolist())
     # The place of the hand is known before the first movement, and where that leads.
@@ -386,8 +391,9 @@ def _execution_of(
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
     """Return the joint travel of the idle arm, rad, summed over the goals: for each goal the
-    Euclidean distance of the joint angles of the arm that does not hit it from their values at the
-    hit before (for goal 1, at the start). It is 0 if that arm keeps still, as in EC1 and EC3.
+    Euclidean distance of the joint angles of the arm that does not hit the goal from their values
+    at the hit before (for goal 1, at the start). It is 0 if this arm keeps still, as under EC1 and
+    EC3.
 
     ``hands`` has the hand for each goal, ``reached`` the configuration at each hit, ``(G, dof)``.
     """
@@ -404,9 +410,9 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
-    """Check a solution, and return a list of the movements for each goal, in the order of goals
-    (movements as :func:`_check_movement` returns them). Raises SolutionError for a solution that
-    breaks the task's rules."""
+    """Check a solution, and return a list of the movements for each goal, in the order of goals;
+    a path has its last waypoint as target, and locked base coordinates are as at the start.
+    Raises SolutionError for a solution that breaks the task's rules."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
             f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
@@ -466,9 +472,9 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 
 
 def _check_point(task: Task, point: Any) -> Array:
-    """Return a configuration as an array: the array given, or a copy in which locked base
-    coordinates are those of the start (:func:`_hold_base`). Raises ValueError if it is no
-    configuration of the robot, or moves a locked base coordinate."""
+    """Return a configuration as an array ``(dof,)``: the array given, or a copy in which locked
+    base coordinates are as at the start. Raises ValueError if ``point`` is no configuration of the
+    robot, or moves a locked base coordinate by more than 1e-6."""
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
@@ -481,9 +487,9 @@ def _check_point(task: Task, point: Any) -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Set locked base coordinates of points, ``(..., dof)``, to those of the start, in the
-    array itself, and return the array. Raises ValueError where one differs by more than
-    :data:`HELD`; NaN stays."""
+    """Set locked base coordinates of points, ``(..., dof)``, to their values at the start, in the
+    array itself, and return the array. Raises ValueError where a coordinate differs from the start
+    by more than :data:`HELD`, 1e-6 length units; NaN stays."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
         moved = np.abs(points[..., k] - task.q0[k])
@@ -497,9 +503,9 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Return a copy of targets, shape ``(N, G, dof)``, in which locked base coordinates are those
-    of the start (:func:`_hold_base`); NaN passes. Raises ValueError for another shape, for infinite
-    entries and for targets that move a locked base."""
+    """Return a copy of targets, shape ``(N, G, dof)``, in which locked base coordinates are as at
+    the start; NaN passes. Raises ValueError for another shape, for infinite entries and for
+    targets that move a locked base by more than 1e-6."""
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
@@ -573,7 +579,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     TypeError
         The task is neither a Task nor a text nor a path.
     ValueError
-        The hands do not fit the task, or no movement can be made with the model.
+        The hands do not fit the task, or a constant of the model is out of bounds.
 
     Notes
     -----
@@ -615,7 +621,7 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     NotApplicableError
         There are more than 4096 sequences.
     ValueError
-        The robot has not all of these hands.
+        ``hands`` is empty, or names a hand that the robot does not have.
     """
     task = as_task(task)
     return sequences_with(hands_among(task, hands), len(task.goals), task.name)
@@ -626,9 +632,9 @@ def initial_hands(
 ) -> str:
     """Return the hand sequence of a task's first trial.
 
-    A sequence that the task names stands as it is. Of a policy it is the sequence with which the
-    corrective process alone gets the highest reward: among sequences of one hand
-    (``"best-single-hand"``), or among all (``"best-of-all"``).
+    If the task names a sequence, it is this sequence. If the task names a policy, it is the
+    sequence with which the corrective process alone gets the highest reward: among sequences of one
+    hand (``"best-single-hand"``), or among all (``"best-of-all"``).
 
     Parameters
     ----------
@@ -653,7 +659,8 @@ def initial_hands(
     NotApplicableError
         No candidate completes the task, or there are more than 4096.
     ValueError
-        The robot has not all of these hands, or no movement can be made with the model.
+        ``hands`` is empty or names a hand that the robot does not have, or a constant of the model
+        is out of bounds.
 
     Notes
     -----

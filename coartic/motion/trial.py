@@ -130,9 +130,10 @@ def aim(run: Any, target: Any) -> None:
 @inlined
 def move(count: int, robot: Any, batch: Any) -> None:
     """Move each of the first ``count`` runs of a batch (records of robots) to its target, or check
-    whether its hand is in the goal, as its ``action`` says (:data:`IDLE`): phase 3, *move*. A
-    movement ends on a hit, too. ``q``, ``hit``, ``ticks`` and ``acting`` change in place, and
-    ``evaluations`` grows; a run without a movement takes 0 ticks."""
+    whether its hand is in the goal, as its ``action`` says (``IDLE``, ``CHECK``, ``MOVE`` or
+    ``REPEAT``): phase 3, *move*. A movement ends on a hit, too. ``q``, ``hit``, ``ticks`` and
+    ``acting`` change in place, and ``evaluations`` grows; a run without a movement takes 0
+    ticks."""
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action
@@ -148,16 +149,16 @@ def move(count: int, robot: Any, batch: Any) -> None:
 def correct(count: int, robot: Any, batch: Any) -> None:
     """Correct missed goals of the first ``count`` runs, in place: phase 4, *correct*. The
     corrective process **A** finds configurations that hit, and the runs move there; ``target`` and
-    ``ticks`` become those of these movements. A preferred posture would have its place in
-    :func:`coartic.motion.movement.descend_to_goals`."""
+    ``ticks`` of a run become the target and the ticks of its corrective movement, 0 ticks if none
+    is made."""
     find_corrections(count, robot, batch)
     make_corrections(count, robot, batch)
 
 
 @inlined
 def make_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Move those of the first ``count`` runs for which **A** converged, in place, to the
-    configurations that **A** found, their ``target``."""
+    """Move each of the first ``count`` runs for which **A** converged, in place, to the
+    configuration that **A** found, its ``target``."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -166,7 +167,8 @@ def make_corrections(count: int, robot: Any, batch: Any) -> None:
 @inlined
 def account(run: Any, moved: int, goal: Any) -> None:
     """Write the result of a run for its goal into the record ``goal``, in place: phase 5,
-    *account*. ``moved``: ticks of its movements to targets. A run that missed ends its trial."""
+    *account*. ``moved``: ticks of the run's movements to targets. If the run missed its goal, its
+    trial ends."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = moved + run.ticks
@@ -191,8 +193,9 @@ def count_goal(goal: Any, counts: Any) -> None:
 
 @shared
 def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
-    """Move those of the first ``count`` runs whose ``acting`` is True to their targets, in place;
-    a movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near it."""
+    """Move each of the first ``count`` runs whose ``acting`` is True to its target, in place; a
+    movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near the place
+    to which the target brings it."""
     at, slot = batch.at[0], 0
     for i in range(count):
         if batch.runs[i].acting:
@@ -206,8 +209,8 @@ def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
 def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
     """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
     for each of the first ``count`` runs that missed it, goes on and may be corrected; no run moves.
-    ``converged`` of a run becomes True if **A** found a target; it, ``ticks`` and ``iterations`` of
-    all these runs are set to 0 before."""
+    ``converged`` becomes True for a run for which **A** found a target, False for all others;
+    ``ticks`` become 0, and ``iterations`` the number made, 0 without **A**."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -222,15 +225,17 @@ def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
 
 @shared
 def find_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Have the paper's corrective process **A** find targets that hit the goals which the first
-    ``count`` runs missed; no run moves (:func:`_find_by`)."""
+    """Have the paper's corrective process **A** find a ``target`` that hits the goal for each of
+    the first ``count`` runs that missed it; ``converged`` says where **A** did. No run moves
+    (:func:`_find_by`)."""
     _find_by(count, robot, batch, correct_slots)
 
 
 @shared
 def find_pulled_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Have **A**, pulled to each run's preferred posture, find targets that hit the goals which the
-    first ``count`` runs missed; no run moves (:func:`_find_by`)."""
+    """Have **A**, pulled to each run's preferred posture, find a ``target`` that hits the goal for
+    each of the first ``count`` runs that missed it; ``converged`` says where **A** did. No run
+    moves (:func:`_find_by`)."""
     _find_by(count, robot, batch, pull_slots)
 
 
@@ -241,16 +246,16 @@ class Requests(NamedTuple):
     """Requests to the kernel: N arms, each to G goals in turn by M movements each."""
 
     starts: Configs
-    """Shape ``(N, dof)``, or ``(1, dof)`` for one start of all."""
+    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` for one start of all."""
     hands: Hands
-    """Shape ``(N, G)``."""
+    """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
-    """Shape ``(N, G, M, dof)``; NaN for joints that stay. The first movement for a goal is made,
-    further ones where it is still missed."""
+    """Targets, shape ``(N, G, M, dof)``, length unit and rad; NaN for joints that stay. The first
+    movement for a goal is made, further ones where the goal is still missed."""
     stops: NDArray[np.bool_]
     """True where the movement to a target ends on arrival, shape ``(N, G, M)``; empty if all do."""
     goals: Points
-    """Shape ``(N, G, 2)``, or ``(1, G, 2)`` for the same goals of all."""
+    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` for the same goals of all."""
 
 
 ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
@@ -280,8 +285,8 @@ def row_of(rows: Any, n: int) -> Any:
 
 @inlined
 def _are_within(targets: Any) -> bool:
-    """Return whether no target ``(G, M, dof)`` of a trial has an absolute value beyond
-    :data:`LARGEST_ENTRY`; NaN, a joint that stays, has not."""
+    """Return whether no entry of the targets ``(G, M, dof)`` of a trial has an absolute value
+    beyond 1e5 (:data:`LARGEST_ENTRY`); NaN, a joint that stays, counts as within."""
     far = 0
     for g in range(targets.shape[0]):
         for m in range(targets.shape[1]):
@@ -294,8 +299,9 @@ def _are_within(targets: Any) -> bool:
 def _reach_lot(
     first: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
 ) -> None:
-    """Let ``count`` arms from number ``first`` on, as many as a batch has runs, reach for their
-    goals; fill ``goals`` and ``counts`` with their accounts."""
+    """Let ``count`` arms from number ``first`` (from 0) on, at most as many as ``batch`` has runs,
+    reach for their goals; fill in ``goals``, accounts ``(N, G, M)``, and ``counts``, ``(N, 5)``,
+    in place. ``arms`` are :class:`Requests`."""
     for i in range(count):
         n, run = first + i, batch.runs[i]
         set_off(run, row_of(arms.starts, n))
@@ -340,8 +346,8 @@ def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any
     """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
     ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`.
 
-    ``others`` are the entries of :class:`Requests` and then those of a batch: a tuple with names
-    takes Numba half a microsecond.
+    ``others`` are the entries of :class:`Requests` and then the entries of a batch, one by one: a
+    tuple with names takes Numba half a microsecond.
     """
     arms, batch = Requests(*others[:5]), Batch(*others[5:])
     count, room = len(arms.targets), len(batch.runs)
@@ -369,7 +375,7 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
     """Let N arms reach for G goals each, in turn; an arm that misses a goal makes no further
-    movement. Return their accounts. ``parameters`` come from :func:`robot_parameters`.
+    movement. Return the accounts of N trials. ``parameters`` come from :func:`robot_parameters`.
 
     A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
     checked. Many arms are shared among threads.
@@ -404,15 +410,15 @@ class Reached(NamedTuple):
     hit: NDArray[np.bool_]
     """True where the hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
-    """Control ticks of its movements, shape ``(N,)``."""
+    """Control ticks of each arm's movements, shape ``(N,)``."""
     corrected: Configs
-    """Target of its corrective movement, shape ``(N, dof)``; NaN where none was made."""
+    """Target of each arm's corrective movement, shape ``(N, dof)``; NaN where none was made."""
     corrections: NDArray[np.int64]
-    """Corrective movements made, 0 or 1: 0 also where **A** did not converge."""
+    """Corrective movements made, 0 or 1, shape ``(N,)``: 0 also where **A** did not converge."""
     iterations: NDArray[np.int64]
-    """Iterations of the corrective process, one Jacobian each."""
+    """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Number of forward-kinematics evaluations."""
+    """Number of forward-kinematics evaluations, shape ``(N,)``."""
 
 
 @checked_arguments
@@ -514,8 +520,9 @@ _last_compiled: CompiledTask | None = None
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
     """Return a task with a model as the kernels read it. The last result is kept: do not change its
-    arrays. Raises ValueError for a task or a model with which no trial can be made; an unchecked
-    copy of a task (``model_copy``) can be such."""
+    arrays. Raises ValueError for a model out of bounds, and for a task with goals or a start beyond
+    100,000 or of a wrong shape, as an unchecked copy (``model_copy``) can have; TypeError if the
+    model is no MotionModel."""
     global _last_compiled
     last = _last_compiled  # another thread may replace it
     if last is not None and last.task is task and last.model is model:
@@ -543,8 +550,8 @@ def count_trials(count: int) -> None:
     """Add ``count`` to the number of trials made outside the sessions of runs
     (:func:`trials_outside`).
 
-    Functions that make trials call it, unless their argument ``outside`` is False: then the session
-    of a run makes the trials. Their callers need not count.
+    Functions that make trials call this one, unless their argument ``outside`` is False: then the
+    session of a run makes the trials. Callers of such functions need not count.
     """
     global _outside
     _outside += count
@@ -563,9 +570,10 @@ def make_trials(
     *,
     outside: bool = True,
 ) -> Accounts:
-    """Make N trials of a task and return their accounts. ``hands``, 0 or 1, has shape ``(N, G)``,
-    ``targets`` shape ``(N, G, M, dof)``, with NaN for joints that stay; ``stops`` is as in
-    :class:`Requests`, ``outside`` as in :func:`count_trials`."""
+    """Make N trials of a task and return their accounts. ``hands``, 0 left or 1 right, has shape
+    ``(N, G)``, ``targets`` shape ``(N, G, M, dof)``, with NaN for joints that stay; ``stops``, of
+    shape ``(N, G, M)``, is True for movements that end on arrival, too (by default all). Trials are
+    counted as made outside the session of a run if ``outside``."""
     if outside:
         count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
@@ -667,7 +675,8 @@ def ranked_sequences(
     by reward, the best first and failed trials last. An entry has the sequence, the reward (None if
     the trial failed), the reason of the failure (or empty), and the counts of the trial by
     :data:`COUNTED`. Of equal rewards the sequence with the fewest changes of hand comes first, then
-    the sequence given first. ``outside`` as in :func:`count_trials`."""
+    the sequence given first. Trials are counted as made outside the session of a run if
+    ``outside``."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets, outside=outside)
@@ -707,7 +716,7 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
     """Return a sentence that a task, called ``task``, has more than 4096 hand sequences, too many
-    to try; None if it has not. ``goals`` and ``hands`` are numbers of goals and of hands."""
+    to try; None for fewer. ``goals`` and ``hands`` are numbers of goals and of hands."""
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
@@ -715,8 +724,8 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Return ``hands`` as a tuple, for None all hands of the task's robot. Raises ValueError for
-    hands that the robot does not have."""
+    """Return ``hands`` as a tuple, for None all hands of the task's robot. Raises ValueError for no
+    hand and for a hand that the robot does not have."""
     if hands is None:
         return task.hands
     chosen = tuple(hands) if isinstance(hands, Iterable) else ()
@@ -740,8 +749,9 @@ def search_initial_hands(
 
     A sequence that the task names is returned, with no counts, whatever ``hands``. If the task
     names a policy, it is the sequence of ``hands`` (by default the task's) with which the
-    corrective process alone gets the highest reward, among all sequences or those of one hand.
-    Raises NotApplicableError if no sequence completes the task, or there are more than 4096.
+    corrective process alone gets the highest reward, among all sequences or sequences of one hand.
+    Raises NotApplicableError if no sequence completes the task, or there are more than 4096, and
+    ValueError for ``hands`` that the robot does not have.
     """
     allowed = hands_among(task, hands)
     if not task.initial_is_policy:
@@ -757,9 +767,10 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """Search for the hand sequence of trial 0 by the policy of a task, given as JSON; arguments and
-    results are those of :func:`search_initial_hands`, whose caller counts the trials. The last 64
-    results are kept.
+    """Search for the hand sequence of trial 0 by the policy of a task, given as JSON, among
+    sequences of ``hands``; return it and the counts of the search, by counters of
+    :class:`~coartic.method.Meter`. The caller counts the trials. The last 64 results are kept.
+    Raises NotApplicableError if no sequence completes the task, or there are more than 4096.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)

@@ -79,7 +79,8 @@ def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]
 
 
 def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
-    """Fill the circles of goals that are hit and empty the others; ``hit`` has a bool for each."""
+    """Fill the circles of goals that are hit, and empty all other circles; ``hit`` has a bool for
+    each circle."""
     for circle, is_hit in zip(circles, np.asarray(hit), strict=True):
         circle.set(fill=bool(is_hit), facecolor=_HIT)
 

@@ -53,9 +53,10 @@ def write_film(
     ``movements`` are pairs of a title and a trajectory. Returns the number of frames that differ,
     and the ticks that are shown in a second.
 
-    ``width`` of the picture is in pixels. A movement that ends before the others stands still.
-    Without ``replace`` no file is written over. Raises CoarticError for movements without a tick,
-    and as :func:`check_film` does.
+    ``width`` of the picture is in pixels. A movement that ends before the longest one then stands
+    still. Without ``replace`` no file is written over. Raises CoarticError for movements without a
+    tick, for an ending other than .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be
+    written.
     """
     check_film(path, replace=replace)
     ticks = max(len(movement.configurations) for _, movement in movements)
@@ -90,8 +91,8 @@ def write_film(
 
 
 def check_film(path: Path, *, replace: bool = False) -> None:
-    """Raise CoarticError for a film whose ending is not in :data:`FILMS`, for MP4 without ffmpeg,
-    and as :func:`check_output` does. Nothing is written."""
+    """Raise CoarticError for a film that does not end in .gif or .mp4, for MP4 without ffmpeg, and
+    if the file cannot be written or is there without ``replace``. Nothing is written."""
     check_ending(path, FILMS)
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
@@ -99,8 +100,9 @@ def check_film(path: Path, *, replace: bool = False) -> None:
 
 
 def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
-    """Draw goals, robot, traces and the counter of ticks, and return a function that updates them
-    to a row of the movement's configurations, from 0; to the last one past the end."""
+    """Draw goals, robot, traces and the counter of ticks, and return a function that updates the
+    drawing to a row of the movement's configurations, from 0; a row past the end shows the last
+    configuration."""
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
     traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}
@@ -122,8 +124,9 @@ def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int],
 def set_stage(
     movements: Sequence[tuple[str, Trajectory]], width: int
 ) -> tuple[Figure, list[Callable[[int], None]]]:
-    """Return a figure ``width`` pixels wide with axes for each movement, all over the same region,
-    and for each movement a function that shows a row of its configurations, from 0."""
+    """Return a figure ``width`` pixels wide with axes for each of ``movements``, pairs of a title
+    and a trajectory, all over the same region, and for each movement a function that shows a row of
+    its configurations, from 0."""
     corners = np.array([box(movement.task, movement.configurations) for _, movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low

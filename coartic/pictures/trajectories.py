@@ -15,6 +15,7 @@ from coartic.errors import SolutionError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import check_limits
 from coartic.internal.text import short_repr
+from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import line_points, path_points
 from coartic.motion.solution import Execution, Movement, execute
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Every control tick of an execution that hit all goals (:func:`trajectory`)."""
 
@@ -42,6 +43,7 @@ class Trajectory:
     hits: NDArray[np.int64]
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""
+    __eq__ = equal_contents
 
     def __repr__(self) -> str:
         return short_repr(
@@ -75,7 +77,7 @@ class Trajectory:
 
     def subtask(self, goal: int) -> Array:
         """Return the rows of ``configurations`` from the hit of the goal before, or the start, to
-        the hit of a goal, both included.
+        the hit of a goal, both included, shape ``(rows, dof)``.
 
         ``goal`` is a number from 1. Raises ValueError if there is no such goal.
         """
@@ -109,7 +111,7 @@ class Trajectory:
 
     def plot(self) -> Figure:
         """Return a figure of the robot at the start (pale) and at each hit, with the path of the
-        hand that hits."""
+        hand that hits each goal."""
         from matplotlib.figure import Figure
 
         from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
@@ -164,8 +166,8 @@ def trajectory(
 ) -> Trajectory:
     """Execute a solution and keep every control tick.
 
-    The number of ticks and the configurations at the hits are those of :func:`coartic.execute`,
-    bit for bit.
+    The number of ticks and the configurations at the hits are the same as in
+    :func:`coartic.execute`, bit for bit.
 
     Parameters
     ----------
@@ -188,7 +190,7 @@ def trajectory(
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError
-        No movement can be made with the model.
+        A constant of the model is out of bounds.
     """
     task = as_task(task)
     execution = execute(task, movements, model=model)

@@ -42,10 +42,10 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
     """Return the figure as HTML for a page, which has the styles of ``play.css`` and defines the
     colours that these name.
 
-    ``presets`` are what it offers (:func:`preset_of`). ``more`` is for the scripts: the ``page`` to
-    which links lead, None for none; ``first``, what is chosen at first; ``folder`` with the stored
-    runs, as a shell reads it; ``cells`` of the table ``ranking`` that show films: row, column and
-    what to choose.
+    ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is for the
+    scripts: the ``page`` to which links lead, None for none; ``first``, the choice at first;
+    ``folder`` with the stored runs, quoted for a shell; ``cells`` of the table ``ranking`` that
+    show films, each with row, column and the choice that it makes.
     """
     content = {"presets": presets, "version": coartic.__version__, **more}
     data = json.dumps(content, allow_nan=False, separators=(",", ":"))
@@ -62,7 +62,8 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
 
 
 def preset_of(task: Task) -> dict[str, Any]:
-    """Return a task as the figure offers it: label, task, and proven optimum (reward) or None."""
+    """Return a task as the figure offers it: ``label``, ``task`` (its fields as plain data), and
+    ``optimum``, the reward of the best solution if it is proven to be the best, or None."""
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
@@ -73,8 +74,9 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """Return a preset of two tasks with one first goal; ``others``: the second task's other
-    goals."""
+    """Return a preset (:func:`preset_of`) for two tasks with the same first goal: ``task`` is
+    ``ascending``, ``others`` are the later goals of ``descending``, and ``optimum`` has no
+    value."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 

@@ -45,8 +45,9 @@ def version_of(code: str) -> str:
 
 
 def same_run(run_id: str) -> tuple[str, str]:
-    """Return the digits of a run's id, and the version for which its code stands: two runs with
-    these are one, whatever version of coartic stored them."""
+    """Return the hex digits at the beginning of a run's id, and the version for which the code at
+    its end stands (:func:`version_of`). Two runs for which both agree are the same run, whatever
+    version of coartic stored them."""
     digits, _, code = run_id.partition("-")
     return digits, version_of(code)
 
@@ -82,12 +83,14 @@ class MethodInfo:
 
     @property
     def version(self) -> str:
-        """The code, in the form in which codes are compared (:func:`version_of`)."""
+        """The code, in which ``1.1`` stands for the hashes of coartic 4.0.0: codes are compared in
+        this form."""
         return version_of(self.code)
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Place, id and, for a method file, code: the arguments of :func:`load_method`."""
+        """Module or method file, id and, for a method file, code, else an empty text: the arguments
+        of :func:`load_method`."""
         return self.where, self.name, "" if self.is_ours else self.code
 
     def load(self) -> type[Method]:
@@ -96,13 +99,13 @@ class MethodInfo:
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
-        """Import the method and return an instance with these parameters, and defaults for the
-        others. Raises ValueError for wrong parameters."""
+        """Import the method and return an instance with these parameters, and defaults for all
+        other parameters. Raises ValueError for wrong parameters."""
         method = self.load()
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all parameters, defaults included, as plain data, except those of
+        """Return all parameters by name, defaults included, as plain data, except parameters in
         :attr:`Method.later` that have their defaults. Raises CoarticError for a wrong parameter."""
         return dict(self._ask("complete", parameters))
 
@@ -122,20 +125,21 @@ class MethodInfo:
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
-        """Return the answer of the method, or of the process that has imported its file."""
+        """Return the answer of the method, or of the process that has imported its file, to a
+        question of :func:`answer`. Raises CoarticError for wrong parameters or no answer."""
         if self.where in READERS:
             return READERS[self.where](self.name, question, *arguments)
         return answer(self.load(), question, *arguments)
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Functions that ask a process about its method file, by :attr:`MethodInfo.where`; this process
-does not import method files."""
+"""Functions that ask the process which has imported a method file, by the path of the file; this
+process imports no method file."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
-    """Return, as plain data, what the method of :class:`MethodInfo` that ``question`` names returns
-    (``"complete"``, ``"why_not"`` or ``"rules"``).
+    """Return, as plain data, the result of the function of :class:`MethodInfo` that ``question``
+    names: ``"complete"`` (all parameters), ``"why_not"`` (a reason or None) or ``"rules"``.
 
     ``arguments`` are parameters (none for ``"rules"``), then for ``"why_not"`` the entries of an
     outline. Raises CoarticError for wrong parameters, and if the method fails to answer.
@@ -170,7 +174,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Return the info of a method; the other arguments are fields of :class:`MethodInfo`."""
+    """Return the info of a method from its class and three fields of :class:`MethodInfo`."""
     return MethodInfo(
         name=method.name,
         title=method.title,
@@ -209,8 +213,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 
 
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
-    """Return the methods that a module itself defines; with ``abstract`` its abstract ones, and
-    without all others."""
+    """Return the classes of methods that a module itself defines: concrete classes, or, with
+    ``abstract``, abstract classes, which lack a function."""
     return [
         value
         for value in vars(module).values()

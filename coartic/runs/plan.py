@@ -45,17 +45,17 @@ class Cell:
 
     @property
     def label(self) -> str:
-        """The method with its setting."""
+        """Id of the method and its setting, such as ``cma-es/bandit sigma=0.1``."""
         return label_of(self.method.name, self.setting)
 
     @cached_property
     def definition(self) -> dict[str, Any]:
-        """The task as plain data."""
+        """The task as plain data: its fields, such as ``goals`` and ``start``, by name."""
         return self.task.model_dump(mode="json")
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the cell without the version or code of its method.
+        """Hash, 64 hex digits, of the cell without the version or code of its method.
 
         A time limit is not a part of the cell: it can prevent a result, and cannot change one.
         """
@@ -78,12 +78,14 @@ class Job:
     seed: int
     """Seed of the suite."""
     numbers: Sequence[int]
-    """Numbers of the runs, from 0 within the cell; in a plan a range. A plan of runs 50 to 99 is a
-    part of the plan of runs 0 to 99, which a folder states."""
+    """Numbers of the runs, from 0 within the cell; in a plan a range. A job of runs 50 to 99 is a
+    part of the job of runs 0 to 99, which a results folder then stores in its plan."""
     time_limit_s: float | None = None
     """CPU time of all these runs together, s."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
+    suite_trials: int | None = None
+    """Trials of a run by the suite's file, whatever a command asks for; None if it names none."""
 
     def run_id(self, number: int, code: str | None = None) -> str:
         """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and
@@ -93,7 +95,8 @@ class Job:
         return f"{digits}-{self.cell.method.code if code is None else code}"
 
     def run_seed(self, number: int) -> int:
-        """Return the seed of the random numbers of a run (:func:`run_seed`)."""
+        """Return the seed of the random numbers of run ``number``, from the seed of the suite and
+        the task's name: the same for all methods."""
         return run_seed(self.seed, self.cell.task.name, number)
 
 

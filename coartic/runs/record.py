@@ -28,34 +28,46 @@ from coartic.tasks.task import Task
 Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
 """Status of a run."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
-"""Prefixes of columns by the part of a run that they score: the solution, the first trial of a
-learner, and one noiseless greedy trial after learning."""
+"""Prefixes of columns by the part of a run that the columns score: ``solution``, ``initial`` (the
+first trial of a learner) and ``replay`` (one noiseless greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
 LATE = "late_imports"
 """Entry of the details of a run: files of the user's that a run of its process first loaded, too
 late to count as the code of its method."""
+EARLIER = "earlier_runs"
+"""Entry of the details of a run that came out otherwise after another run: its task, in a list."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
+_MOST_NUMBERS = 400_000
+"""Most entries of the targets and waypoints of a solution, each of at most 25 characters."""
+LONGEST_SOLUTION = 25 * _MOST_NUMBERS
+"""Most characters of the stored paths of a solution."""
 MOST_STEPS = 1_000_000
 """Most movement steps of a solution through its targets in order; solutions of the paper's tasks
 have some thousands."""
 
 
 class Score(NamedTuple):
-    """The score of a part of a run (:data:`PARTS`), from its execution; None where blank."""
+    """Score of a part of a run (solution, initial or replay), from its execution; None where
+    blank."""
 
     reward: int | None = None
+    """Total reward, minus the ticks."""
     hands: str | None = None
     """Hand of each goal, such as ``LRLR``."""
     movements: tuple[Movement, ...] = ()
+    """Movements as executed, with their ticks."""
     corrections: int | None = None
     """Corrective movements that a solution needed."""
     other_arm_travel: float | None = None
     """Joint travel of the arm that a solution does not choose, rad."""
 
 
-def late_import(method: str, files: Sequence[str]) -> str:
-    """Return a sentence on files (:data:`LATE`) that runs of a method loaded too late."""
+def mark_of(method: str, kind: str, files: Sequence[str]) -> str:
+    """Return a sentence on a method some of whose runs have an entry ``kind`` in their details: on
+    ``files`` that were loaded too late (:data:`LATE`), or the tasks of these (:data:`EARLIER`)."""
+    if kind == EARLIER:
+        return f"{method}: results depend on earlier runs (seen on {', '.join(files)})"
     was = "was" if len(files) == 1 else "were"
     return (
         f"{method}: {', '.join(files)} {was} first loaded during a run, so that a change there is "
@@ -84,10 +96,11 @@ class Outcome:
     """The result of a run as its method states it, in plain data, before it is scored."""
 
     status: Status
+    """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
     reason: str = ""
     """The reason why the run is not ok; empty if the run is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
-    """Movements by part (:data:`PARTS`), still to be executed and scored."""
+    """Movements by part (``solution``, ``initial``, ``replay``), not yet executed and scored."""
     details: dict[str, Any] = field(default_factory=dict)
     """Further data that the method keeps, such as corrective movements by trial."""
     used: tuple[str, ...] = ()
@@ -98,8 +111,8 @@ class Outcome:
     """Reward of each trial; None if the trial failed or its reward is not kept."""
     times: Times = Times()
     environment: dict[str, Any] | None = None
-    """Versions, platform, processor, variables, arithmetic and commit, or those of them that are
-    not as in the process that scores the run."""
+    """Versions, platform, processor, variables, arithmetic and commit, by name, or only the entries
+    that differ from the environment of the process that scores the run."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +124,7 @@ class Run:
     outcome: Outcome
     """The outcome, without ``parts``: the scores have their movements."""
     scores: dict[str, Score]
-    """Scores by part (:data:`PARTS`); empty if the run is not ok."""
+    """Scores by part (``solution``, ``initial``, ``replay``); empty if the run is not ok."""
     date: str
     """Date and time at the end of the run, UTC."""
 
@@ -127,7 +140,7 @@ class Run:
 
     @cached_property
     def id(self) -> str:
-        """Id of the run (:meth:`Job.run_id`)."""
+        """Id of the run: 16 hex digits, a hyphen, and the version or code of the method."""
         return self.job.run_id(self.number)
 
     @property
@@ -142,17 +155,20 @@ class Run:
 
     @property
     def initial(self) -> Score:
-        """Score of a learner's first trial; blank if it or the run failed, or for other methods."""
+        """Score of a learner's first trial; blank if the trial or the run failed, or for other
+        methods."""
         return self.scores.get("initial", Score())
 
     @property
     def replay(self) -> Score:
-        """Score of the greedy trial after learning; blank as for :attr:`initial`."""
+        """Score of a learner's greedy trial after learning; blank if the trial or the run failed,
+        or for other methods."""
         return self.scores.get("replay", Score())
 
     @property
     def counts(self) -> Any:
-        """The meter; a meter of blanks if the worker died."""
+        """Counts of the run (:class:`~coartic.method.Meter`), without values (None) if the worker
+        died."""
         return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
 
     @property
@@ -169,7 +185,8 @@ class Run:
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials; None for other methods."""
+        """Corrective movements in the last tenth of a learner's trials; None for other methods and
+        failed runs."""
         return self._corrections(-1)
 
     def _corrections(self, place: int) -> int | None:
@@ -180,7 +197,7 @@ class Run:
 
     @property
     def is_downsampled(self) -> bool:
-        """True if rewards of some trials are not kept (:meth:`downsample`)."""
+        """True if rewards of some trials that did not fail are not kept: None in their place."""
         meter = self.outcome.meter
         return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
 
@@ -196,7 +213,7 @@ class Run:
 
     @cached_property
     def result(self) -> str:
-        """Hash of status, every joint of every movement, and rewards of all trials.
+        """Hash, 16 hex digits, of status, every joint of every movement, and rewards of all trials.
 
         Two runs with the same outcome have the same hash, whatever time and evaluations they took.
         """
@@ -205,12 +222,13 @@ class Run:
         return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
 
     def movement_data(self, part: str) -> list[list[Any]]:
-        """Return the movements of a part (:data:`PARTS`), each as a list of goal, hand, kind, ticks
-        and path (:func:`movement_data`); an empty list if the run lacks the part."""
+        """Return the movements of a part (``solution``, ``initial`` or ``replay``), each as a list
+        of goal, hand, kind, ticks and path; an empty list if the run lacks the part."""
         return [movement_data(each) for each in self.scores.get(part, Score()).movements]
 
     def to_row(self) -> dict[str, Any]:
-        """Return the columns of the run in table ``results``, without the ids of other rows."""
+        """Return the columns of the run in table ``results`` by name, without ``cell`` and
+        ``environment``, the ids of rows of other tables."""
         row = {name: attrgetter(source)(self) for name, _, source, _ in COLUMNS if source}
         details = json.dumps(self.outcome.details)
         used = ", ".join(self.outcome.used)
@@ -295,9 +313,9 @@ def movement_data(movement: Movement) -> list[Any]:
     """Return a movement as a list of goal, hand, kind, ticks and path: the form in which workers
     send, hashes count and folders store movements.
 
-    The path is JSON: the target, or the waypoints of a movement of kind ``path``; ticks or a target
-    that are missing are None. Adding 0.0 drops the sign of -0.0. Raises TypeError, ValueError or
-    AttributeError for a movement that has no such form.
+    The path is JSON: the target, or the waypoints of a movement of kind ``path``; None stands for
+    missing ticks and a missing target. Adding 0.0 drops the sign of -0.0. Raises TypeError,
+    ValueError or AttributeError for a movement that has no such form.
     """
     m, place = movement, movement.target
     if m.waypoints is not None:
@@ -322,9 +340,9 @@ def movement_from(data: Sequence[Any]) -> Movement:
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     """Return the rewards of trials as bytes, four a number; the caller packs them.
 
-    The numbers are the best reward, signed (0 if all are None), then for each trial by how much it
-    is worse, plus 1; 0 stands for None. All lowest bytes of the numbers come first, then all next
-    bytes: so they pack best.
+    The first number is the best reward, signed (0 without any reward). Then each trial has the
+    number of ticks by which it is worse, plus 1, or 0 if its reward is None. All lowest bytes of
+    the numbers come first, then all next bytes: so they pack best.
     """
     values = np.array(rewards, np.float64)  # None becomes NaN
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)
@@ -335,8 +353,8 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
     """Execute solutions of a task side by side under the paper's model; scores come from here.
 
-    Returns for each solution its execution, or the error of a solution that breaks the rules of
-    the task or is too long (:func:`too_long`).
+    Returns for each solution, in order, its execution, or, as an object, the error of a solution
+    that breaks the rules of the task, or has more than 10,000 movements or 1,000,000 steps.
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
@@ -345,7 +363,7 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution with more than 10,000 movements or more than
+    """Return the error of a solution with more than 10,000 movements, 400,000 numbers or
     :data:`MOST_STEPS` steps; None for any other solution."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
@@ -353,6 +371,8 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
+    if (count := sum(map(np.size, corners))) > _MOST_NUMBERS:
+        return SolutionError(f"its paths have {count} numbers; at most {_MOST_NUMBERS} are allowed")
     if (
         len({np.shape(corner) for corner in corners}) == 1
     ):  # otherwise the solution breaks the rules

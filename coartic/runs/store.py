@@ -25,11 +25,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
-from coartic.internal.limits import MOST_TRIALS
+from coartic.internal.limits import (
+    MOST_RUNS,
+    MOST_SECONDS,
+    MOST_SEED,
+    MOST_TRIALS,
+    check_limits,
+)
 from coartic.internal.text import one_line, plain
 from coartic.internal.validation import explain_inline
 from coartic.method import Meter
@@ -40,13 +46,16 @@ from coartic.runs.method_info import version_of
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
+    EARLIER,
     LATE,
+    LONGEST_SOLUTION,
     PREFIXES,
     Outcome,
     Run,
     Score,
     Status,
     Times,
+    mark_of,
     movement_data,
     movement_from,
     reward_bytes,
@@ -74,7 +83,8 @@ _OF_METHOD = ("title", "citation", "stochastic", "defaults", "origin", "code")
 
 
 def _rule(name: str, kind: str) -> str:
-    """Return the condition that SQLite checks for a column of table ``results``."""
+    """Return the condition, in SQL, that SQLite checks for a column of table ``results``, from its
+    name and its type, such as ``TEXT NOT NULL``."""
     if kind.startswith("TEXT"):
         letters = f" AND {name} NOT GLOB '*[^LR]*'" if name.endswith("hands") else ""
         return f"typeof({name}) != 'blob'{letters}"
@@ -133,9 +143,27 @@ _PLANNED = (
 )
 """Queries of all that a plan says; ``plan_hash`` is a hash of their rows."""
 
+LONGEST_VALUE = 50_000_000  # bytes of a value in the file
+LONGEST_TASK = 100_000  # characters of the definition of a task
 _LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
 WAIT_S = 1.0  # wait for another program
 _LONGEST_PATH = 500  # letters of the path of a file; SQLite adds those of its journal
+
+
+class _Commit(BaseModel):
+    id: str
+    dirty: bool
+
+
+class _Surroundings(BaseModel):
+    """Facts on the last ``coartic run`` that reports and citations state."""
+
+    coartic: str
+    commit: _Commit | None
+    processor: str
+    cores: int
+    command: list[str]
+    date: str
 
 
 class Store:
@@ -156,11 +184,13 @@ class Store:
 
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
         """Put a plan in place of the earlier plan. Runs that only the earlier plan asked for stay
-        in the file, and no view shows them. ``made_with`` is as of :meth:`made_with`.
+        in the file, and no view shows them. ``made_with`` has versions, platform, commit,
+        ``command`` and ``date`` of this command, by name.
 
         Raises CoarticError if the folder holds another suite.
         """
-        first, environment = plan[0], dict(made_with)
+        first = plan[0]
+        environment = dict(made_with) | {"suite_trials": first.suite_trials}
         suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
         suite |= {name: environment.pop(name) for name in ("command", "date")}
         with self.transaction():
@@ -190,16 +220,20 @@ class Store:
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
                 raise ValueError("the plan is not as it was written")
-            return [
-                Job(
-                    self._read_cell(row),
-                    suite["seed"],
-                    range(row["runs"]),
-                    suite["time_limit_s"],
-                    suite["name"],
-                )
-                for row in self._db.execute(_PLANNED[1])
-            ]
+            check_limits("the seed", suite["seed"], 0, MOST_SEED)
+            if suite["time_limit_s"] is not None:
+                check_limits("the time limit", suite["time_limit_s"], 0.0, MOST_SECONDS)
+            trials = json.loads(suite["content"]).get("suite_trials")
+            if trials is not None:
+                check_limits("the suite's number of trials", trials, 1, MOST_TRIALS)
+            name, limit_s, plan = suite["name"], suite["time_limit_s"], list[Job]()
+            for row in self._db.execute(_PLANNED[1]):
+                check_limits("the number of runs", row["runs"], 1, MOST_RUNS)
+                cell, numbers = self._read_cell(row), range(row["runs"])
+                plan.append(Job(cell, suite["seed"], numbers, limit_s, name, trials))
+            if not plan:
+                raise ValueError("the plan is empty")
+            return plan
 
     def made_with(self) -> dict[str, Any]:
         """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``,
@@ -207,7 +241,9 @@ class Store:
         with explain_errors(self.folder):
             row = self._suite()
             how = {"command": json.loads(row["command"]), "date": row["date"]}
-            return dict(json.loads(row["content"]) | how)
+            content = dict(json.loads(row["content"])) | how
+            _Surroundings.model_validate(content, strict=True)
+            return content
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -248,19 +284,21 @@ class Store:
             {(name, version_of(old), version_of(now)): n for name, old, now, n in self._rows(query)}
         )
 
-    def late_imports(self) -> dict[str, list[str]]:
-        """Return, by method, the files that runs of the plan first loaded while they ran
-        (``late_imports`` of their details)."""
-        query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{LATE}')
-            WHERE json_type(details, '$.{LATE}') = 'array' ORDER BY method, value"""
+    def marks(self) -> dict[str, list[str]]:
+        """Return, by method, sentences on what details of runs of the plan say against them
+        (:func:`.mark_of`)."""
         found = defaultdict[str, list[str]](list)
-        for method, name in self._rows(query):
-            found[method].append(str(name))
+        for kind in (LATE, EARLIER):
+            query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{kind}')
+                WHERE json_type(details, '$.{kind}') = 'array' ORDER BY method, value"""
+            for method, rows in groupby(self._rows(query), itemgetter(0)):
+                found[method].append(mark_of(method, kind, [str(value) for _, value in rows]))
         return dict(found)
 
     def others(self) -> Counter[int]:
-        """Return the number of runs, stale runs too, that the plan does not ask for, by the seed of
-        their suite."""
+        """Return the number of runs in the folder that the plan does not ask for, by the seed of
+        their suite; runs of another version or code of their method (:meth:`stale`) are among
+        them."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
         return Counter(dict(self._rows(query)))
@@ -298,6 +336,7 @@ class Store:
             blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
             rewards = _unpack(blob[0], row["trials"]) if blob else np.empty(0)
             meter = {name: row[name] for name in vars(Meter())}
+            self._check_lengths("WHERE result_id = ?", row["id"])
             parts: dict[str, list[Movement]] = {part: [] for part in PREFIXES}
             query = """SELECT part, goal, hand, kind, ticks, path FROM movements
                 WHERE result_id = ? ORDER BY "order\""""
@@ -306,12 +345,12 @@ class Store:
             outcome = Outcome(
                 row["status"],
                 row["reason"],
-                details=json.loads(row["details"]),
+                details=dict(json.loads(row["details"])),
                 used=tuple(filter(None, row["used"].split(", "))),
                 meter=None if row["trials"] is None else Meter(**meter),
                 rewards=[None if np.isnan(reward) else int(reward) for reward in rewards.tolist()],
                 times=Times(**{name: row[name] for name in vars(Times())}),
-                environment=json.loads(environment["content"]),
+                environment=dict(json.loads(environment["content"])),
             )
             scores = {
                 part: Score(row[f"{prefix}reward"], row[f"{prefix}hands"], tuple(parts[part]))
@@ -335,16 +374,18 @@ class Store:
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions``, a row for each movement, as a data frame (nullable types)."""
+        self._check_lengths()
         return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of a part (:data:`PREFIXES`) by run id, of the first ``most`` ok
-        runs of each cell of the plan; runs without the part are left out."""
+        """Return the movements of a part (``solution``, ``initial`` or ``replay``) by run id, of
+        the first ``most`` ok runs of each cell of the plan; runs without the part are left out."""
         query = """SELECT run_id, goal, hand, kind, ticks, path FROM
             (SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
             FROM asked WHERE status = 'ok') AS solved
             JOIN movements ON result_id = solved.id AND part = ? WHERE place <= ?
             ORDER BY position, run, "order\""""
+        self._check_lengths()
         with explain_errors(self.folder):
             rows = self._execute(query, (part, most))
             return {
@@ -364,8 +405,8 @@ class Store:
     # Rows.
 
     def _suite(self) -> Any:
-        """Return the row of the last suite, with its environment. Raises CoarticError if there is
-        none."""
+        """Return the row of the last suite, with its environment. Raises CoarticError if no suite
+        is stored."""
         row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
         if row is None:
             raise CoarticError("it is not finished; repeat the `coartic run` command")
@@ -396,13 +437,15 @@ class Store:
             self._insert("learning", {"result_id": result, "rewards": blob})
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
-        """Return a cell from its row. Raises ValueError or TaskError if coartic cannot have written
-        the row."""
+        """Return a cell from its row of table ``cells``; its method has no ``where``. Raises
+        ValueError or TaskError if coartic cannot have written the row."""
         method = {name: row[name] for name in _OF_METHOD} | {
             "name": row["method"],
             "defaults": json.loads(row["defaults"]),
             "information": tuple(filter(None, row["information"].split(", "))),
         }
+        if len(row["definition"]) > LONGEST_TASK:
+            raise ValueError(f"the task of {len(row['definition'])} characters is too long")
         content = {
             "task": parse_task(json.loads(row["definition"]), str(self.folder / RUNS_FILE)),
             "method": method,
@@ -410,12 +453,23 @@ class Store:
             "trial_budget": row["trial_budget"],
         }
         cell: Cell = _CELL.validate_python(content)
-        if (cell.digest, cell.setting) != (row["digest"], row["setting"]):
+        named = cell.digest, cell.setting, cell.task.name
+        if named != (row["digest"], row["setting"], row["task"]):
             raise ValueError(f"{cell.label} on {cell.task.name} is not the cell that was run")
         return cell
 
+    def _check_lengths(self, condition: str = "", *values: object) -> None:
+        """Raise CoarticError, before it is read, for a solution that is longer than runs keep, of
+        all runs or of those that satisfy an SQL ``condition``."""
+        query = f"""SELECT max(length) FROM (SELECT sum(length(path)) AS length FROM movements
+            {condition} GROUP BY result_id, part)"""
+        with explain_errors(self.folder):
+            if ((self._one(query, *values)[0]) or 0) > LONGEST_SOLUTION:
+                raise ValueError("a solution is too long")
+
     def _plan_hash(self) -> str:
-        """Return the hash of the last suite: settings, command, date, environment, cells."""
+        """Return the hash, 64 hex digits, of the last suite: settings, command, date, environment,
+        cells."""
         return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:
@@ -431,7 +485,8 @@ class Store:
 
     def _cell(self, cell: Cell) -> tuple[int, str]:
         """Return the id and the code of the row of a cell; insert the row if it is missing. A row
-        that 4.0.0 wrote keeps its code, and is that of the version for which the code stands."""
+        that 4.0.0 wrote keeps its code, a hash, and counts as a row of the version for which this
+        code stands."""
         for number, code in self._rows("SELECT id, code FROM cells WHERE digest = ?", cell.digest):
             if version_of(code) == cell.method.version:
                 return number, code
@@ -457,12 +512,13 @@ class Store:
         return self._db.execute(f"WITH asked AS ({_ASKED}) {query}", values)
 
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return the rows of a query (:meth:`_execute`)."""
+        """Return a list of the rows of a query, in which ``asked`` is the runs of the plan. Raises
+        CoarticError if the file cannot be read."""
         with explain_errors(self.folder):
             return self._execute(query, values).fetchall()
 
     def _one(self, query: str, *values: object) -> Any:
-        """Return the first row of a query, or None."""
+        """Return the first row of a query; None if it has no row."""
         return next(iter(self._rows(query, *values)), None)
 
     def _frame(self, query: str) -> pd.DataFrame:
@@ -493,7 +549,7 @@ class Store:
 
 
 def _as_text(value: Any) -> Any:
-    """Return a list or a table as JSON, and any other value as it is."""
+    """Return a list, a tuple or a dictionary as JSON, and any other value unchanged."""
     is_table = isinstance(value, dict | list | tuple)
     return json.dumps(value, ensure_ascii=False) if is_table else value
 
@@ -540,7 +596,7 @@ def open_store(folder: Path) -> Iterator[Store]:
             connection.execute("BEGIN")  # all reads of this block see one state
             if not _has_tables(connection):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
-            with _lock(folder, shared=True):  # refused while a process writes
+            with lock(folder, shared=True):  # refused while a process writes
                 pass
         yield Store(folder, connection)
 
@@ -567,7 +623,7 @@ def writing(folder: Path) -> Iterator[Store]:
                 f"{folder} is not empty and holds no results of coartic. Choose another folder."
             )
         make_folder(folder)
-    with _lock(folder):
+    with lock(folder):
         with explain_errors(folder):
             _check_files(folder)
             opened = _connect((folder / RUNS_FILE).absolute().as_uri(), WAIT_S)
@@ -585,9 +641,9 @@ def writing(folder: Path) -> Iterator[Store]:
 
 
 @contextmanager
-def _lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Lock a folder for this process, or share the lock with other readers. Systems and disks
-    without such locks are left as they are.
+def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
+    """Lock a folder for this process, which performs a ``command``, or share the lock with other
+    readers. Systems and disks without such locks are left as they are.
 
     Raises CoarticError while another process holds the lock.
     """
@@ -607,7 +663,7 @@ def _lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
             except BlockingIOError:
                 if time.monotonic() > end:
                     raise CoarticError(
-                        f"another `coartic run` is at work in {folder}; wait for it, or choose "
+                        f"another `{command}` is at work in {folder}; wait for it, or choose "
                         "another folder"
                     ) from None
                 time.sleep(WAIT_S / 20)
@@ -624,6 +680,7 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")
     connection.execute("PRAGMA cell_size_check = ON")
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
     return connection
 
 
@@ -645,9 +702,9 @@ def _check_files(folder: Path) -> None:
 def _has_tables(connection: sqlite3.Connection) -> bool:
     """Return True if the file has the tables of coartic, and False if the file is empty.
 
-    What other programs add to the file (statistics, indexes, tables, views) is let be, except
-    triggers, which change what is written. Raises CoarticError for any other file, and ValueError
-    for a row that names a missing row: nothing would show its run.
+    Additions of other programs (statistics, indexes, tables, views) pass, except triggers, which
+    change data as they are written. Raises CoarticError for any other file, and ValueError for a
+    row that names a missing row: no view would show its run.
     """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -685,8 +742,8 @@ _UNREADABLE = (
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Turn an error of this block into a CoarticError, be it an error of the system, of SQLite or
-    of the content of the file."""
+    """Turn an error of the block of this context (of the system, of SQLite or of the content of
+    ``runs.sqlite`` in ``folder``) into a CoarticError that names the file."""
     try:
         yield
     except (CoarticError, *_UNREADABLE) as error:
@@ -707,12 +764,16 @@ _SENTENCES = {
     "back, or repeat the command to start again",
     "SQLITE_CORRUPT": _DAMAGED,
     "SQLITE_NOTADB": _DAMAGED,
+    "SQLITE_TOOBIG": f"a value has more than {LONGEST_VALUE} bytes, which coartic does not write",
+    "SQLITE_IOERR": "the system cannot read or write it, as where a disk, a quota or the limit of "
+    "file size (`ulimit -f`) is full: make room, and repeat the command",
+    "SQLITE_FULL": "the disk is full: make room, and repeat the command",
 }
 """Sentences by SQLite's names of errors, or by the first two words of the names."""
 
 
 def _explain(path: Path, error: Exception) -> str:
-    """Return a sentence on a file that cannot be used."""
+    """Return a sentence that the file ``path`` cannot be used, and why, from the error raised."""
     said = plain(str(error), 200) or type(error).__name__
     if isinstance(error, CoarticError):
         said = one_line(str(error))
@@ -747,9 +808,9 @@ def _why_not_opened(path: Path) -> str:
 
 
 def _unpack(blob: bytes, trials: int | None) -> Array:
-    """Return the rewards of the trials of a run from table ``learning``, which holds them packed
-    (:func:`reward_bytes`), shape ``(trials,)``; NaN stands for a trial that failed or whose reward
-    is not kept.
+    """Return the rewards of the trials of a run from table ``learning``, whose ``blob`` holds them
+    packed (:func:`reward_bytes`), shape ``(trials,)``; NaN stands for a trial that failed or whose
+    reward is not kept.
 
     Raises ValueError for damaged rewards, and for more rewards than trials.
     """

@@ -7,7 +7,7 @@ from pathlib import Path
 from coartic.errors import TaskError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import foreign_file, unknown
-from coartic.tasks.families import instance
+from coartic.tasks.families import instance, is_family, shipped_families
 from coartic.tasks.task import Task, read_task, shipped_tasks
 
 TaskLike = Task | str | Path
@@ -32,8 +32,8 @@ def load_task(name_or_path: str | Path) -> Task:
     ----------
     name_or_path : str or pathlib.Path
         The name of a task that comes with the package (``"ascending"``) or of an instance of a
-        family (``"two-armed/v1/i017"``), or the path of a task file. A text that ends in ``.toml``
-        is a path.
+        family (``"two-armed/v1/i017"``, ``"mine.v1.toml/i017"`` of the family of a file), or the
+        path of a task file. A text that ends in ``.toml`` is a path.
 
     Returns
     -------
@@ -55,8 +55,13 @@ def load_task(name_or_path: str | Path) -> Task:
     if words := foreign_file(str(name_or_path)):
         raise TaskError(words)
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
+        if is_family(str(name_or_path)):
+            raise TaskError(
+                f"{name_or_path} is a family: name an instance, such as {name_or_path}/i000"
+            )
         task = read_task(Path(name_or_path))
-        if "/" in task.name and task != instance(task.name):
+        is_own = task.family not in (None, *shipped_families())
+        if "/" in task.name and not is_own and task != instance(task.name):
             raise TaskError(
                 f"{name_or_path}: the task is called {task.name!r}, but it is not the instance of "
                 "that name. Give it another name, or write the instance anew: "

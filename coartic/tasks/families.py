@@ -21,6 +21,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -172,7 +173,8 @@ class Family(FileData):
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
     """Starting postures; each instance has one: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
-    """Policy that finds the hands of trial 0; the instance names the hands."""
+    """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``; an
+    instance names the hands that the policy found for it."""
     apart: Thousandths = 300
     """Least distance between the centres of two goals, length unit."""
     clear: Thousandths = 200
@@ -187,7 +189,7 @@ class Family(FileData):
 def draft(family: Family, address: Address, attempt: int) -> Task:
     """Return the task drawn for the instance at ``address`` in attempt ``attempt`` (from 0); equal
     arguments give equal tasks. No rule of the family is checked (:func:`broken_rule`): goals may be
-    out of reach. ``initial_hands`` is the name of the family's policy, not yet a hand sequence.
+    out of reach. ``initial_hands`` of the task is a policy, not yet a hand sequence.
     """
     key = hash_key(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)
@@ -289,8 +291,8 @@ def first_good(
     family: Family, address: Address, most: int = MOST_ATTEMPTS
 ) -> tuple[Task, tuple[str, ...]]:
     """Return the first draft (task drawn for the instance at ``address``) that breaks no rule, and
-    the name of the rule (:func:`broken_rule`) that each earlier draft broke, in order. Raises
-    TaskError if each of the first ``most`` drafts breaks a rule.
+    for each earlier draft, in order, the name of the rule that it broke, such as ``"overlap"``
+    (:func:`broken_rule`). Raises TaskError if each of the first ``most`` drafts breaks a rule.
     """
     rejected: list[str] = []
     while len(rejected) < most:
@@ -331,15 +333,22 @@ def instance_of(family: Family, address: Address) -> Task:
 
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """Return an instance of a shipped family, a task, by its name, such as ``two-armed/v1/i017``;
-    the last 4096 are kept. Raises TaskError for any other name."""
-    address = address_of(name)
+    """Return an instance of a family, a task, by its name, such as ``two-armed/v1/i017``, or
+    ``mine.v1.toml/i017`` of the family of a file; the last 4096 are kept. Raises TaskError for any
+    other name."""
+    place, _, short = name.rpartition("/")
+    address = address_of(f"{load_family(place).name}/{short}" if is_file(place) else name)
     if address is None:
         raise TaskError(
             f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
             "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
         )
-    return instance_of(load_family(address.family), address)
+    return instance_of(load_family(place), address)
+
+
+def is_file(family: str) -> bool:
+    """Return whether a family is named by its file, whose name ends in ``.toml``."""
+    return family.endswith(".toml")
 
 
 def named_by(text: str) -> list[str]:
@@ -348,10 +357,12 @@ def named_by(text: str) -> list[str]:
     unchecked. Raises TaskError for a range that is malformed, goes backwards or has more than
     10,000 instances.
     """
-    if "/" not in text or ".." not in text or text.endswith(".toml"):
+    if "/" not in text or ".." not in text.rpartition("/")[2] or text.endswith(".toml"):
         return [text]
     written = _RANGE.fullmatch(text)
-    ends = [address_of(written[1] + end) for end in written.groups()[1:]] if written else [None]
+    start = written[1] if written else ""
+    known = f"{load_family(start[:-1]).name}/" if is_file(start[:-1]) else start
+    ends = [address_of(known + end) for end in written.groups()[1:]] if written else [None]
     first, last = ends[0], ends[-1]
     if first is None or last is None or first.stream != last.stream:
         raise TaskError(
@@ -363,7 +374,7 @@ def named_by(text: str) -> list[str]:
     if last.number - first.number >= MOST_CELLS:
         raise TaskError(f"{text!r} names more than {MOST_CELLS:,} instances")
     numbers = range(first.number, last.number + 1)
-    return [str(first._replace(number=number)) for number in numbers]
+    return [str(first._replace(family=start[:-1], number=number)) for number in numbers]
 
 
 def shipped_families() -> dict[str, Family]:
@@ -386,12 +397,24 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 
 def load_family(name: str) -> Family:
-    """Return a shipped family by its name with version, such as ``two-armed/v1``. Raises TaskError
-    for an unknown name."""
+    """Return a shipped family by its name with version, such as ``two-armed/v1``, or a family of
+    your own by the path of its file. Raises TaskError for an unknown name."""
+    if is_file(name):
+        return read_family(Path(name))
     shipped = shipped_families()
     if name not in shipped:
         raise TaskError(unknown("family", name, shipped))
     return shipped[name]
+
+
+def is_family(name: str) -> bool:
+    """Return whether a text is the name of a shipped family, or of a file that holds a family. A
+    file that cannot be read holds none."""
+    with suppress(TaskError):
+        return name in shipped_families() or (
+            is_file(name) and "region" in read_toml(name, error=TaskError)
+        )
+    return False
 
 
 @cache
@@ -419,7 +442,8 @@ def instance_names(
     family: str, split: Split, count: int | None = None, year: int | None = None
 ) -> list[str]:
     """List the names of instances 0 to ``count`` - 1 of a split (``"development"``, ``"test"``,
-    ``"fresh"``) of a shipped family; by default ``count`` is 1000 for development, else 10.
+    ``"fresh"``) of a family, by its name or its file; by default ``count`` is 1000 for development,
+    else 10.
 
     Raises ValueError for another split, for a count that is not from 1 to 10,000, for fresh
     instances without a year and for others with one; TaskError for an unknown family.

@@ -34,6 +34,7 @@ class KnownOptimum:
     """The best reward known of a task, with all joints free and under the paper's model."""
 
     reward: int
+    """Total reward, minus the ticks."""
     bound: int | None
     """Reward that no solution exceeds; None where nothing is proven."""
     hands: str = ""
@@ -81,11 +82,12 @@ def entries() -> list[dict[str, Any]]:
     """Read ``optima.json``; return a new list with a dictionary for each task of the paper and each
     restriction (base and other arm).
 
-    Keys: ``task``, ``essence`` (:func:`essence`), ``base`` (coordinates that are locked; ``task``:
-    as the task locks them), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``;
-    then ``reward``, ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (reward
-    that each search found) and ``solution`` (goal, hand, kind, target and waypoints of each
-    movement); or ``infeasible``, the reason why no search has a solution.
+    Keys: ``task``, ``essence`` (:func:`essence`), ``base`` (coordinates that are locked: ``y``,
+    ``xy``, or ``task``, as the task locks them), ``other_arm`` (the idle arm: ``free`` or
+    ``still``), ``run_ids`` and ``made_by``; then ``reward``, ``hands``, ``bound`` (reward that no
+    solution exceeds), ``searches`` (reward that each search found), ``solution`` (goal, hand, kind,
+    target and waypoints of each movement) and, in one entry, ``nodes`` (number of nodes of the
+    search that proved the bound); or ``infeasible``, the reason why no search has a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
     return content["optima"]

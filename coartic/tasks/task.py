@@ -79,6 +79,7 @@ class Address(NamedTuple):
     """``d`` (development), ``i`` (test) or a year as ``2027-`` (fresh); in the name the number of
     the instance follows it."""
     number: int
+    """Number of the instance, from 0."""
 
     @property
     def split(self) -> Split:
@@ -156,7 +157,8 @@ class Task(FileData):
     robot: Robot = Robot()
     """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
-    """Source and status of the figures, by key. The task's author chose those that are not here."""
+    """Source and status of the figures, by key. The task's author chose figures without an
+    entry."""
 
     @cached_property
     def q0(self) -> Array:
@@ -173,8 +175,8 @@ class Task(FileData):
         return goals
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
-        """Return a copy with the fields in ``update`` changed, which are not checked; its arrays
-        ``q0`` and ``goal_array`` are those of the changed fields."""
+        """Return a copy with the fields in ``update`` changed, which are not checked; the copy's
+        arrays ``q0`` and ``goal_array`` follow from the changed fields."""
         copied = super().model_copy(update=update, deep=deep)
         for name in ("q0", "goal_array"):
             copied.__dict__.pop(name, None)
@@ -192,7 +194,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family, with its version, if the task's name is that of an instance; else
+        """Name of the family, with its version, if the task's name is the name of an instance; else
         None."""
         address = address_of(self.name)
         return address and address.family
@@ -206,13 +208,16 @@ class Task(FileData):
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
-        """Keys in ``provenance`` whose figures were inferred from the paper, not published."""
+        """Keys in ``provenance``, such as ``"goals"``, whose figures were inferred from the paper,
+        not published."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="before")
     @classmethod
     def _with_start(cls, content: Any) -> Any:
-        """Read ``q0`` as the start, or let both arms point along +x without a start."""
+        """Return the content of a task with ``q0``, if given, as ``start``, or, without either,
+        with both arms along +x. Raises a validation error for both, for another shape of ``q0``,
+        and for a ``penalty``."""
         if not isinstance(content, dict):
             return content
         if "penalty" in content:
@@ -286,7 +291,8 @@ class Task(FileData):
     @checked_arguments
     def save(self, path: str | Path, *, replace: bool = False) -> None:
         """Write the task as a file ``.toml``, which :func:`load_task` reads. With ``replace`` a
-        file that is there is written over. Raises CoarticError if the file cannot be written."""
+        file of that name is written over. Raises CoarticError if the file cannot be written, or is
+        there without ``replace``."""
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
             raise CoarticError(f"cannot write {file}: the name of a task's file ends in .toml")
@@ -384,8 +390,9 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
 
 
 def check_task(task: Task) -> Task:
-    """Return the task itself. Raises TaskError if a goal is out of reach: no hand, or not its
-    initial hand, can come as near as the paper's corrective process has to."""
+    """Return the task itself. Raises TaskError if a goal is out of reach: no hand of the task, or
+    not the hand that ``initial_hands`` gives the goal, can come as near to its centre as a tenth of
+    the radius, where the paper's corrective process ends."""
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
@@ -414,7 +421,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     content : dict
         The content, as ``tomllib`` reads it from a TOML file.
     source : str
-        What errors name it, such as the path of the file.
+        Name of the content in errors, such as the path of the file.
     reach : bool
         Whether to refuse goals that are out of reach.
 
@@ -435,7 +442,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 
 
 def _all_keys() -> list[str]:
-    """Return all keys that a task file may have, in any of its tables."""
+    """Return the names of all keys that a task file may have, in any of its tables."""
     robot = [field.name for field in fields(Robot)]
     others = (*Start.model_fields, *robot, *Provenance.model_fields)
     return [*Task.model_fields, *others]

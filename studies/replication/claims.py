@@ -30,14 +30,14 @@ BEYOND = postures.BEYOND | hands.BEYOND | families.BEYOND
 """Rules that say whether learners show more than random search, for claims that need it."""
 COLUMNS = [
     *("statement", "replicates", "evidence", "test", "p_holm", "opposite_p_holm"),
-    *("more_than_selection", "evidence_beyond", "test_beyond", "p_beyond", "opposite_p_beyond"),
+    *("more_than_one_selection", "evidence_beyond", "test_beyond", "p_beyond", "opposite_p_beyond"),
     *("sets", "place", "quote", "suite", "run_ids"),
 ]
 
 
 def judge_claims(study, names):
-    """Judge claims by a folder: whether each *replicates*, and is *more than selection* (empty for
-    claims that need no comparison with random search).
+    """Judge claims by a folder: whether each *replicates*, and is *more than one selection* among
+    as many trials (empty for claims that need no comparison with random search).
 
     P-values are corrected over the claims of a group among ``names``. ``sets``: the number of sets
     of goals that support and refute the claim; ``suite``: empty for a claim for which the folder
@@ -49,7 +49,7 @@ def judge_claims(study, names):
     beyond, read_beyond = judge_rules(study, compared, BEYOND, claims.test_beyond)
     few = SETS.claim[2 * SETS.supported <= SETS.members]  # support it, on some task
     goals = judged.index.isin(few) & (judged.verdict == "supported")
-    renamed = {"verdict": "more_than_selection", "evidence": "evidence_beyond",
+    renamed = {"verdict": "more_than_one_selection", "evidence": "evidence_beyond",
                "test": "test_beyond", "p_holm": "p_beyond",
                "opposite_p_holm": "opposite_p_beyond"}  # fmt: skip
     judged = judged.join(beyond.reindex(columns=[*renamed]).rename(columns=renamed))

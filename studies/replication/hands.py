@@ -11,9 +11,8 @@ from comparisons import written
 from published import published_cell
 from reader import EC2, EC3, EC4, MARGINS, TASK_1, TASK_2, MissingError
 
-from coartic.analysis import all_of, number
+from coartic.analysis import all_of
 from coartic.analysis.judging import Finding
-from coartic.analysis.signatures.measures import ticks_slower
 from coartic.analysis.statistics.hypotheses import share_test
 from coartic.estimates import Estimate, difference_of_means
 
@@ -22,33 +21,29 @@ RANDOM_HANDS = "random-search/hands"
 """Random search with every hand sequence: EC3 without its memory."""
 
 
-def slower_hands_are_chosen(read):
-    """Test that more than a quarter of the runs choose a hand that is slower for its goal alone."""
+def hands_change(read):
+    """Test that more than a quarter of the runs hit a goal that others follow with another hand
+    than the initial solution."""
     tests, against, parts = [], [], []
     for label in (EC2, EC3):
-        cell = read.cell(TASK_1, label)
-        slower = chosen_slower(cell, read.initial_execution(TASK_1).hands)
-        does = slower > 0
+        does = changed_hands(read, label)
         count, total = int(does.sum()), len(does)
         for which, side in ((tests, "greater"), (against, "less")):
             which.append(share_test(count, total, MARGINS.few, side))
         parts.append(f"{read.title(TASK_1)} {read.who(label)}: {count} of {total} runs")
-        if count:
-            parts[-1] += f", slower for these goals by {number(slower[does].mean(), 0)} ticks"
         if 0 < count < total:
-            rewards = np.array([run.reward for run in cell.runs], dtype=float)
+            rewards = read.reward(TASK_1, label).numbers
             better = written(difference_of_means(rewards[does], rewards[~does]), 1)
             parts[-1] += f", which end with {better} ticks more reward than the others"
     return under_one_condition(tests, against, parts)
 
 
-def more_slower_hands_than_random_search(read):
-    """Test that more runs choose a slower hand than in random search with every hand sequence."""
-    initial = read.initial_execution(TASK_1).hands
-    control = chosen_slower(read.cell(TASK_1, RANDOM_HANDS), initial) > 0
+def hands_change_beyond_random_search(read):
+    """Test that more runs change hands than in random search with every hand sequence."""
+    control = changed_hands(read, RANDOM_HANDS)
     tests, against, parts = [], [], []
     for label in (EC2, EC3):
-        does = chosen_slower(read.cell(TASK_1, label), initial) > 0
+        does = changed_hands(read, label)
         counts = does.sum(), len(does), control.sum(), len(control)
         tests.append(fisher_test(*counts, "greater"))
         less = fisher_test(*counts, "less")
@@ -76,12 +71,11 @@ def under_one_condition(tests, against, parts):
     return Finding(test.value > 0, "; ".join(parts), (test,), (contrary,))
 
 
-def chosen_slower(cell, initial):
-    """Return the ticks by which chosen hands are slower for their goals alone, shape ``(runs,)``: a
-    sum over goals, without the last, that are hit with another hand than initially."""
-    changed = [[one != other for one, other in zip(run.hands, initial, strict=True)]
-               for run in cell.runs]  # fmt: skip
-    return np.where(changed, ticks_slower(cell), 0.0)[:, :-1].sum(axis=1)
+def changed_hands(read, label):
+    """Return whether each run on two-armed task 1 hits a goal before the last with another hand
+    than the initial solution, shape ``(runs,)``."""
+    initial = read.initial_execution(TASK_1).hands[:-1]
+    return np.array([hands[:-1] != initial for hands in read.hands(TASK_1, label)])
 
 
 def most_do(words, does, *, claimed=True):
@@ -162,7 +156,7 @@ def rail(read):
 
 
 RULES = {
-    "hand-coarticulation-task-1": slower_hands_are_chosen,
+    "hand-coarticulation-task-1": hands_change,
     "ec2-sequences": partial(half_find, task=TASK_1, label=EC2, hands="RRLR"),
     "no-reversal": no_reversal,
     "half-choose-rlrr": partial(half_find, task=TASK_2, label=EC3, hands="RLRR"),
@@ -170,5 +164,5 @@ RULES = {
     "rail": rail,
 }
 """Rules by the ids of their claims."""
-BEYOND = {"hand-coarticulation-task-1": more_slower_hands_than_random_search}
+BEYOND = {"hand-coarticulation-task-1": hands_change_beyond_random_search}
 """Rules that say whether learners show more than random search, by the ids of their claims."""

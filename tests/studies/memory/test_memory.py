@@ -6,8 +6,8 @@ import pytest
 
 from tests.support.processes import programs
 
-(MEMORY,) = programs("memory", "study")
-STAGES = MEMORY.STAGES
+CELLS, SCALES, EQUAL = programs("memory", "cells", "scales", "equal_gain")
+STAGES = SCALES.STAGES
 
 
 def planted(of_stages, learner, families=("aligned", "long"), tasks=6, noise=0.0):
@@ -19,7 +19,7 @@ def planted(of_stages, learner, families=("aligned", "long"), tasks=6, noise=0.0
         for number in range(tasks):
             own = noise * rng.normal()
             cells = [("compared", 0, learner), ("learner", 0, learner)]
-            cells += [(keep, stages, value) for keep in MEMORY.KEEPS
+            cells += [(keep, stages, value) for keep in CELLS.KEEPS
                       for stages, value in zip(STAGES, of_stages, strict=True)]  # fmt: skip
             rows += [
                 {"group": family, "task": f"{family}/v1/i{number:03d}", "name": name,
@@ -34,7 +34,7 @@ RISING = [0.0, 10.0, 20.0, 30.0, 40.0, 41.0, 42.0]
 
 
 def test_a_scale_is_level_where_nothing_exceeds_the_bound():
-    scale = MEMORY.Scale(planted(RISING, 35.0, noise=5.0), "gain", "postures")
+    scale = SCALES.Scale(planted(RISING, 35.0, noise=5.0), "gain", "postures")
     assert scale.means[30] - scale.means[1] == pytest.approx(40)
     assert [scale.level(bound) for bound in (0.5, 1.5, 2.5, 13.0, 100.0)] == [1000, 100, 30, 10, 1]
     assert scale.difference(1000, 1) == pytest.approx((42, 42, 42))
@@ -55,9 +55,9 @@ def test_a_scale_is_level_where_nothing_exceeds_the_bound():
     ],
 )
 def test_the_learner_has_a_place_on_the_scale(learner, place, where):
-    scale = MEMORY.Scale(planted(RISING, learner), "gain", "targets")
+    scale = SCALES.Scale(planted(RISING, learner), "gain", "targets")
     assert scale.place() == pytest.approx((place,) * 3)
-    assert MEMORY.where(scale, 5.0) == where
+    assert SCALES.where(scale, 5.0) == where
 
 
 def test_families_weigh_the_same_whatever_their_tasks():
@@ -65,7 +65,7 @@ def test_families_weigh_the_same_whatever_their_tasks():
     cells.loc[cells.group == "long", "gain"] += 8
     fewer = cells[~cells.task.isin(["long/v1/i000", "long/v1/i001"])]
     for each in (cells, fewer):
-        scale = MEMORY.Scale(each, "gain", "postures")
+        scale = SCALES.Scale(each, "gain", "postures")
         assert scale.means["learner"] == pytest.approx(4)
     assert len(scale) == 10
 
@@ -74,7 +74,7 @@ def test_a_spread_between_families_is_no_spread_of_a_difference():
     cells = planted(RISING, 30.0)
     more = (cells.group == "long") & (cells.name == "compared")
     cells.loc[more, "gain"] += 20
-    values = MEMORY.Scale(cells, "gain", "postures").more("learner", 1000)
+    values = SCALES.Scale(cells, "gain", "postures").more("learner", 1000)
     assert values.to_numpy() == pytest.approx(30 + 10 - 42)
 
 
@@ -99,7 +99,7 @@ def test_the_learner_is_interpolated_between_its_gains(gain, arm, status):
     ]
     cells = pd.DataFrame(rows, columns=["name", "gain", "arm"])
     others = {"other arm": cells.arm / 2, "first": cells.arm / 2, "stages": 0}
-    (row,) = MEMORY.at_equal_gain(cells.assign(group="long", task="x", **others)).to_dict("records")
+    (row,) = EQUAL.at_equal_gain(cells.assign(group="long", task="x", **others)).to_dict("records")
     assert row["status"] == status
     expected = np.nan if arm is None else arm
     assert row["learner arm"] == pytest.approx(expected, nan_ok=True)
@@ -118,8 +118,8 @@ def test_random_search_has_the_hands_of_the_learner():
     search = runs(name="random search", trials=10_000, stages=1, keep="postures",
                   hands=["RR", "RR", "RL", "LL"], gain=[2.0, 4.0, 9.0, 70.0])  # fmt: skip
     search["other arm"] = [np.nan, np.nan, 0.25, 0.75]
-    cells = MEMORY.measure_cells(pd.concat([learner, search]))
+    cells = CELLS.measure_cells(pd.concat([learner, search]))
     table = cells.set_index("name")[["gain", "other arm"]]
     assert table.loc["compared"].tolist() == pytest.approx([7.0, 0.5])
-    for keep in MEMORY.KEEPS:  # with one part both are the same
+    for keep in CELLS.KEEPS:  # with one part both are the same
         assert table.loc[keep].tolist() == pytest.approx([(2 * 3 + 9) / 3, 0.25])

@@ -179,10 +179,12 @@ def on_the_rail(free):
             (next_to_plans(-300, -310), "supported"),
             (next_to_plans(-310, -300), "not supported"),
             (next_to_plans(-300, -300), "undecided"),
-            (next_to_plans(-300, {"squared-displacement": -310}), "supported"),
-            # p of its test is 0.049, too much times six.
-            (next_to_plans(-300, {"squared-displacement": -302}, spread=(-3, -2, 3, 2, -1, 2)),
-             "undecided"),
+            # Two of three plans decide.
+            (next_to_plans(-300, {"squared-displacement": -310}), "undecided"),
+            (next_to_plans(-300, {"squared-displacement": -290, "acceleration": -310,
+                                  "jerk": -310}), "supported"),
+            (next_to_plans(-300, {"squared-displacement": -290, "acceleration": -290,
+                                  "jerk": -310}), "not supported"),
         )),
     ],
 )  # fmt: skip
@@ -206,10 +208,19 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     assert finding.holds
     assert not all_higher([Higher(first, second, by=2)]).holds
     assert finding.evidence.count("t, who: 5.0 [") == 1
-    one_of = performance.some_of(all_higher([Higher(second, first), Higher(first, second)]))
-    least = exchange_test(first.numbers, second.numbers)
-    assert one_of.holds
-    assert one_of.tests[0].p == pytest.approx(2 * least.p)
+
+
+@pytest.mark.parametrize("beaten", [0, 1, 2, 3])
+def test_two_of_three_plans_have_to_be_beaten(beaten):
+    """By twice the second smallest p of the claim, or of its opposite."""
+    high, low = ticks("t", 7, 8, 9, 10), ticks("t", 1, 2, 3, 4)
+    each = [all_higher([Higher(high, low) if k < beaten else Higher(low, high)]) for k in range(3)]
+    finding = performance.two_of_three(each)
+    least = exchange_test(high.numbers, low.numbers).p
+    assert finding.holds == (beaten > 1)
+    assert (finding.tests[0].p == pytest.approx(2 * least)) == (beaten > 1)
+    assert (finding.against[0].p == pytest.approx(2 * least)) == (beaten < 2)
+    assert finding.evidence.count(": beaten") == beaten
 
 
 CELLS = [
@@ -246,13 +257,21 @@ def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words):
 
 
 def test_corrections_early_and_late():
-    """Counts of runs differ around a drift that is there in some of the cells, or in none."""
-    for drift, verdict in ((40, "supported"), (-40, "not supported"), (0, "undecided")):
+    """Counts of runs differ around a drift; of the three or four movements of learned solutions one
+    is corrected, or three. If both counts disagree, nothing is decided."""
+    for drift, learned, verdict in (
+        (40, 1, "supported"),
+        (40, 3, "undecided"),
+        (-40, 1, "undecided"),
+        (-40, 3, "not supported"),
+        (0, 1, "undecided"),
+    ):
         rows = [
             {
                 **entry,
                 "early_corrections": 2000 + drift + 9 * (k % 5),
                 "late_corrections": 2000 + 9 * (3 * k % 5),
+                "solution_corrections": learned,
             }
             for k, entry in enumerate(seven([9, 10, 11, 12, 13]))
         ]
@@ -262,7 +281,7 @@ def test_corrections_early_and_late():
         # Of 999.9 trials with four goals; first and last tenth; the last cell is EC4's on task 2.
         early, late = (np.mean([row[f"{when}_corrections"] for row in rows[-5:]]) / 3999.6
                        for when in ("early", "late"))  # fmt: skip
-        *_, test = finding_of("corrections-two-armed", study).tests
+        *_, test, _ = finding_of("corrections-two-armed", study).tests
         assert test.value == pytest.approx(early - late)
 
 
@@ -358,28 +377,27 @@ def test_resemblance_is_half_the_initial_distance(share, verdict):
     assert beyond_half == pytest.approx([0.5 - share] * 2)
 
 
-SLOWER = ["LLRR"] * 8 + ["LRLR"] * 31 + ["RRRR"]
-"""Hands of 40 runs, few of which are slower for a goal and not the initial ones."""
+FEW = ["LLRR"] * 9 + ["RRRR"] * 31
+"""Hands of 40 runs, few of which are not the initial ones."""
 
 
 @pytest.mark.parametrize(
     ("learned", "of_random_search", "verdict"),
     [
-        ("LLRR", "LRLR", "supported"),  # left is slower for goal 2
-        ("RRRR", "LRLR", "not supported"),  # slower, but as initially
-        ("LRLR", "LRLR", "not supported"),
-        ("LRLL", "LRLR", "not supported"),  # slower, but nothing follows
+        ("LLRR", "RRRR", "supported"),
+        ("RRRR", "RRRR", "not supported"),
+        ("RRRL", "RRRR", "not supported"),  # nothing follows
         ("LLRR", "LLRR", "supported"),  # random search does so as well
-        ("few LLRR", "LRLR", "undecided"),  # more than it, but few
+        ("few LLRR", "RRRR", "undecided"),  # more than it, but few
     ],
 )
-def test_hands_that_serve_other_goals(learned, of_random_search, verdict):
-    """Of two-armed task 1: left first and right second are the quicker hands, initially RRRR."""
-    of = {"dual-process/EC2": learned, "dual-process/EC3": "LRLR",
+def test_hands_that_change(learned, of_random_search, verdict):
+    """Of two-armed task 1, whose initial hands are RRRR."""
+    of = {"dual-process/EC2": learned, "dual-process/EC3": "RRRR",
           "random-search/hands": of_random_search}  # fmt: skip
-    runs = {h: corrective_trial(T1, h) for h in {"LRLL", *SLOWER}}
+    runs = {h: corrective_trial(T1, h) for h in {"RRRL", *FEW}}
     solutions = {
-        (T1, label): [runs[h] for h in (SLOWER if h.startswith("few") else [h] * 40)]
+        (T1, label): [runs[h] for h in (FEW if h.startswith("few") else [h] * 40)]
         for label, h in of.items()
     }
     study = plant(solutions)
@@ -387,10 +405,6 @@ def test_hands_that_serve_other_goals(learned, of_random_search, verdict):
     more = verdict_of("hand-coarticulation-task-1", study, claims.BEYOND)
     as_many = of_random_search == "LLRR" or verdict == "not supported"
     assert (more.verdict == "supported") != as_many, more.evidence
-    if verdict == "supported":
-        slow, quick = (corrective_trial(T1, h).ticks_by_goal()[1] for h in ("LLRR", "LRRR"))
-        slower = hands.chosen_slower(study.executed(T1, "dual-process/EC2"), "RRRR")
-        assert slower.tolist() == [slow - quick] * 40
 
 
 def improved(task, hands, q):
@@ -453,7 +467,7 @@ SEEN = {
         (-1, -2, "not supported", "supported"),  # though random search shows less
     ],
 )
-def test_what_replicates_may_be_no_more_than_selection(
+def test_what_replicates_may_be_no_more_than_one_selection(
     claim, learned, random_search, replicates, beyond
 ):
     if claim == "context" and learned < 0:
@@ -539,8 +553,8 @@ def test_the_register_on_runs(study):
     assert "(EC1-subtask)" in entries.evidence["overall-reward"]
     for which in ("one", "two"):
         assert entries.replicates[f"corrective-near-shortest-{which}-armed"] == "supported"
-    assert entries.more_than_selection[["context", "arm-coarticulation"]].notna().all()
-    assert entries.more_than_selection.count() == len(claims.BEYOND)
+    assert entries.more_than_one_selection[["context", "arm-coarticulation"]].notna().all()
+    assert entries.more_than_one_selection.count() == len(claims.BEYOND)
     for name in ("beats-inaccurate-one-armed", "overall-reward-two-armed"):  # not run
         assert entries.replicates[name] == "undecided"
         assert "this folder has no runs of" in entries.evidence[name]

@@ -66,8 +66,8 @@ def test_claims_of_generality(monkeypatch, rising):
     of_random_search = with_signatures(rising, of_random_search=1.0)
     # No more than random search shows:
     judged = claims.judge_claims(of_random_search, of_signatures)
-    assert set(judged.more_than_selection) == {"undecided"}
-    assert set(entries.more_than_selection[of_signatures]) == {"supported"}
+    assert set(judged.more_than_one_selection) == {"undecided"}
+    assert set(entries.more_than_one_selection[of_signatures]) == {"supported"}
     assert entries.replicates["corrective-ensures-in-general"] == "supported"
     jerk = entries.evidence["beats-inaccurate-in-general"]
     assert "fewer than 3 instances of one-armed/v1" in jerk
@@ -84,7 +84,7 @@ def test_a_claim_that_one_family_does_not_judge_says_what_the_others_show(rising
 
     seen = MadeUp(study, **vars(study) | {"signature_by_hands": by_hands})
     entry = claims.judge_claims(seen, ["arm-coarticulation-in-general"]).iloc[0]
-    assert entry.more_than_selection == "undecided"
+    assert entry.more_than_one_selection == "undecided"
     assert "long/v1: 2.68 [" in entry.evidence  # the mean of 2, and 3 + n / 10, over n = 0 to 7
     said, _, shown = entry.evidence_beyond.partition(". ")
     assert said.endswith("can be judged of long/v1, more than random search")

@@ -1,0 +1,92 @@
+"""Finding body-shares: what of the body varies at the first goal if the second one does.
+
+    python studies/human/body_shares.py
+
+People's hip, shoulder and elbow vary in the reach to a first target with the place of a second one.
+Tasks ascending and descending of the shipped suite ``comparison`` have the first goal in common and
+no other. Compared are mean postures at this goal: the base for the hip, the first joint of the arm
+for the shoulder, the second for the elbow. The unit of inference is the run. Writes body.csv, which
+study.py joins with the other effects.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from study import FINDINGS, LEVEL, MODELS, RESAMPLES, by_model, decide, verdict_of
+
+from coartic.analysis import load
+from coartic.estimates import Estimate
+
+TASKS, NAME = ("ascending", "descending"), "body-shares"
+SEARCH = "random search"
+
+
+def postures(study, model):
+    """Return the configurations at goal 1 on both tasks, shape ``(runs, dof)`` each; empty for a
+    model that did not run there."""
+    method = MODELS[model]["method"] or "dual-process/EC1"
+    replay = MODELS[model].get("replayed", False)
+    if any((task, method) not in study.cells for task in TASKS):
+        return []
+    return [study.configurations(task, method, replay=replay)[:, 0] for task in TASKS]
+
+
+def differences(groups, joints):
+    """Return the length of the difference of mean postures in these joints."""
+    first, second = (group[:, joints].mean(axis=0) for group in groups)
+    return float(np.linalg.norm(first - second))
+
+
+def with_interval(sides, joints, level):
+    """Return the difference of one model, or less that of another, with percentiles of resampled
+    runs; without an interval where a model has a single run."""
+
+    def statistic(drawn):
+        first, *second = (differences(groups, joints) for groups in drawn)
+        return first - sum(second)
+
+    rng = np.random.default_rng(0)
+    drawn = [
+        statistic([[group[rng.integers(len(group), size=len(group))] for group in groups]
+                   for groups in sides])
+        for _ in range(RESAMPLES)
+    ]  # fmt: skip
+    ends = np.quantile(drawn, [level / 2, 1 - level / 2])
+    return Estimate(statistic(sides), *map(float, ends))
+
+
+def measure_body(study):
+    """Return rows of the effects for this finding, as :func:`study.measure_effects` does."""
+    finding, rows = FINDINGS[NAME], []
+    silent, built_in = (by_model(finding[words]) for words in ("silent", "built_in"))
+    robot = study.tasks[TASKS[0]].robot
+    arm = np.arange(robot.dof)[robot.joints("right")]
+    groups = {"base": [0, 1], "shoulder": arm[:1], "elbow": arm[1:2]}
+    level, search = LEVEL / len(finding["tests"]), postures(study, SEARCH)
+    for model in MODELS:
+        ours, tests = ([] if model in silent else postures(study, model)), []
+        for test in finding["tests"]:
+            joints = groups[test["measure"].split()[0]]
+            seen = with_interval([ours], joints, level) if ours else Estimate(np.nan)
+            over = Estimate(np.nan)
+            if ours and model != SEARCH:
+                over = with_interval([ours, search], joints, level)
+            count = min(map(len, ours)) if ours else 0
+            verdict, because = decide(test, seen, over, count and np.inf, silent.get(model, ""))
+            tests.append({
+                "measure": test["measure"], "bound": f"above {test['above']:g}",
+                **seen.columns("value"), "tasks": count, **over.columns("over_random_search"),
+                "of_test": verdict, "because": because,
+            })  # fmt: skip
+        verdict = verdict_of([test["of_test"] for test in tests])
+        judged = {"verdict": verdict, "built_in": built_in.get(model) == verdict}
+        rows += [{"finding": NAME, "model": model, **test, **judged} for test in tests]
+    effects = pd.DataFrame(rows)
+    effects["because"] = effects.pop("because")
+    names = effects.finding + " " + effects.model + " " + effects.measure
+    return effects.set_index(names.rename("row"))
+
+
+if __name__ == "__main__":
+    measure_body(load("shipped")).to_csv(Path(__file__).with_name("body.csv"), float_format="%.6g")

@@ -1,0 +1,102 @@
+"""Gain and signatures of each task, method, number of trials and dose of memory, over runs."""
+
+import pandas as pd
+
+from coartic.analysis import TwoContexts
+
+MEASURES = {
+    "gain": "gain (ticks)",
+    "first": "first movement slower (ticks)",
+    "arm": "next goal nearer (ticks)",
+    "other arm": "idle hand nearer (share)",
+}
+"""Gain and signatures, with the labels of their axes. The gain counts from the corrective process
+alone with its best hands."""
+KEEPS = ("postures", "targets")
+NAMES = {
+    "dual-process/EC1": "learner",
+    "dual-process/EC4": "learner",
+    "dual-process/EC1-informed": "informed learner",
+    "dual-process/EC4-informed": "informed learner",
+    "random-search": "random search",
+    "hill-climbing": "hill climbing",
+    "cma-es/bandit": "CMA-ES",
+    "posture-based/two-goals": "posture planning",
+    "posture-qp/goals-ahead": "posture QP",
+}
+TRIALS = 10_000
+LEAST_SHARE = 0.1
+
+
+def measure_runs(study):
+    """Return the solved runs with gain and signatures; ``group``: family, or task of the paper."""
+    runs = study.runs[study.runs.status == "ok"]
+    return runs.assign(
+        group=runs.family.str.partition("/")[0].fillna(runs.task),
+        name=runs.method.map(NAMES),
+        gain=runs.reward.astype(float) - runs.corrective_best,
+        **{name: study.signature(name) for name in MEASURES if name != "gain"},
+    )
+
+
+def measure_cells(runs):
+    """Return means over runs, a row for each task, method, number of trials, and for random search
+    number of stages and what is kept.
+
+    Random search has a mean for each hand sequence of the learner, weighted by the learner's runs;
+    rows of the learner with 10,000 trials have the runs with these hands alone (``compared``).
+    """
+    rows, measures = [], [*MEASURES]
+    for (group, task), of_task in runs.groupby(["group", "task"], sort=False):
+        learner = of_task[(of_task.name == "learner") & (of_task.trials == TRIALS)]
+        shares = learner.hands.value_counts(normalize=True)
+        shares = shares[shares >= LEAST_SHARE]
+        key = {"group": group, "task": task}
+        compared = learner[learner.hands.isin(shares.index)][measures].mean()
+        rows.append(key | {"name": "compared", "trials": TRIALS} | compared.to_dict())
+        search = of_task[of_task.name == "random search"]
+        for (stages, keep), of_dose in search.groupby(["stages", "keep"], sort=False):
+            by_hands = of_dose.groupby("hands")[measures].mean()
+            if {*shares.index} <= {*by_hands.index}:
+                of_hands = by_hands.loc[shares.index]
+                weights = of_hands.notna().mul(shares, axis=0)  # of hands with the signature
+                means = (of_hands * weights).sum() / weights.sum()
+                for kept in KEEPS if stages == 1 else (keep,):
+                    names = {"name": kept, "trials": TRIALS, "stages": int(stages)}
+                    rows.append(key | names | means.to_dict())
+        others = of_task[of_task.name != "random search"]
+        for (name, trials), of_cell in others.groupby(["name", "trials"], sort=False, dropna=False):
+            names = {"name": name, "trials": trials}
+            rows.append(key | names | of_cell[measures].mean().to_dict())
+    return pd.DataFrame(rows).fillna({"stages": 0, "trials": 0}).astype({"stages": int})
+
+
+def groups_of(cells, measure):
+    """Return the families that have a measure, by group: all of them, and each alone."""
+    there = cells[cells.task.str.contains("/") & cells[measure].notna()]
+    there = there[there[measure].groupby(there.group).transform("any")]  # 0 with one arm
+    families = [*dict.fromkeys(there.group)]
+    return {"all": families} | {family: [family] for family in families}
+
+
+def measure_contexts(study):
+    """Tabulate the posture difference at the first goal of both one-armed tasks of the paper, with
+    the mean gain on both, by method, trials and stages."""
+    rows = {}
+    runs = measure_runs(study)
+    runs = runs[runs.task.isin(("ascending", "descending"))]
+    for label, of in runs.groupby("label", sort=False):
+        if of.task.nunique() == 2:
+            both = (study.executed(task, label) for task in ("ascending", "descending"))
+            contexts = TwoContexts(*both, 1, "right")
+            first = of.iloc[0]
+            rows[label] = {
+                "name": first["name"],
+                "trials": first.trials,
+                "stages": first.get("stages", 0),
+                "keep": first.get("keep", ""),
+                "runs": len(of) // 2,
+                "gain": of.groupby("task").gain.mean().mean(),
+                "distance": contexts.posture_difference,
+            }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("label")

@@ -1,0 +1,60 @@
+"""Signatures of each method where the learner gains as much, and what is left out."""
+
+import numpy as np
+import pandas as pd
+from cells import MEASURES
+from scales import drawn
+
+
+def at_equal_gain(cells):
+    """Return each cell's signatures next to the learner's where the learner gains as much,
+    interpolated over its numbers of trials, with 0 at gain 0.
+
+    A row for each cell of another method: signatures, those of the learner in columns that begin
+    with ``learner``, and ``status``: ``compared``, ``gain below 0`` or ``beyond the learner``."""
+    signatures = [name for name in MEASURES if name != "gain"]
+    rows = []
+    for _, of_task in cells.groupby("task", sort=False):
+        learner = of_task[(of_task.name == "learner") & (of_task.gain > 0)].sort_values("gain")
+        gains = np.append(0.0, learner.gain)
+        for row in of_task[~of_task.name.isin(["learner", "compared"])].to_dict("records"):
+            below, beyond = row["gain"] < 0, row["gain"] > gains[-1]
+            row["status"] = (
+                "gain below 0" if below else "beyond the learner" if beyond else "compared"
+            )
+            for name in signatures:
+                at = np.interp(row["gain"], gains, np.append(0.0, learner[name]))
+                row[f"learner {name}"] = at if row["status"] == "compared" else np.nan
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def tabulate_equal(cells):
+    """Tabulate what is left of each method's signatures at the learner's gain: the difference, and
+    the ratio of sums over tasks, with tasks resampled within families; and what is left out."""
+    equal, rows = at_equal_gain(cells[cells.task.str.contains("/")]), {}
+    keys = ["name", "stages"]
+    for group, of_group in (("all", equal), *equal.groupby("group", sort=False)):
+        for (name, stages), of in of_group.groupby(keys, sort=False):
+            row = {"group": group, "name": name, "stages": stages, "cells": len(of)}
+            row |= of.status.value_counts().to_dict()
+            for measure in MEASURES:
+                if measure == "gain":
+                    continue
+                pairs = of[["group", measure, f"learner {measure}"]].dropna().sort_values("group")
+                if len(pairs) < 3 or not pairs[measure].any():
+                    continue
+                mine, learner = pairs[[measure, f"learner {measure}"]].to_numpy().T
+                places = drawn(pairs.group)
+                differences = (mine - learner)[places].mean(axis=1)
+                ratios = mine[places].sum(axis=1) / learner[places].sum(axis=1)
+                for word, value, each in (
+                    ("difference", (mine - learner).mean(), differences),
+                    ("ratio", mine.sum() / learner.sum(), ratios),
+                ):
+                    low, high = np.quantile(each, [0.025, 0.975])
+                    column = f"{measure}_{word}"
+                    row |= {column: value, f"{column}_low": low, f"{column}_high": high}
+                row[f"{measure}_tasks"] = len(pairs)
+            rows[f"{group} {name} {stages}"] = row
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")

@@ -1,0 +1,92 @@
+"""Measure what is left of the learner's excess over one selection where it has gained as much.
+
+    coartic run studies/memory/one-selection.toml --out results/one-selection
+    python studies/memory/one_selection.py results/one-selection
+
+writes one_selection.csv, a row for each task and signature: random search (the best of 10,000
+trials), and by how much the learner exceeds it, after as many trials (``more``) and after the
+number of trials at which its gain is nearest to random search's (``equal``). On two arms both have
+the hands in which the learner ends.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from cells import MEASURES, TRIALS, measure_runs
+
+from coartic.analysis import load
+from coartic.estimates import Estimate, difference_of_means
+
+CONTEXTS = "ascending", "descending"
+RESAMPLES = 9_999
+
+
+def tabulate(study):
+    """Return the table; posture differences are those at the first goal of two tasks."""
+    runs, rows = measure_runs(study), {}
+    for task, of_task in runs.groupby("task", sort=False):
+        search = of_task[of_task.name == "random search"]
+        learner = of_task[of_task.name == "learner"]
+        commonest = learner.hands[learner.trials == TRIALS].mode()[0]
+        learner = learner[learner.hands == commonest]
+        equal = as_much(learner, search)
+        for measure in MEASURES:
+            theirs = search[measure].dropna()
+            if len(theirs):
+                rows[f"{task} {measure}"] = row_of(theirs.mean(), equal, {
+                    word: difference_of_means(learner[measure][learner.trials == trials], theirs)
+                    for word, trials in (("more", TRIALS), ("equal", equal))
+                })  # fmt: skip
+    both = runs[runs.task.isin(CONTEXTS)]
+    search, learner = (both[both.name == name] for name in ("random search", "learner"))
+    equal = as_much(learner, search)
+    theirs = postures(study, search)
+    rows["contexts posture"] = row_of(distance(theirs), equal, {
+        word: excess(postures(study, learner[learner.trials == trials]), theirs)
+        for word, trials in (("more", TRIALS), ("equal", equal))
+    })  # fmt: skip
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
+
+
+def as_much(learner, search):
+    """Return the number of trials at which the learner's mean gain is nearest to random search's,
+    with means of tasks that weigh the same."""
+    gains = learner.groupby(["trials", "task"]).gain.mean().groupby("trials").mean()
+    return int((gains - search.groupby("task").gain.mean().mean()).abs().idxmin())
+
+
+def row_of(value, trials, excesses):
+    """Return a row of the table: random search's value, and estimates by the word of the column."""
+    row = {"random_search": value, "trials": trials}
+    for word, estimate in excesses.items():
+        row |= estimate.columns(word)
+    return row
+
+
+def postures(study, runs):
+    """Return configurations at goal 1 on both tasks of a method, shape ``(runs, dof)`` each."""
+    return [study.configurations(task, runs.label.iloc[0])[:, 0] for task in CONTEXTS]
+
+
+def distance(groups):
+    """Return the distance of the mean configurations of two groups."""
+    return float(np.linalg.norm(groups[0].mean(axis=0) - groups[1].mean(axis=0)))
+
+
+def excess(ours, theirs):
+    """Return by how much a posture difference exceeds another, with percentiles of resampled
+    runs."""
+    rng, groups = np.random.default_rng(0), [*ours, *theirs]
+    drawn = [distance(resampled[:2]) - distance(resampled[2:]) for resampled in (
+        [group[rng.integers(len(group), size=len(group))] for group in groups]
+        for _ in range(RESAMPLES)
+    )]  # fmt: skip
+    value = distance(ours) - distance(theirs)
+    return Estimate(value, *map(float, np.quantile(drawn, [0.025, 0.975])))
+
+
+if __name__ == "__main__":
+    table = tabulate(load(sys.argv[1]))
+    table.to_csv(Path(__file__).with_suffix(".csv"), float_format="%.6g")
