@@ -46,6 +46,12 @@ class Finding:
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
+    def __str__(self) -> str:
+        """A sentence: what the runs show, p-values uncorrected, and the evidence."""
+        shown = {True: "The runs show it", False: "The runs do not show it", None: "Too few runs"}
+        p = p_value(_largest_p(self.tests))
+        return f"{shown[self.holds]}{f' ({p})' * bool(p)}: {self.evidence.rstrip('.')}."
+
     @property
     def opposite_p(self) -> float:
         """Smallest p-value of the tests in ``against``, times their number (Bonferroni), 1 at most;

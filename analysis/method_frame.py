@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from coartic.analysis.methods import (
+    COLORS,
     CONDITION_OF,
     EC1,
     INFORMED_LEARNERS,
     KNOWN_METHODS,
     LEARNERS,
+    MARKS,
     SEARCHES,
     title_of,
 )
@@ -30,10 +32,8 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "not using the reward",
 )
 """Groups of methods by their use of the reward."""
-COLORS = ("sky", "vermillion", "orange", "purple", "blue")
-DASHES = ("dashed", "dotted", "dash-dotted", "solid")
-OWN_COLOR = "brown"
-"""Colour of methods from files: no built-in method has it."""
+OWN_COLOR, OWN_MARK = "walnut", "star"
+"""Colour of methods from files, and mark of the first: no built-in method has them."""
 
 
 MARK = " ‡"
@@ -74,6 +74,7 @@ def methods_of(
             "setting": setting,
             "parts": (label,),
             "title": title_of(base, setting) + MARK * (base in marked),
+            "short": title_of(base, setting, short=True) + MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,
@@ -87,8 +88,9 @@ def methods_of(
     tasks = {label: {*of_method.task} for label, of_method in by_label.items()}
     for label, (one, two) in _joined_learners(tasks):
         conditions = label.partition(" ")[2].replace("-informed", "")
-        title = f"{rows[two]['algorithm']} {conditions}"
-        rows[label] = rows[two] | {"parts": (one, two), "title": title}
+        names = {"title": f"{rows[two]['algorithm']} {conditions}"}
+        names["short"] = f"{rows[two]['short'].rpartition(' ')[0]} {conditions}"
+        rows[label] = rows[two] | {"parts": (one, two)} | names
     for label, look in _looks_of(rows):
         rows[label]["look"] = look
     place = {name: number for number, name in enumerate(KNOWN_METHODS)}
@@ -143,12 +145,14 @@ def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.Dat
 
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the label of each row with the names of its colour and dash, such as ``("sky",
-    "dashed")``: the pair in its ``look``; or for the first four methods from files brown and a
-    dash; or the next pair that no ``look`` has."""
+    """Yield the label of each row with the names of its colour and mark: those in its ``look``; or
+    for the first methods from files the colour of own methods and a mark; or the next pair that no
+    other method has."""
     fixed = {row["look"] for row in rows.values()}
-    free = itertools.cycle((c, d) for d in DASHES for c in COLORS if (c, d) not in fixed)
-    theirs = itertools.chain(((OWN_COLOR, dash) for dash in DASHES), free)
+    colors = [color for color in COLORS if color not in (OWN_COLOR, "ink")]
+    marks = [mark for mark in MARKS if mark != OWN_MARK]
+    free = itertools.cycle((c, m) for m in marks for c in colors if (c, m) not in fixed)
+    theirs = itertools.chain(((OWN_COLOR, mark) for mark in MARKS), free)
     for label in sorted(rows, key=lambda label: bool(rows[label]["built_in"])):
         row = rows[label]
         yield label, row["look"] or next(free if row["built_in"] else theirs)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
@@ -23,6 +23,34 @@ RANDOM_SEARCH = "random-search"
 """Id of random search: the best of random targets around postures of the corrective process."""
 
 
+COLORS = {
+    "ink": "#000000",
+    "walnut": "#4a2b18",
+    "grape": "#4b2a9b",
+    "navy": "#00558f",
+    "forest": "#007c52",
+    "rust": "#d55e00",
+    "silver": "#8c8c8c",
+    "azure": "#5bb8ea",
+    "rose": "#dc9fc3",
+    "amber": "#eba717",
+}
+"""Colours of methods, from dark to light, in steps that remain in grey and for readers with a
+colour vision deficiency. On a dark page ``page.css`` has lighter ones."""
+MARKS: dict[str, Any] = {
+    "star": ("*", "-"),
+    "circle": ("o", (0, (1, 1.2))),
+    "square": ("s", (0, (4, 1.5))),
+    "diamond": ("D", (0, (9, 1.5))),
+    "thin-diamond": ("d", "-"),
+    "triangle": ("^", (0, (3, 1, 1, 1, 1, 1))),
+    "inverted-triangle": ("v", (0, (2, 2))),
+    "plus": ("P", (0, (5, 1.2, 1, 1.2))),
+    "cross": ("X", (0, (7, 1, 3, 1))),
+}
+"""Marks of methods in Matplotlib's terms, each with the dash of lines."""
+
+
 class _KnownMethod(NamedTuple):
     """Facts about a built-in method; ``methods.toml`` explains the fields."""
 
@@ -33,6 +61,7 @@ class _KnownMethod(NamedTuple):
     headline: bool = False
     ablation_of: str = ""
     solvers: Sequence[str] = ()
+    short: str = ""
 
 
 KNOWN_METHODS = {
@@ -53,11 +82,13 @@ _WORDS = {
 """Words for parameters, before their values."""
 
 
-def title_of(method: str, setting: str = "") -> str:
+def title_of(method: str, setting: str = "", *, short: bool = False) -> str:
     """Return the name of a method, given by id, with its setting in words: ``learner EC4``, ``hill
     climbing``, ``CMA-ES (other arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty
-    for none. The name of a method from a file is its id."""
-    name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else one_line(method)
+    for none. The name of a method from a file is its id. ``short``: the short name of a built-in
+    method that has one."""
+    known = KNOWN_METHODS.get(method)
+    name = (short and known.short) or known.name if known else one_line(method)
     if not setting:
         return name
     pairs = (part.partition("=") for part in one_line(setting).split(", "))

@@ -302,6 +302,7 @@ class Study:
         - ``parts``: labels of its runs, a tuple of one text, or two of a joined row, in which runs
           of the second label count on a task with runs of both;
         - ``title``: name on the page, in tables and figures;
+        - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
         - ``is_learner``: True for the paper's learner under the paper's conditions;
         - ``is_search``: True for searches for the optimum, which are references;
@@ -311,7 +312,7 @@ class Study:
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with whatever setting, represents its algorithm;
         - ``under``: of a setting or ablation, label of its method, if this method ran; or empty;
-        - ``look``: names of colour and dash in figures, a tuple of two texts.
+        - ``look``: names of colour and mark in figures, a tuple of two texts.
         """
         return methods_of(self.runs, self.declared, self.marks)
 

@@ -98,6 +98,7 @@ class CMAES(Method):
 
     name = "cma-es/bandit"
     version = 2
+    tuned_on = "the paper's tasks: twenty settings"
     title = "CMA-ES, a bandit over hand sequences"
     citation = _CITATION + (
         " P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
@@ -142,6 +143,7 @@ class GoalByGoal(Method):
 
     name = "cma-es/goal-by-goal"
     version = 2
+    tuned_on = CMAES.tuned_on
     title = "CMA-ES, hands chosen goal by goal"
     citation = _CITATION
     information = OPTIMISER_INFORMATION

@@ -16,6 +16,7 @@ class GivenHands(Method):
     """The corrective process with the task's initial hands: trial 0 of the learner."""
 
     name = "corrective-alone/given"
+    tuned_on = "nothing: it has no constants but the paper's"
     title = "Corrective process alone, the task's hands"
     citation = (
         "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "
@@ -40,6 +41,7 @@ class BestHands(Method):
     """The corrective process with every hand sequence; the best one is kept."""
 
     name = "corrective-alone/best-hands"
+    tuned_on = GivenHands.tuned_on
     title = "Corrective process alone, best hands"
     citation = GivenHands.citation
     information = GivenHands.information

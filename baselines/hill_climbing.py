@@ -27,6 +27,7 @@ class HillClimbing(Method):
     """A (1+1) hill climber per hand sequence."""
 
     name = "hill-climbing"
+    tuned_on = "nothing: the paper's values"
     title = "Hill climbing, (1+1) for each hand sequence"
     citation = (
         "H.-G. Beyer, H.-P. Schwefel (2002). Evolution strategies: a comprehensive "

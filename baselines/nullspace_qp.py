@@ -88,6 +88,7 @@ class LeastMotion(Control):
 
     name = "nullspace-qp/least-motion"
     version = 2
+    tuned_on = "nothing"
     title = "Prioritised null-space QP, least motion"
     citation = (
         "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "

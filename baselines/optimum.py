@@ -51,6 +51,7 @@ class OptimumSearch(Method):
 
     name = "optimum/search"
     version = 2
+    tuned_on = "random tasks"
     title = "Optimum: dynamic programming over postures"
     citation = (
         "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "

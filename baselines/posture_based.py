@@ -75,6 +75,7 @@ class PostureBased(Method):
 
     version = 2
     horizon: ClassVar[Literal[1, 2]]
+    tuned_on = "the paper's tasks, by hand"
     citation = (
         "D. A. Rosenbaum, R. J. Meulenbroek, J. Vaughan, C. Jansen (2001). Posture-based "
         "motion planning: applications to grasping. Psychological Review 108(4), 709-734, "

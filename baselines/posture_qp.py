@@ -172,6 +172,7 @@ class CurrentGoal(Control):
 
     name = "posture-qp/current-goal"
     version = 2
+    tuned_on = "30 development instances: some 60 settings"
     title = "Posture QP, current goal"
     citation = (
         "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "

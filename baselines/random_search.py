@@ -122,6 +122,7 @@ class RandomSearchHands(Method):
     exist, it has the task's initial hand sequence alone."""
 
     name = "random-search/hands"
+    tuned_on = "nothing: the paper's values"
     title = "Random search with every hand sequence"
     citation = (
         "L. A. Rastrigin (1963). The convergence of the random search method in the extremal "

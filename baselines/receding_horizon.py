@@ -61,6 +61,7 @@ class RecedingHorizon(Method):
 
     name = "receding-horizon"
     version = 2
+    tuned_on = "random tasks"
     title = "Receding-horizon planning of the shortest path"
     citation = (
         "D. Q. Mayne, J. B. Rawlings, C. V. Rao, P. O. M. Scokaert (2000). Constrained model "

@@ -103,6 +103,7 @@ class TrajectoryOptimisation(Method):
     version = 2
     cost: ClassVar[Cost]
     stochastic = False
+    tuned_on = "random tasks"
     Parameters = TrajectoryParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
 
@@ -253,6 +254,10 @@ class HandJerk(Jerk):
 
     name = "trajectory-optimisation/hand-jerk"
     title = "Trajectory optimisation, minimum hand jerk"
+    tuned_on = (
+        "two-armed-2: least time between goals, and weight of joint jerk, where weights from 0.001 "
+        "to 10 end at -349 to -399 (shipped: -393); else random tasks"
+    )
     secondary = ("minimum jerk of the hand",)
     cost = "hand-jerk"
     Parameters = HandJerkParameters

@@ -140,11 +140,12 @@ def _methods_of_module(
 
 
 def _check_declaration(method: type[Method], origin: str) -> None:
-    """Check that a method declares its name, title and citation, texts of one line, and its
-    information; ``origin`` is the name of its file in messages. Raises CoarticError for a missing
-    or wrong declaration. The registry checks the form of ids (:func:`~.registry.check_id`)."""
+    """Check that a method declares its name, title, citation and what it was tuned on, texts of
+    one line, and its information; ``origin`` is the name of its file in messages. Raises
+    CoarticError for a missing or wrong declaration. The registry checks the form of ids
+    (:func:`~.registry.check_id`)."""
     where = f"{origin}: {method.__name__}"
-    for attribute in ("name", "title", "citation"):
+    for attribute in ("name", "title", "citation", "tuned_on"):
         text = getattr(method, attribute, None)
         if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
             raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")

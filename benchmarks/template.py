@@ -12,6 +12,7 @@ class Mine(Optimiser):
     name = "NAME"  # its id in commands and tables
     title = "Random steps from the best point"  # in lists and citations
     citation = "I. Rechenberg (1973). Evolutionsstrategie."  # what others cite
+    tuned_on = "nothing"  # tasks on which you chose its constants, here the step of 0.03
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
         """Minimise the cost of a trial, until ``objective`` raises BudgetError, as no trial is

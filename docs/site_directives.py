@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -21,6 +22,17 @@ from coartic.play.page import part_of_page, play_page, player_figure, preset_of,
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import Task, shipped_tasks
 
+STORY = {
+    "learn": "A trial goes for goal after goal. For each goal the learner chooses a hand and moves "
+    "towards the stored target plus noise; where that misses, the corrective process goes on. "
+    "After a trial that hit every goal, the postures reached become targets where no earlier trial "
+    "with these hands had a higher reward.",
+    "_choose": "Mostly the hand with the best value; at times another one.",
+    "_explore": "Noise on the joints that the exploration condition names.",
+    "correct": "The corrective process: follow the transposed Jacobian until the hand is there.",
+    "execute": "How every method's solution is scored: movement after movement, minus the ticks.",
+}
+"""What the functions of the slow learner do, in the order of the story."""
 REPLICATION = Path(__file__).parents[1] / "studies" / "replication"
 
 
@@ -115,6 +127,26 @@ def methods(group: str) -> Iterator[str]:
         if group_of(uses) == group
     )
     yield from table(("name", "id", "information"), rows)
+
+
+def tuned() -> Iterator[str]:
+    """Yield a list of what built-in methods were tuned on."""
+    names: dict[str, list[str]] = {}
+    for name, info in built_in().items():
+        names.setdefault(info.tuned_on, []).append(title_of(name))
+    yield from (f"- {'; '.join(each)}: **{text}**" for text, each in names.items())
+    yield ""
+
+
+def slowly() -> Iterator[str]:
+    """Yield the slow and obvious learner of the tests, function by function: the docstring as a
+    paragraph, then the code."""
+    text = (Path(__file__).parents[1] / "tests" / "support" / "reference.py").read_text("utf-8")
+    parts = {part.name: part for part in ast.parse(text).body if isinstance(part, ast.FunctionDef)}
+    for name in ("learn", "_choose", "_explore", "correct", "execute"):
+        code = ast.get_source_segment(text, parts[name])
+        assert code is not None
+        yield f"## `{name}`\n\n{STORY[name]}\n\n```python\n{code}\n```\n"
 
 
 def columns() -> Iterator[str]:

@@ -1,5 +1,6 @@
 """Figures: what they show is what the runs say."""
 
+import itertools
 import re
 
 import numpy as np
@@ -10,9 +11,9 @@ from matplotlib.figure import Figure
 from coartic import CoarticError, load_task
 from coartic.analysis import load
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
-from coartic.analysis.methods import KNOWN_METHODS, title_of
-from coartic.analysis.sections import FIGURES
-from coartic.analysis.sections.ranking import name_in_figure
+from coartic.analysis.methods import COLORS, KNOWN_METHODS, title_of
+from coartic.analysis.report.about import finding
+from coartic.analysis.sections import FIGURES, SECTIONS
 from coartic.pictures import drawing
 from tests.support.figures import misplaced
 from tests.support.made_up import row, study_of
@@ -37,9 +38,20 @@ def test_robots_and_goals_are_drawn_where_they_are():
         np.testing.assert_array_equal(line.get_xydata(), due)
 
 
-def test_a_long_name_keeps_its_end(traced):
-    for letters, name in ((44, 22 * "a" + 22 * "b"), (60, f"{22 * 'a'}…{21 * 'b'}")):
-        assert name_in_figure(traced, letters // 2 * "a" + letters // 2 * "b") == name
+@pytest.mark.parametrize("width", [None, 3.4])
+def test_a_long_name_is_whole(width):
+    long = "mine, " + 5 * "with a name that goes on and on, "
+    study = study_of([row(name, -300, task="ascending") for name in (long, "hill-climbing")])
+    figure = FIGURES["ranking"](study, width=width).figure
+    assert misplaced(figure) == ([], [])
+    words = " ".join(label.get_text() for label in figure.axes[0].get_yticklabels())
+    assert long.strip() in words.replace("\n", " ")
+
+
+def test_short_names_fit_and_differ():
+    short = [title_of(method, short=True) for method in KNOWN_METHODS]
+    assert len({*short}) == len(short)
+    assert max(map(len, short)) <= 22
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -50,6 +62,7 @@ def test_no_text_leaves_a_figure_of_any_width_or_lies_on_another(name, shipped):
             pytest.skip("the shipped results have no such figure")
         assert misplaced(plot.figure) == ([], []), width
         assert (plot.figure.get_figwidth() == width) == bool(width)
+        assert width is None or plot.figure.get_figheight() < 4.01
         assert plot.id == name
         assert all(map(len, (plot.alt, plot.caption, plot.data)))
 
@@ -76,19 +89,60 @@ def test_the_gallery_shows_every_figure():
 
 
 def test_names_and_looks_tell_methods_apart():
-    """The same looks whatever methods from files are there, which are brown."""
+    """The same looks whatever methods from files are there, whose colour no other method has."""
     assert len({title_of(method) for method in KNOWN}) == len(KNOWN)
-    fixed = [method for method, known in KNOWN_METHODS.items() if known.look]
     alone, both = (
         study_of([row(method, -300, task="ascending") for method in methods]).methods.look
         for methods in ([*KNOWN_METHODS], ["mine", *KNOWN_METHODS, "theirs"])
     )
-    assert len({*alone[fixed]}) == len(fixed)
-    assert both[[*KNOWN_METHODS]].equals(alone)
-    brown = {color for color, _ in both[["mine", "theirs"]]}
-    assert brown == {"brown"}
-    assert not brown & {color for color, _ in alone}
-    assert both["mine"] != both["theirs"]
+    single = [label for label in both.index if not label.startswith("dual-process (")]
+    assert len({*both[single]}) == len(single)
+    assert both[[*alone.index]].equals(alone)
+    own = {color for color, _ in both[["mine", "theirs"]]}
+    assert len(own) == 1
+    assert not own & {color for color, _ in alone}
+
+
+def lightness(color, seen):
+    """L* of CIELAB of a colour ``#rrggbb`` as somebody sees it."""
+    parts = np.array([int(color[place : place + 2], 16) / 255 for place in (1, 3, 5)])
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    y = np.clip(seen @ linear, 0, 1) @ [0.2126, 0.7152, 0.0722]
+    return 116 * np.cbrt(y) - 16 if y > 0.008856 else 903.3 * y
+
+
+# Machado, Oliveira & Fernandes (2009), IEEE TVCG 15, table 1, severity 1.0, of linear RGB.
+SEEN = {
+    "full colour": np.eye(3),
+    "protanopia": np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                            [-0.003882, -0.048116, 1.051998]]),
+    "deuteranopia": np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                              [-0.011820, 0.042940, 0.968881]]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("seen", SEEN)
+def test_methods_that_a_sentence_compares_differ_in_lightness_and_mark(seen, shipped):
+    own = study_of([row("mine", -300, task="ascending")]).methods.look["mine"]
+    titles, looks = shipped.methods.title, shipped.methods.look
+    css = (ROOT / "analysis" / "report" / "page.css").read_text("utf-8").partition("(prefers-")[2]
+    dark = dict(re.findall(r"--(\w+): (#\w{6})", css))
+    compared = 0
+    for section in SECTIONS:
+        for words in finding(shipped, section):
+            named, words = [own], words.replace("from the corrective process alone", "")
+            for label in titles.sort_values(key=lambda each: -each.str.len(), kind="stable").index:
+                if titles[label] in words:
+                    words = words.replace(titles[label], "")
+                    named.append(looks[label])
+            for one, other in itertools.combinations(named, 2):
+                assert one[0] != other[0]
+                assert one[1] != other[1]
+                for colors in (COLORS, dark):
+                    pair = (lightness(colors[name], SEEN[seen]) for name, _ in (one, other))
+                    assert abs(np.subtract(*pair)) >= 10, (words, one, other)
+                compared += 1
+    assert compared > 10
 
 
 def test_a_picture_leaves_its_figure_as_it_was_and_has_no_date(monkeypatch):

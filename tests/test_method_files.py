@@ -2,6 +2,7 @@
 
 import re
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
-from coartic.benchmarks.registry import registry
+from coartic.benchmarks.registry import built_in, registry
 from tests.support.suites import ROOT
 
 METHOD = ROOT / "tests" / "methods" / "nearest_hand.py"
@@ -35,6 +36,19 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     code, _, error = coartic(*again)
     assert code == 2
     assert "unknown method 'nearest-hand': pass --method-file" in error
+
+
+def test_what_a_method_was_tuned_on_is_listed_and_changes_no_run(coartic, tmp_path):
+    assert all(info.tuned_on for info in built_in().values())
+    assert "Tuned on     the paper's tasks: twenty settings" in coartic("list", "cma-es/bandit")[1]
+    for text, said in (('tuned_on = "mine-0 to mine-9"', "mine-0 to mine-9"), ("", "not said")):
+        file = tmp_path / "nearest_hand.py"
+        file.write_text(
+            TEXT.replace("    stochastic = False\n", f"    stochastic = False\n    {text}\n")
+        )
+        assert f"Tuned on     {said}\n" in coartic("list", "nearest-hand", "--method-file", file)[1]
+    declared = built_in()["cma-es/bandit"]
+    assert replace(declared, tuned_on="other tasks") == declared
 
 
 FILES = {

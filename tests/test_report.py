@@ -163,6 +163,10 @@ def test_a_report_of_one_run_without_a_learner_stays_with_its_results(traced, tm
     files, _ = write_report(one, tmp_path / "report")
     assert {"report.html", "tables/ranking.tex"} <= {*files}
     assert any(name.endswith(".pdf") for name in files)
+    write_report(one, tmp_path / "report", width=3.4)
+    drawn = [file.read_text("utf-8") for file in (tmp_path / "report" / "figures").glob("*.svg")]
+    assert drawn
+    assert all('width="244.8pt"' in text for text in drawn)
     with pytest.raises(CoarticError, match="report holds the report of other results"):
         write_report(traced, tmp_path / "report")
     write_report(one, tmp_path / "report", for_paper=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import io
 import re
+import textwrap
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -21,6 +22,8 @@ from matplotlib.figure import Figure
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
+from coartic.analysis.methods import COLORS
+from coartic.analysis.standings import compared, shown_name
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
@@ -30,6 +33,7 @@ from coartic.internal.text import one_line
 from coartic.internal.threads import environment
 
 FORMATS = (".svg", ".pdf", ".png")
+_LONGEST_NAME = 48  # letters of a line with a name; half of it in a narrow figure
 _NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # whatever the user has there: no date is written
 
 
@@ -114,6 +118,16 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     return {label: style.look_of(rows.look[label], from_file[label]) for label in rows.index}
 
 
+def name_in_figure(study: Study, method: str) -> str:
+    """Return the name of a method, given by label, in the figure that is being drawn: as
+    :func:`.shown_name`, in a narrow figure with its short name; a long name on several lines."""
+    title, longest = study.methods.title[method], _LONGEST_NAME
+    name = shown_name(study, method) if method in compared(study) else title
+    if style.is_narrow():
+        name, longest = name.replace(title, study.methods.short[method]), longest // 2
+    return "\n".join(textwrap.wrap(name, longest))
+
+
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
     """Return the rows in words, for an alternative text. Names in ``{}`` of the template are
     columns, ``{title}`` is the title of the method whose label is in column ``method``."""
@@ -156,9 +170,9 @@ def for_page(plot: Plot) -> str:
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
-    one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
-    :func:`~.style.tip` show its text. Ids begin with the plot's id, so that several figures can
-    share a page. Every ``style`` attribute becomes a class, named by a hash of the style.
+    one, its grey is ``--grey``, its blue ``--blue``, and colours of methods have their names. Marks
+    with a :func:`~.style.tip` show its text. Ids begin with the plot's id, so that several figures
+    can share a page. Every ``style`` attribute becomes a class, named by a hash of the style.
     """
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point
@@ -175,7 +189,8 @@ def for_page(plot: Plot) -> str:
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
     # The backend leaves black fills out: they inherit the root's.
     text = text.replace(style.INK, "currentColor").replace(style.BACKGROUND, "var(--paper, none)")
-    for color, name in ((style.GREY, "grey"), (style.BLUE, "blue"), (style.SKY, "sky")):
+    names = {"grey": style.GREY, "blue": style.BLUE, **COLORS}
+    for name, color in names.items():
         text = text.replace(color, f"var(--{name}, {color})")
     head, body = text.split(">", 1)
     view = re.search(r'viewBox="[^"]*"', head)

@@ -1,7 +1,7 @@
 """Style of all figures: sizes, colours and marks.
 
 Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on white.
-All colours are legible on white and on #111. Dashes distinguish the same lines as colours.
+Methods have colours of their own (:data:`.COLORS`); marks and dashes distinguish the same lines.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
+from coartic.analysis.methods import COLORS, MARKS
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -35,51 +36,37 @@ TALLEST = 225 / INCH
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Matplotlib's settings of all figures."""
-LEAST_PANEL = 2.2
-"""Least width of a panel next to another one in a figure of chosen width, inches."""
+LEAST_PANEL, LEAST_SMALL_PANEL = 2.2, 1.6
+"""Least widths of a panel next to another one in a figure of chosen width, inches: a panel with
+names next to it, and one without."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
 BACKGROUND = "#ffffff"
 TIP = "tip:"
 """Beginning of the id of a mark with a :func:`tip`."""
-_COLORS = {
-    "blue": "#0072b2",
-    "sky": "#56b4e9",
-    "green": "#009e73",
-    "orange": "#e69f00",
-    "vermillion": "#d55e00",
-    "purple": "#cc79a7",
-    "grey": "#7a7a7a",
-    "ink": "#000000",
-    "brown": "#8c564b",
-}
-BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK, _ = _COLORS.values()
+BLUE, SKY, GREEN, ORANGE = "#0072b2", "#56b4e9", "#009e73", "#e69f00"
+VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#7a7a7a", COLORS["ink"]
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
-_DASHES: dict[str, Any] = {
-    "solid": "-",
-    "dashed": (0, (4, 1.5)),
-    "dotted": (0, (1, 1.2)),
-    "dash-dotted": (0, (5, 1.2, 1, 1.2)),
-    "long-dashed": (0, (9, 1.5)),
-}
-OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": _DASHES["dotted"]}
-INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": _DASHES["dash-dotted"]}
+OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": (0, (1, 1.2))}
+INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.2))}
 """Looks of the lines at the optimum, and at the reward of the corrective process alone."""
 styled = style.context(["default", RC])
 """Decorator that draws in this style on Matplotlib's defaults, without the user's settings."""
 
 
 Look = dict[str, Any]
-"""Look of a method's lines and marks: ``color``, ``linestyle``, ``linewidth``, ``markersize``."""
+"""Look of a method's lines and marks: arguments of Matplotlib's ``plot``."""
 
 
 def look_of(names: tuple[str, str], bold: bool) -> Look:
-    """Return the look of lines and marks by ``names``, of a colour and of a dash; ``bold``: with a
-    wider line and larger marks."""
-    color, dash = names
+    """Return the look of lines and marks by ``names``, of :data:`.COLORS` and of
+    :data:`.MARKS`; ``bold``: with a wider line and larger marks."""
+    marker, dash = MARKS[names[1]]
+    look: Look = {"color": COLORS[names[0]], "marker": marker, "linestyle": dash}
+    look |= {"markevery": 0.2, "markeredgewidth": 0}  # a mark at every fifth of the diagonal
     sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
-    return {"color": _COLORS[color], "linestyle": _DASHES[dash], **sizes}
+    return look | sizes
 
 
 def grid(panels: int) -> tuple[int, int]:
@@ -107,7 +94,11 @@ def is_narrow() -> bool:
 
 
 def panels(
-    shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
+    shape: tuple[int, int],
+    size: tuple[float, float],
+    used: int | None = None,
+    least: float = LEAST_PANEL,
+    **subplots: Any,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with panels. In a block of :func:`drawn_at` the figure has the width chosen
     there, and, if panels would be too narrow, fewer panels side by side and a larger height.
@@ -122,6 +113,8 @@ def panels(
     used : int, optional
         Number of panels used, the first ones, by default all. Further panels stay empty; in a block
         of :func:`drawn_at` there are none, except empty ones that fill the last row.
+    least : float
+        Least width of a panel next to another one in a figure of chosen width, inches.
     **subplots
         Arguments of Matplotlib's ``Figure.subplots``, such as ``sharey=True``.
 
@@ -132,7 +125,7 @@ def panels(
     """
     used = used or shape[0] * shape[1]
     if (width := _width.get()) is not None:
-        columns = min(shape[1], max(1, int(width // LEAST_PANEL)))
+        columns = min(shape[1], max(1, int(width // least)))
         rows = -(-used // columns)
         shape, size = (rows, columns), (width, size[1] * rows / shape[0])
     figure = Figure(figsize=size, layout="constrained")
@@ -152,8 +145,13 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
     """Draw a legend of ``columns`` columns, or fewer if the figure is narrow, below all panels; for
     more than two lines of entries the figure becomes taller."""
-    widest = 0.45 + 0.06 * max(len(str(handle.get_label())) for handle in handles)  # inches
-    columns = min(columns, max(1, int(figure.get_figwidth() // widest)))
+    widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
+    while columns > 1:
+        lines = -(-len(handles) // columns)
+        by_column = [widths[at : at + lines] for at in range(0, len(widths), lines)]
+        if sum(map(max, by_column)) <= figure.get_figwidth():
+            break
+        columns -= 1
     lines = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.15 * max(0, lines - 2))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
@@ -230,7 +228,8 @@ def log_axis(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def letters(panels: Iterable[Axes]) -> None:
-    """Name panels a, b, ... z before their titles; panels after the 26th stay as they are."""
+def letters(panels: Iterable[Axes], pad: float | None = None) -> None:
+    """Name panels a, b, ... z before their titles, ``pad`` points above the axes; panels after the
+    26th stay as they are."""
     for letter, axes in zip(ascii_lowercase, panels, strict=False):
-        axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left")
+        axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left", pad=pad)

@@ -41,15 +41,17 @@ def write_report(
     folder: Path,
     *,
     for_paper: bool = True,
+    width: float | None = None,
     watch: Callable[[str], object] = str,
 ) -> tuple[list[str], dict[str, str]]:
     """Write a report into ``folder``, in the place of an earlier report.
 
-    ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF. ``watch`` is called with
-    the title of each section before it is made, and again with ``TITLE, for print`` before its
-    files of figures. Returns the paths of the files below ``folder``, and the errors of parts that
-    could not be made, by the name of the part. Raises CoarticError if the folder holds the results
-    themselves, the report of other results, or other files.
+    ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF, of this ``width``,
+    inches; None: as wide as on the page. ``watch`` is called with the title of each section before
+    it is made, and again with ``TITLE, for print`` before its files of figures. Returns the paths
+    of the files below ``folder``, and the errors of parts that could not be made, by the name of
+    the part. Raises CoarticError if the folder holds the results themselves, the report of other
+    results, or other files.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
@@ -58,11 +60,15 @@ def write_report(
         )
     make_folder(folder, ["report.html"])
     with lock(folder, command="coartic report"):
-        return _write_locked(study, folder, for_paper, watch)
+        return _write_locked(study, folder, for_paper, width, watch)
 
 
 def _write_locked(
-    study: Study, folder: Path, for_paper: bool, watch: Callable[[str], object]
+    study: Study,
+    folder: Path,
+    for_paper: bool,
+    width: float | None,
+    watch: Callable[[str], object],
 ) -> tuple[list[str], dict[str, str]]:
     """Write a report as :func:`write_report` does into a folder that this process has locked."""
     home, report = os.path.relpath(study.folder, folder), folder / "report.html"
@@ -83,7 +89,9 @@ def _write_locked(
         files |= made or {}
     for section in about.visible_sections(study) if for_paper else ():
         watch(f"{section.title}, for print")
-        files |= about.attempt(failures, section.title, _files_of_figures, study, section) or {}
+        files |= (
+            about.attempt(failures, section.title, _files_of_figures, study, section, width) or {}
+        )
     publish(folder, files)
     return list(files), failures
 
@@ -103,10 +111,11 @@ def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, by
     return files
 
 
-def _files_of_figures(study: Study, section: Section) -> dict[str, bytes]:
-    """Return the files of a section's figures, contents by path: SVG and PDF of each."""
+def _files_of_figures(study: Study, section: Section, width: float | None) -> dict[str, bytes]:
+    """Return the files of a section's figures of a width, inches, contents by path: SVG and PDF of
+    each; None: as wide as on the page."""
     files = {}
-    for plot in _plots_of(study, section):
+    for plot in _plots_of(study, section, width):
         for ending in (".svg", ".pdf"):
             files[f"figures/{plot.id}{ending}"] = picture(plot.figure, ending)
             plot.figure.set_layout_engine("none")  # the next is laid out alike
@@ -114,9 +123,10 @@ def _files_of_figures(study: Study, section: Section) -> dict[str, bytes]:
 
 
 @cached
-def _plots_of(study: Study, section: Section) -> list[Plot]:
-    """Return the figures of a section for which the folder has runs."""
-    return [plot for draw in section.figures if (plot := draw(study)) is not None]
+def _plots_of(study: Study, section: Section, width: float | None = None) -> list[Plot]:
+    """Return the figures of a section for which the folder has runs, of a width, inches."""
+    drawn = (draw(study, width=width) for draw in section.figures)
+    return [plot for plot in drawn if plot is not None]
 
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:

@@ -76,9 +76,9 @@
     target.scrollIntoView({ block: "center", inline: "start" });
   };
   window.addEventListener("hashchange", reveal);
-  /* Figures and short tables are printed, folded or not. */
+  /* Figures, and short tables that are not too wide for paper, are printed, folded or not. */
   window.addEventListener("beforeprint", () => document.querySelectorAll("details.folded").forEach((each) => {
-    each.open ||= each.querySelector("figure") || each.querySelectorAll("tr").length <= 11;
+    each.open ||= each.querySelector("figure") || [...each.querySelectorAll("table")].every(({ rows }) => rows.length <= 16 && rows[0].cells.length <= 14);
   }));
   reveal();
 })();

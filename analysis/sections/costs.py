@@ -13,7 +13,7 @@ import pandas as pd
 
 from coartic.analysis import standings
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, name_in_figure, spoken
 from coartic.analysis.method_frame import BY_TRIAL, headline_methods
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import Study, cached, load, solved
@@ -262,7 +262,9 @@ def draw_runtimes(study: Study) -> Parts | None:
     data = pd.concat(steps, ignore_index=True)
     looks = looks_in(study, data.method.unique())
     spends = [spend for spend in PANELS if (data.spend == spend).any()]
-    drawing, panels = style.panels((1, len(spends)), (style.TWO, 2.6), sharey=True)
+    drawing, panels = style.panels(
+        (1, len(spends)), (style.TWO, 1.9 if style.is_narrow() else 2.6), sharey=True
+    )
     for axes, spend in zip(panels, spends, strict=True):
         style.log_axis(axes)
         of_spend = data[data.spend == spend]
@@ -294,9 +296,9 @@ def draw_runtimes(study: Study) -> Parts | None:
     ends = ends.assign(share=100 * ends.share).sort_values("share")
     height = -math.inf
     for end in ends.to_dict("records"):
-        height = max(end["share"], height + 6.5)
+        height = max(end["share"], height + (9 if style.is_narrow() else 6.5))
         panels[-1].annotate(
-            standings.shown_name(study, end["method"]), (1, height), (4, 0), va="center",
+            name_in_figure(study, end["method"]), (1, height), (4, 0), va="center",
             color=looks[end["method"]]["color"], xycoords=panels[-1].get_yaxis_transform(),
             textcoords="offset points", annotation_clip=False,
             weight="normal" if study.methods.built_in[end["method"]] else "bold",

@@ -11,9 +11,9 @@ import pandas as pd
 
 from coartic.analysis import standings
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, name_in_figure, spoken
 from coartic.analysis.method_frame import headline_methods
-from coartic.analysis.methods import EC1, LEARNERS
+from coartic.analysis.methods import EC1, LEARNERS, title_of
 from coartic.analysis.sections.costs import best_after, improvements
 from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Rows, row_of_cell, table
@@ -65,7 +65,9 @@ def draw_learning_curves(study: Study) -> Parts | None:
     labels = [label for label in study.methods.index if label in {*data.method}]
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
-    drawing, panels = style.panels((rows, columns), size, len(tasks))
+    if style.is_narrow():
+        size = style.ONE, 1.4 * rows + 0.4
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
     looks = looks_in(study, labels)
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
         of_task = data[data.task == task.name]
@@ -87,13 +89,15 @@ def draw_learning_curves(study: Study) -> Parts | None:
         style.log_axis(axes)
         axes.set_xlim(1, max(2, of_task.trial.max()))
         axes.set_title(marked(task))
-        axes.set_ylabel("reward (ticks)")
+        axes.set_ylabel("" if place % columns and style.is_narrow() else "reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.legend_line(study.methods.title[label], **look) for label, look in looks.items()
+        style.legend_line(name_in_figure(study, label), **look) for label, look in looks.items()
     ]
-    handles += [style.legend_line("corrective process alone, best hands", **style.INITIAL)]
+    if any(study.corrective_best[task.name] == study.corrective_best[task.name] for task in tasks):
+        name = title_of("corrective-alone/best-hands", short=style.is_narrow())
+        handles.append(style.legend_line(name, **style.INITIAL))
     if known := [task.name for task in tasks if task.name in study.optima]:
         handles.append(style.legend_line(standings.reference(study, known), **style.OPTIMUM))
     style.legend(drawing, handles, min(len(handles), 4))

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, name_in_figure, spoken
 from coartic.analysis.method_frame import without_settings
 from coartic.analysis.standings import compared, solved_tasks, together
 from coartic.analysis.statistics.instances import Scores, other_tasks
@@ -135,7 +135,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])
-    style.name_rows(panels[0], [*methods.title[order]])
+    style.name_rows(panels[0], [name_in_figure(study, label) for label in order])
     for label, method in zip(panels[0].get_yticklabels(), order, strict=True):
         label.set_fontweight("normal" if methods.built_in[method] else "bold")
     panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")

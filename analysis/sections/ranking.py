@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, name_in_figure, spoken
 from coartic.analysis.frames import ranking
 from coartic.analysis.method_frame import GROUPS, without_settings
 from coartic.analysis.methods import EC1, EC4
@@ -35,8 +35,6 @@ from coartic.estimates import FEWER_RESAMPLES, LEVEL, Estimate, mean_of_means
 from coartic.internal.text import counted
 from coartic.robot import Array
 
-_LONGEST_NAME = 44
-"""Most letters of a name in the figure."""
 _EARLY = 1_000
 """Number of trials after which the ranking has a further gap, ``gap_early``."""
 
@@ -218,12 +216,17 @@ def draw_ranking(study: Study) -> Parts | None:
     lines: list[Any] = []  # headings of groups, and rows
     for group in [group for group in GROUPS if group in by_group.groups]:
         lines += [capital(group), *by_group.get_group(group).to_dict("records")]
-    drawing, (axes,) = style.panels((1, 1), (style.TWO, 0.6 + 0.165 * len(lines)))
+    narrow = style.is_narrow()
+    names = [line if isinstance(line, str) else name_in_figure(study, line["method"])
+             for line in lines]  # fmt: skip
+    deep = max(name.count("\n") for name in names)
+    height = (0.145 if narrow else 0.165) + 0.1 * deep  # inches of a line
+    drawing, (axes,) = style.panels((1, 1), (style.TWO, 0.6 + height * len(lines)))
     gaps = shown[["gap", "gap_low", "gap_high"]]
     nearest, farthest = gaps.min().min(), max(gaps.max().max(), 0.5)
     left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
-    steps = (1, 2, 5) if farthest < 100 else (1,)
+    steps = (1, 2, 5) if farthest < 100 and not narrow else (1,)
     ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in steps)]
     ticks = [tick for tick in ticks if left <= tick <= 1.1 * farthest]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -231,7 +234,9 @@ def draw_ranking(study: Study) -> Parts | None:
     axes.set_xlim(left, 1.1 * farthest)
     axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
     axes.axvline(0, **style.OPTIMUM)
-    style.name_rows(axes, [name_in_figure(study, line) for line in lines])
+    # In a narrow figure headings, which are longer than names, stand on the right.
+    style.name_rows(axes, [name * (isinstance(line, dict) or not narrow)
+                           for name, line in zip(names, lines, strict=True)])  # fmt: skip
     places: Any = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
     places |= {"va": "center_baseline"}
 
@@ -239,38 +244,29 @@ def draw_ranking(study: Study) -> Parts | None:
         axes.annotate(gap, (1, y), (8, 0), color=color, **places)
         axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **places)
 
-    if not style.is_narrow():
+    if not narrow:
         write_right(1, f"gap (%) [{style.COVERAGE}]", "n", style.GREY)
     for place, (row, label) in enumerate(zip(lines, axes.get_yticklabels(), strict=True)):
         if isinstance(row, str):
             label.set_color(style.GREY)
+            if narrow:
+                axes.annotate(row, (0, -place), (2, 0), color=style.GREY, **places)
             continue
         learner, y = row["is_learner"], -place
         size = looks[row["method"]]["markersize"] + learner  # a diamond of equal width is smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
         axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
-        mark = "D" if learner else "o"
+        mark = looks[row["method"]]["marker"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = shown_name(study, row["method"])
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
-        if not style.is_narrow():
+        if not narrow:
             write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)
-    where = "" if len(tasks) > 1 else f"{study.tasks[tasks[0]].label}: "
+    where = "" if len(tasks) > 1 else study.tasks[tasks[0]].label + (":\n" if narrow else ": ")
     short = to.removesuffix(" reward").replace("this ", "").replace("optimum", "the optimum")
     axes.set_xlabel(f"{where}gap to {short} (%)")
     alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
-
-
-def name_in_figure(study: Study, line: Any) -> str:
-    """Return the name left of a line of the ranking; of a name with more than 44 letters (22 in a
-    narrow figure) the middle becomes ``…``. ``line`` is a heading, a text that is its own name, or
-    the dictionary of a row, whose ``method`` is a label; the name is then the method's title."""
-    name = line if isinstance(line, str) else shown_name(study, line["method"])
-    longest = _LONGEST_NAME // 2 if style.is_narrow() else _LONGEST_NAME
-    if len(name) > longest:  # its end may say on how many tasks
-        name = f"{name[: longest // 2]}…{name[1 - longest // 2 :]}"
-    return name

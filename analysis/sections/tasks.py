@@ -84,9 +84,11 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
     size = style.ONE if size[0] <= style.ONE else style.TWO, size[1]  # one column, or two
-    drawing, panels = style.panels((rows, columns), size, len(tasks))
+    if style.is_narrow():
+        size = style.ONE, size[1] * style.ONE / size[0] + 0.45 * rows
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
     drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge
-    for axes, task, corners in zip(panels, tasks, boxes, strict=True):
+    for place, (axes, task, corners) in enumerate(zip(panels, tasks, boxes, strict=True)):
         draw_robot(axes, task, task.q0)
         if len(task.hands) > 1:  # what shows of an arm under the other one
             left = task.robot.joint_positions(task.q0, "left").T
@@ -95,15 +97,18 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
         number_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
-        fits = int(13 * drawing.get_figwidth() / columns)  # letters
-        axes.set_title("\n".join([*textwrap.wrap(task.label, fits), "; ".join(remarks)]).strip())
+        fits = int(14 * drawing.get_figwidth() / columns)  # letters
+        title = [*textwrap.wrap(task.label, fits), *textwrap.wrap("; ".join(remarks), fits)]
+        axes.set_title("\n".join(title))
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)
         axes.set_aspect("equal")
-        axes.set_xlabel("x (length unit)")
+        if not style.is_narrow() or place + columns >= len(tasks):
+            axes.set_xlabel("x (length unit)")
         axes.set_ylabel("y (length unit)")
-    style.letters(panels if len(tasks) > 1 else ())
+    room = 12 if style.is_narrow() else None  # numbers of goals stand in between
+    style.letters(panels if len(tasks) > 1 else (), pad=room)
     hands = {hand for task in tasks for hand in task.hands}
     arms = [
         style.legend_line(f"{hand} arm", color=style.INK, linewidth=0.9, **look)

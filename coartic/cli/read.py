@@ -32,8 +32,14 @@ def report(
     for_paper: Annotated[
         bool, typer.Option("--for-paper", help="Also figures as SVG and PDF, and tables as LaTeX.")
     ] = False,
+    width: Annotated[
+        float | None,
+        given.within("--width", "Width of these figures, inches: 3.4 for one column.", 2.5, 20),
+    ] = None,
 ) -> None:
     """Write the report of a results folder."""
+    if width is not None and not for_paper:
+        raise CoarticError("--width has no effect without --for-paper")
     out = folder / "report" if out is None else out
     from coartic.analysis.report.build import write_report
     from coartic.analysis.study import load
@@ -41,7 +47,7 @@ def report(
     started = time.monotonic()
     study = load(folder)
     with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
-        files, failures = write_report(study, out, for_paper=for_paper, watch=say_part)
+        files, failures = write_report(study, out, for_paper=for_paper, width=width, watch=say_part)
     say_part("")
     made, what = Counter(Path(name).suffix for name in files), "CSV"
     if for_paper:

@@ -252,6 +252,7 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     yield "Parameters", in_words(info.defaults) or "none"
     yield "Tasks", ", ".join(applies) or "none of the four"
     yield "Runs", "differ by seed" if info.stochastic else "are all the same"
+    yield "Tuned on", info.tuned_on or "not said"
     yield "Cites", info.citation or "nothing"
 
 

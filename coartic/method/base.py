@@ -85,6 +85,9 @@ class Method(ABC):
     information: ClassVar[frozenset[Information]]
     secondary: ClassVar[tuple[str, ...]] = ()
     """Objectives beyond hitting the goals, such as smoothness, in words."""
+    tuned_on: ClassVar[str] = ""
+    """Tasks on which its parameters were chosen, and among how many; empty: not said. Readers judge
+    by it whether its results are of new tasks; runs are not known by it."""
     stochastic: ClassVar[bool] = True
     """True if the seed matters; other methods are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters

@@ -71,6 +71,8 @@ class MethodInfo:
     code: str
     """Versions of model and method, such as ``1.2``; for a method file, the hash of what its
     results come from (:mod:`coartic.benchmarks.own_code`)."""
+    tuned_on: str = field(default="", compare=False)
+    """Tasks on which its parameters were chosen; not stored."""
     where: str = field(default="", compare=False)
     """Module or method file that a worker imports; not stored."""
 
@@ -182,6 +184,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
         defaults=_defaults(method),
         origin=origin,
         code=code,
+        tuned_on=method.tuned_on,
         where=where,
     )
 

@@ -127,7 +127,7 @@ def spread_p(values, published, runs, *, of_mean=False):
 def draw_rewards(rewards):
     """Draw the differences of :func:`compare_rewards`, with intervals and margins."""
     shown = rewards[rewards.published.notna() & (rewards.several | rewards.hands.isna())]
-    figure, (axes,) = figures.panels((1, 1), (figures.ONE, 0.85 + 0.185 * len(shown)))
+    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 0.85 + 0.185 * len(shown)))
     names = []
     for y, row in zip(range(0, -len(shown), -1), shown.itertuples(), strict=True):
         name = f"{row.task}, {row.condition}{'*' * bool(row.pooled)}"

@@ -10,6 +10,7 @@ into this folder. Without folders: figures and page, of the stored tables.
 """
 
 import argparse
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -21,6 +22,9 @@ from solutions import draw_solutions, measure_solutions
 from coartic.analysis import figures, fill_page, load
 
 HERE = Path(__file__).parent
+STYLE = HERE.parents[1] / "analysis" / "report" / "page.css"
+VERDICTS = "not supported", "depends on the goals", "undecided", "supported"
+"""Verdicts in the order of the page: failures first."""
 
 
 def measure(folders):
@@ -49,9 +53,15 @@ def with_stored(claims):
     return pd.concat([claims.drop(lacking), stored]).reindex(CLAIMS.index)
 
 
+def rank(verdicts):
+    """Return the places of a column of verdicts in :data:`VERDICTS`."""
+    return verdicts.map(VERDICTS.index)
+
+
 def write(out):
     """Draw the figures and fill in the page from the tables in a folder: README.md here, page.html
-    with the evidence of each claim elsewhere."""
+    with the evidence of each claim elsewhere, whose links to the project are names of its files:
+    the folder may be moved."""
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in out.glob("*.csv")}
     for name, draw in (("rewards", draw_rewards), ("solutions", draw_solutions)):
         (out / f"{name}.svg").write_bytes(figures.picture(draw(stored[name]), ".svg"))
@@ -59,9 +69,13 @@ def write(out):
         text = fill_page(HERE / "README.md.jinja", **stored)
         (out / "README.md").write_text(text, encoding="utf-8")
     else:
-        text = fill_page(HERE / "page.md.jinja", **stored)
+        text = fill_page(HERE / "page.md.jinja", rank=rank, **stored)
+        text = re.sub(r"\[([^]]+)\]\(\.\./\.\./([^)#]+)[^)]*\)", r"\1 (`\2`)", text)
         body = MarkdownIt("commonmark", {"html": True}).enable("table").render(text)
-        page = (HERE / "page.html").read_text("utf-8").replace("{{ body }}", body)
+        body = body.replace("<table>", '<div class="scroll"><table>')
+        body = body.replace("</table>", "</table></div>")
+        page, style = (HERE / "page.html").read_text("utf-8"), STYLE.read_text("utf-8")
+        page = page.replace("{{ style }}", style).replace("{{ body }}", body)
         (out / "page.html").write_text(page, encoding="utf-8")
 
 
