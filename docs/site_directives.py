@@ -134,7 +134,7 @@ def tuned() -> Iterator[str]:
     names: dict[str, list[str]] = {}
     for name, info in built_in().items():
         names.setdefault(info.tuned_on, []).append(title_of(name))
-    yield from (f"- {'; '.join(each)}: **{text}**" for text, each in names.items())
+    yield from (f"- {', '.join(each)}: **{text}**" for text, each in names.items())
     yield ""
 
 
