@@ -177,9 +177,9 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 def _scored_runs(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the frame of :func:`scored`. Raises CoarticError also for two rows of a run."""
-    found = scored(frame)
-    _refuse_rows(found, "method", found.duplicated("key"), f"{_TWICE}; needed is a row for a run")
-    return found
+    runs = scored(frame)
+    _refuse_rows(runs, "method", runs.duplicated("key"), f"{_TWICE}; needed is a row for a run")
+    return runs
 
 
 def gaps(frame: pd.DataFrame) -> pd.Series:
@@ -363,15 +363,16 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each method, the smallest gap first: ``gap``, the mean over tasks of the mean over
-        runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
-        (stratified bootstrap, NaN with fewer than three runs on a task); the numbers of ``tasks``
-        that it solved in every run, of ``missing`` tasks (other tasks with a best known reward), of
-        ``runs`` and of ``failed`` runs on all tasks. A method with missing tasks has no gap and is
-        last. The paper's learner over tasks for one arm and for two has a row of its own,
-        ``"dual-process (EC1, EC4)"``. With ``corrective_best`` also the ``share`` of the possible
-        gain (:func:`shares`) with ``share_low`` and ``share_high``, a mean over the tasks on which
-        something can be gained, and ``without_gain``, the number of other tasks.
+        A row for each method, the smallest gap first: ``gap``, the mean over the compared tasks
+        (:func:`compared_tasks`: those that most methods share) of the mean over runs, with its 95 %
+        interval ``gap_low`` to ``gap_high`` for other runs on the same tasks (stratified bootstrap,
+        NaN with fewer than three runs on a task); the numbers of compared ``tasks`` that it solved
+        in every run, of ``missing`` tasks (other compared tasks), of ``runs`` and of ``failed``
+        runs on all tasks. A method with missing tasks has no gap and is last. The paper's learner
+        over tasks for one arm and for two has a row of its own, ``"dual-process (EC1, EC4)"``. With
+        ``corrective_best`` also the ``share`` of the possible gain (:func:`shares`) with
+        ``share_low`` and ``share_high``, a mean over the tasks on which something can be gained,
+        and ``without_gain``, the number of other tasks.
 
     Raises
     ------

@@ -186,11 +186,14 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
 
 
 def shown_name(study: Study, method: str) -> str:
-    """Return the title of a method with what sets its numbers apart from the others:
+    """Return the title of a method and, for a method of :func:`compared`, what sets its numbers
+    apart from those of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
     :func:`common_tasks`; ``mine (400 trials)`` for another number of trials than
     :func:`equal_trials`, where its setting does not say it."""
     row, trials = study.methods.loc[method], trials_of(study)[method]
+    if method not in compared(study):
+        return str(row.title)
     apart = [] if row.built_in else [_on_tasks(study, method)]
     if trials != equal_trials(study) and "trials=" not in row.setting:
         apart.append(f"{number(trials)} trials")

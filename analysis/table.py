@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.standings import common_tasks, compared, shown_name
+from coartic.analysis.standings import common_tasks, shown_name
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
@@ -145,8 +145,7 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     words.
     """
     methods, tasks = study.methods, study.tasks
-    names = {label: shown_name(study, label) if label in compared(study) else title
-             for label, title in methods.title.items()}  # fmt: skip
+    names = {label: shown_name(study, label) for label in methods.index}
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
     marks = {name: marked(task) for name, task in tasks.items()}
     return {

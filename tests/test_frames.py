@@ -211,6 +211,22 @@ def test_a_task_that_a_method_lacks_is_not_reached():
         frames.ecdf(unknown.assign(best_known=np.nan), [0.05])
 
 
+def test_one_more_task_of_one_method_changes_no_other_gap():
+    """Three methods share two tasks; one of them ran on a third."""
+    rewards = {"a": [-110, -120, -100], "b": [-105, -130], "c": [-101, -102]}
+    frame = pd.DataFrame(
+        {"method": method, "task": task, "reward": reward, "best_known": -100}
+        for method, of_method in rewards.items()
+        for task, reward in zip("xyz", of_method, strict=False)
+    )
+    ranked = frames.ranking(frame)
+    assert ranked.gap.to_dict() == pytest.approx({"c": 0.015, "a": 0.15, "b": 0.175})
+    assert ranked.index.tolist() == ["c", "a", "b"]
+    assert (ranked.tasks == 2).all()
+    assert (ranked.missing == 0).all()
+    assert ranked.runs.to_dict() == {"a": 3, "b": 2, "c": 2}
+
+
 def test_verdicts_of_planted_means(monkeypatch):
     monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
     rng = np.random.default_rng(2)

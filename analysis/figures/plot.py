@@ -23,7 +23,7 @@ from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.methods import COLORS
-from coartic.analysis.standings import compared, shown_name
+from coartic.analysis.standings import shown_name
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
@@ -122,7 +122,7 @@ def name_in_figure(study: Study, method: str) -> str:
     """Return the name of a method, given by label, in the figure that is being drawn: as
     :func:`.shown_name`, in a narrow figure with its short name; a long name on several lines."""
     title, longest = study.methods.title[method], _LONGEST_NAME
-    name = shown_name(study, method) if method in compared(study) else title
+    name = shown_name(study, method)
     if style.is_narrow():
         name, longest = name.replace(title, study.methods.short[method]), longest // 2
     return "\n".join(textwrap.wrap(name, longest))
@@ -130,8 +130,9 @@ def name_in_figure(study: Study, method: str) -> str:
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
     """Return the rows in words, for an alternative text. Names in ``{}`` of the template are
-    columns, ``{title}`` is the title of the method whose label is in column ``method``."""
-    rows = rows.assign(title=rows.method.map(study.methods.title))
+    columns, ``{title}`` is the name (:func:`.shown_name`) of the method whose label is in column
+    ``method``."""
+    rows = rows.assign(title=[shown_name(study, method) for method in rows.method])
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 

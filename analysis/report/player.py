@@ -12,7 +12,7 @@ from typing import Any
 
 from coartic.analysis.control import contexts_of_control
 from coartic.analysis.sections.coarticulation import shared_goal
-from coartic.analysis.standings import cells_of, compared, own_methods
+from coartic.analysis.standings import cells_of, compared, own_methods, shown_name
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, solved, typical_run
 from coartic.analysis.table import SHORT_ID
 from coartic.play.page import player_figure, preset_of
@@ -86,7 +86,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
                     film["reached"] = study.configurations(name, label)[:, 0].round(3).tolist()
-            runs.append({"id": label, "name": study.methods.title[label], "films": films})
+            runs.append({"id": label, "name": shown_name(study, label), "films": films})
     return runs
 
 
