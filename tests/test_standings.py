@@ -17,6 +17,7 @@ from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import Study
 from coartic.analysis.words import number
+from coartic.cli.read import say_ranking
 from tests.support.golden import golden
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
@@ -216,6 +217,14 @@ def with_trials(seen, by_method, suite_trials=None):
     return MadeUp(Study(seen.folder, plan, seen.made_with, seen.runs), **parts)
 
 
+SIXTEEN = [
+    "cma-es/bandit", "cma-es/goal-by-goal", "hill-climbing", "random-search",
+    "corrective-alone/given", "corrective-alone/best-hands", "posture-qp/goals-ahead",
+    "posture-qp/current-goal", "posture-based/two-goals", "posture-based/one-goal",
+    "nullspace-qp/next-goal-posture", "nullspace-qp/least-motion",
+    *(f"trajectory-optimisation/{each}" for each in ("path-length", "acceleration", "jerk")),
+    "trajectory-optimisation/hand-jerk",
+]  # fmt: skip
 BEST = {("ascending", "mine"): [-292] * 3, ("two-armed-1", "mine"): [-465] * 3}
 
 
@@ -263,6 +272,33 @@ def test_what_was_asked_for_has_a_row_below():
     assert board.index[-1] == "dual-process/EC4"
     (sentence,) = standings.not_ranked(seen, also)
     assert "is not ranked: 1 of 2 tasks; on it CMA-ES has" in sentence
+
+
+def test_the_terminal_prints_ten_methods_own_methods_and_what_was_named(capsys):
+    rewards = {
+        ("ascending", name): [-300 - n, -301 - n, -302 - n] for n, name in enumerate(SIXTEEN)
+    }
+    rewards |= {
+        ("two-armed-1", name): [-500 - n, -501 - n, -502 - n] for n, name in enumerate(SIXTEEN)
+    }
+    last = {("ascending", "mine"): [-319] * 3, ("two-armed-1", "mine"): [-600] * 3}
+    rows = [{**run, "commit": ""} for cell, of in (rewards | LEARNER | last).items()
+            for run in runs_of(*cell, of)]  # fmt: skip
+    optima = made_up_optima("ascending", "two-armed-1")
+    seen = study_of(rows, optima=optima)
+    titles = seen.methods.title
+
+    def printed(*asked):
+        say_ranking(seen, asked)
+        lines = capsys.readouterr().out.splitlines()
+        return [line.partition("  ")[0] for line in lines[1:] if re.search(r"  +\d+$", line)]
+
+    usual = printed()
+    assert len(usual) == 10  # nine of 17, and the method from a file
+    assert {"learner (EC1, EC4)", "random search", "mine"} < {*usual}
+    assert titles[SIXTEEN[-1]] not in usual
+    assert printed("dual-process/EC1", "dual-process/EC4") == usual
+    assert {*printed(SIXTEEN[-1])} == {*usual, titles[SIXTEEN[-1]]}
 
 
 def test_an_own_method_is_compared_on_the_tasks_that_it_solved():

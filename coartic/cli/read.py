@@ -69,11 +69,11 @@ def report(
 def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
     """Print a table, then pairs of a word and a text.
 
-    The table has at most ten methods of the ranking, without settings and ablations: those
-    with the smallest gaps and, wherever they rank, the learner and random search; and all methods
-    from files and of the labels ``asked``, also below the ranking. The pairs are the reasons why
-    these are not ranked, the findings on coarticulation and on cost, numbers of runs and trials
-    that are not those of the paper, the failed runs, and ``more``.
+    The table has at most ten methods of the ranking, without settings and ablations: those with the
+    smallest gaps and, wherever they rank, the learner and random search; and all methods from files
+    and of the labels ``asked`` that are in no joined row, also below the ranking. The pairs are the
+    reasons why these are not ranked, the findings on coarticulation and on cost, numbers of runs
+    and trials that are not those of the paper, the failed runs, and ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
@@ -82,7 +82,9 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     from coartic.analysis.words import interval, number
     from coartic.learner.learning import TRIALS
 
-    also = frozenset(asked)
+    in_order = board(study).query("ranked")
+    joined = {part for parts in in_order.parts if len(parts) > 1 for part in parts}
+    also = frozenset(asked) - joined  # which the row of both conditions has
     rows = without_settings(board(study, also)).reset_index(names="method")
     named = [row["method"] for row in leading(rows[rows.ranked])]
     first = rows.method[rows.ranked][: 12 - len(named)]

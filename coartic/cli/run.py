@@ -117,7 +117,7 @@ def run(
             **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
         )
         asked = plan(chosen, request, registered)
-        labels = {job.cell.label for job in asked}
+        labels = {job.cell.label for job in asked} if names else set[str]()
         if include:
             only = {job.cell.task.name for job in asked} if tasks else None
             asked = include_folders(asked, include, out, only)
