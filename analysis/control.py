@@ -12,7 +12,7 @@ compared with like:
 - as many trials;
 - all runs of both: a run that does not improve counts with what it shows, often 0.
 
-The test is the one-tailed bootstrap test of the difference of means over runs.
+The test is the one-tailed test of the difference of means over runs by exchange of labels.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ tasks that it solved ({{ group.tasks.iloc[0] }}): \
         "100 % the best known reward; tasks on which both are equal have none. Intervals describe "
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
-        "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
+        "by two-tailed tests, corrected for the tasks of the method (table "
         "against-learner). Empty: the runs are too few, or too alike, to tell. Ranked are methods "
         "that solved all tasks in at most as many trials as the others; own methods that did not "
         "stand below. What an own method uses is as its "
