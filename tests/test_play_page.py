@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import expect
 
 from coartic import CONDITIONS, Movement, Task, corrective_trial, execute, learn, load_task
 from coartic.analysis import solutions_of
@@ -345,14 +346,14 @@ def test_a_slider_leads_from_trial_and_error_to_planning(opened):
     page.get_by_label("Task").select_option("1")
     assert "drift=1" in settled(page).url
     choose(page, "planner")
-    assert not dial.is_visible()
+    expect(dial).to_be_hidden()
     for nonsense in ("x", "0.2"):
         changed_to(page, f"preset=2&others=&trials=50&drift={nonsense}")
         assert shown_condition(page) == CONDITIONS["EC1"]
         assert ticks(page, "The learner") == by_drift[0]
     changed_to(page, "preset=2&others=&drift=1")
     press(page, "Reset")
-    assert dial.input_value() == "0"
+    expect(dial).to_have_value("0")
 
 
 def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back(opened):
@@ -388,7 +389,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     distances = np.linalg.norm(places[:, None] - places, axis=2) + 10 * np.eye(11)
     assert distances.min() >= 1
     assert "reach" not in text(page, "finding")
-    assert task.inner_text() == "Up or down (changed)"
+    expect(task).to_have_text("Up or down (changed)")
     slide(page, "Tick", 400)
     for _ in range(5):
         press(page, "Remove a goal")
@@ -397,7 +398,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     assert "the robot hits goal 1." in text(page, "lead")
     assert text(page, "why") == "The only goal stays; it has no next goal."
     press(page, "Reset")
-    assert task.inner_text() == "Up or down"
+    expect(task).to_have_text("Up or down")
     assert "both robots" in text(page, "lead")
     # A link to this file is of use with the file.
     press(page, "Copy link")
@@ -413,9 +414,9 @@ def test_on_a_phone_picture_slider_and_finding_come_first(visited, address):
         for part in (".stage", "[data-is=trials]", "[data-is=finding]"):
             box = page.locator(part).bounding_box()
             assert box["y"] + box["height"] <= height
-    assert not page.get_by_label("Task").is_visible()
+    expect(page.get_by_label("Task")).to_be_hidden()
     page.get_by_text("Try more").click()
-    assert page.get_by_label("Task").is_visible()
+    expect(page.get_by_label("Task")).to_be_visible()
 
 
 def test_every_goal_is_seen_on_screen_and_in_print(opened):

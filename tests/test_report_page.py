@@ -4,6 +4,7 @@ import re
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import expect
 
 from coartic.analysis.sections import TABLES
 from coartic.analysis.sections.coarticulation import shared_goal
@@ -117,10 +118,10 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
     assert seen >= 8
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowUp")
-    assert page.get_by_role("radio", name="A learner").is_checked()
+    expect(page.get_by_role("radio", name="A learner")).to_be_checked()
     part(page, "play").press("Tab")
-    assert part(page, "stored").input_value() == ""
-    assert "The learner" in part(page, "score").inner_text()
+    expect(part(page, "stored")).to_have_value("")
+    expect(part(page, "score")).to_contain_text("The learner")
 
 
 def test_a_cell_of_the_ranking_opens_its_film_and_says_its_command(opened, traced):
@@ -129,14 +130,14 @@ def test_a_cell_of_the_ranking_opens_its_film_and_says_its_command(opened, trace
     assert cells.count() > 5
     row = page.locator("#table-ranking tr", has=page.get_by_title("row hill-climbing"))
     row.locator(".film-of").click()
-    assert part(page, "stored").input_value() == "hill-climbing"
-    assert part(page, "preset").locator("option:checked").text_content() == "Two-armed 1 †"
+    expect(part(page, "stored")).to_have_value("hill-climbing")
+    expect(part(page, "preset").locator("option:checked")).to_have_text("Two-armed 1 †")
     run = typical_run(solved(traced.cells["two-armed-1", "hill-climbing"]))
-    command = rf"coartic draw \S+ --run {run[:8]} --out film.gif"
-    assert re.fullmatch(command, part(page, "film").locator("code").inner_text())
+    command = re.compile(rf"^coartic draw \S+ --run {run[:8]} --out film.gif$")
+    expect(part(page, "film").locator("code")).to_have_text(command)  # with the next picture
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
-    assert not page.get_by_role("button", name="Copy link").is_visible()
+    expect(page.get_by_role("button", name="Copy link")).to_be_hidden()
 
 
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
