@@ -87,16 +87,18 @@ class Local:
         self.timeout_s = timeout_s
         self.verbose = verbose
 
-    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
+    def perform(
+        self, jobs: Sequence[Job], *, in_order: bool = False
+    ) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with its outcomes, in the order in which jobs finish; the outcomes of a
         job whose process ends are ``timeout`` or ``crashed``. A process performs jobs of one method
-        in order.
+        in order, with ``in_order`` all of them.
 
         Raises CoarticError if process after process ends before its first job, and if answers
         cannot be written.
         """
         with closing(Workers(self)) as workers:
-            yield from workers.perform(jobs)
+            yield from workers.perform(jobs, in_order=in_order)
 
 
 class Workers:
@@ -114,17 +116,21 @@ class Workers:
             self._idle.end()
         self.folder.cleanup()
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield each job with its outcomes, in the order in which jobs finish. Raises CoarticError
-        if process after process ends before its first job, and if answers cannot be written."""
+    def perform(
+        self, jobs: Sequence[Job], *, in_order: bool = False
+    ) -> Iterator[tuple[Job, list[Outcome]]]:
+        """Yield each job with its outcomes, in the order in which jobs finish; with ``in_order``
+        one worker has all jobs of a method. Raises CoarticError if process after process ends
+        before its first job, and if answers cannot be written."""
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.cell.method.key].append(job)
         most = self.local.workers
+        parts = 1 if in_order else most
         waiting = deque(
-            of_method[first::most]  # every part has runs of every cell
+            of_method[first::parts]  # every part has runs of every cell
             for of_method in by_method.values()
-            for first in range(min(most, len(of_method)))
+            for first in range(min(parts, len(of_method)))
         )
         workers, lost, repeated = list[Worker](), 0, set[int]()
         try:

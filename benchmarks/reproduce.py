@@ -21,6 +21,8 @@ from coartic.runs.plan import Job
 from coartic.runs.record import EARLIER, LATE, PARTS, Run, too_long
 from coartic.runs.store import open_store
 
+LONG_S = 60.0
+"""Wall time of a run, s, beyond which it is made again alone."""
 AFTER_ANOTHER = "with the same seed after another run"
 """Words of a doubt about a method whose results depend on its earlier runs (:func:`doubts_of`)."""
 
@@ -61,10 +63,14 @@ def trajectory_of(run: Run) -> Trajectory:
         raise CoarticError(f"run {run.id} cannot be shown: {error}") from None
 
 
-def perform_in_order(jobs: Sequence[Job], *, verbose: bool = False) -> Iterator[Run]:
-    """Perform jobs of one method in order in one new process; yield the scored runs, not stored."""
-    for job, outcomes in Local(1, verbose=verbose).perform(jobs):
-        yield from score(job, outcomes)
+def perform_in_order(
+    jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
+) -> Iterator[Run]:
+    """Perform jobs, those of a method in order in one new process, ``workers`` processes at once;
+    yield the scored runs, which are not stored, as they finish."""
+    with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
+        for job, outcomes in answers:
+            yield from score(job, outcomes)
 
 
 def perform_runs_again(
@@ -115,21 +121,31 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
         return [store.run(run_id) for run_id in ids[::step][:count]]
 
 
-def doubts_of(run: Run) -> Iterator[str]:
-    """Yield sentences on doubts about a method, from one of its runs, which is made again after a
-    run with another seed, in a new process: angles in degrees, hidden state, no use of the seed."""
+def repeats_of(run: Run) -> list[Job]:
+    """Return the jobs whose runs :func:`doubts_of` compares with a run: a run with another seed,
+    and then this run again; of a run of more than a minute this run again alone."""
+    is_long = (run.outcome.times.wall_s or 0.0) > LONG_S
+    numbers = (run.number,) if is_long else (run.number + 1, run.number)
+    return [replace(run.job, numbers=(number,)) for number in numbers]
+
+
+def doubts_of(run: Run, repeats: Sequence[Run]) -> Iterator[str]:
+    """Yield sentences on doubts about a method, from one of its runs and the runs of
+    :func:`repeats_of` in their order: angles in degrees, hidden state, no use of the seed."""
     name, task = run.cell.method.name, run.cell.task.name
     advice = f"see: coartic check {name}"
     if hint := hint_of(run.solution.movements):
         yield f"{name} on {task}: {hint}"
-    jobs = [replace(run.job, numbers=(number,)) for number in (run.number + 1, run.number)]
-    other, again = perform_in_order(jobs)
+    *others, again = repeats
+    when = AFTER_ANOTHER if others else "with the same seed"
     for change in compare_runs(run, again)[:1]:
         yield (
-            f"{name} gives another result on {task} {AFTER_ANOTHER} "
+            f"{name} gives another result on {task} {when} "
             f"({change}): it keeps something, or draws from a generator without a seed; {advice}"
         )
-    changes = compare_runs(run, other)
+    if not others:
+        return
+    changes = compare_runs(run, others[0])
     if changes and not run.cell.method.stochastic:
         yield (
             f"{name} is declared not to be stochastic, but another seed gives another result on "

@@ -20,7 +20,13 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import made_with
-from coartic.benchmarks.reproduce import AFTER_ANOTHER, doubts_of
+from coartic.benchmarks.reproduce import (
+    AFTER_ANOTHER,
+    LONG_S,
+    doubts_of,
+    perform_in_order,
+    repeats_of,
+)
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
@@ -75,6 +81,8 @@ class Progress:
     """Number of runs with a known wall time, by method."""
     workers: int = 1
     """Number of runs that are performed at once."""
+    repeats: int = 0
+    """Runs still to perform that only show whether results of own methods repeat."""
 
     def count(self, status: str) -> None:
         """Count a run of the folder by its status."""
@@ -192,8 +200,9 @@ def perform(
     The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
     that fail are stored and counted, and raise nothing; those that crashed, or timed out under a
     lower limit, are performed again by the next call. An interruption keeps finished runs. For each
-    method of a file, a run is made again after a run with another seed; a warning says if the
-    results differ, or if targets may be meant in degrees.
+    method of a file, a run is made again after a run with another seed (the shortest run, alone, if
+    all take more than a minute); a warning says if the results differ, or if targets may be meant
+    in degrees.
 
     Parameters
     ----------
@@ -242,9 +251,11 @@ def perform(
         missing = _missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.cell.method.name] += len(job.numbers)
+        for name in {job.cell.method.name for job in missing if not job.cell.method.is_ours}:
+            progress.waiting[name] += 2  # which show whether its results repeat
         progress.workers = executor.workers
         tell(None)
-        jobs, first = _divided(missing, executor.workers), dict[str, Run]()
+        jobs, chosen = _divided(missing, executor.workers), dict[str, Run]()
         while jobs:
             alone: list[Job] = []
             with closing(executor.perform(jobs)) as answers:  # ends workers after an error here
@@ -256,13 +267,24 @@ def perform(
                     store.write(runs)
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
-                            first.setdefault(run.cell.method.name, run)
+                            name = run.cell.method.name
+                            chosen[name] = min(chosen.get(name, run), run, key=_seconds)
                         progress.finish(run)
                         tell(run.cell)
             jobs = alone
-        doubts = list[str]()
-        for run in first.values():
-            of_run = [*doubts_of(run)]
+        again, doubts = defaultdict[str, list[Run]](list), list[str]()
+        repeats = [job for run in chosen.values() for job in repeats_of(run)]
+        progress.waiting = Counter(job.cell.method.name for job in repeats)
+        progress.repeats, progress.workers = len(repeats), min(executor.workers, Local().workers)
+        for job in repeats[:1]:
+            tell(job.cell)
+        for run in perform_in_order(repeats, progress.workers):
+            again[run.cell.method.name].append(run)
+            progress.waiting[run.cell.method.name] -= 1
+            progress.repeats -= 1
+            tell(run.cell)
+        for name, run in chosen.items():
+            of_run = [*doubts_of(run, again[name])]
             doubts += of_run
             if any(AFTER_ANOTHER in doubt for doubt in of_run):
                 details = run.outcome.details | {EARLIER: [run.cell.task.name]}
@@ -274,6 +296,11 @@ def perform(
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
+
+
+def _seconds(run: Run) -> float:
+    """Wall time of a run, s, at least a minute: runs that take no longer are alike."""
+    return max(run.outcome.times.wall_s or math.inf, LONG_S)
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:

@@ -85,12 +85,51 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
     lines = ["Runs: 63/63  1 failed"]
     if is_terminal:
         lines = [
-            f"18/63  1 failed  {name}",
-            f"19/63  1 failed  48 min left  {name}",
-            f"63/63  1 failed  {name}",
+            f"Runs: 18/63  1 failed  {name}",
+            f"Runs: 19/63  1 failed  48 min left  {name}"[:78] + "…",
+            f"Runs: 63/63  1 failed  {name}",
         ]
         assert {*map(len, shown)} == {0, 79}  # drawn in its place, each time as wide
     assert [line.rstrip() for line in shown if line] == lines
+
+
+SLOW = """import time
+from coartic import Optimiser
+class Slow(Optimiser):
+    name, title, citation = "slow", "Slow", "x"
+    def optimise(self, objective, rng):
+        time.sleep(0.5)
+        for _ in range(2):
+            objective(objective.x0 + 0.01 * rng.standard_normal(objective.dim))
+"""
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_no_command_is_silent_for_long(coartic, tmp_path, monkeypatch):
+    monkeypatch.setattr(Display, "EVERY_S", 0.05)
+    own = tmp_path / "slow.py", tmp_path / "out"
+    own[0].write_text(SLOW, encoding="utf-8")
+    task = "--tasks", "ascending"
+    shown = coartic(
+        "run",
+        "quick",
+        *task,
+        "--method-file",
+        own[0],
+        "--methods",
+        "slow",
+        "--runs",
+        1,
+        "--out",
+        own[1],
+    )[2]
+    assert re.search(r"Runs: 0/1 \(\d+ s so far\)\n", shown)
+    assert re.search(r"Runs: 1/1  2 runs again, to see whether results repeat.*\n", shown)
+    assert re.search(r"Runs: 1/1  1 run again, .*so far\)\n", shown)
+    shown = coartic("check", "slow", "--method-file", own[0])[2]
+    assert "Performing runs of slow (0 s so far)" in shown
+    shown = coartic("verify", own[1], "--again", 1, "--method-file", own[0])[2]
+    assert "Performing 1 run again (0 s so far)" in shown
 
 
 @pytest.mark.parametrize(

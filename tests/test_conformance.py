@@ -69,9 +69,10 @@ def quick_checks(monkeypatch, another_process):
     for methods that draw nothing: tests/test_short_runs.py has a run of each other one."""
 
     class HereAndThere(InProcess):
-        def perform(self, jobs):
+        def perform(self, jobs, **options):
             here = len(jobs) > 1 or jobs[0].cell.method.stochastic
-            return zip(jobs, (map if here else another_process.map)(perform_job, jobs), strict=True)
+            answers = (map if here else another_process.map)(perform_job, jobs)
+            yield from zip(jobs, answers, strict=True)
 
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(reproduce, "Local", HereAndThere)

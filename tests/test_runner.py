@@ -299,3 +299,17 @@ def test_runs_of_a_method_file_warn_of_what_a_check_would_find(methods, name, tm
     texts = [str(each.message) for each in said]
     assert len({*texts}) == len(texts)
     assert any(DOUBTS[name] in text for text in texts) == bool(DOUBTS[name])
+
+
+@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize(("wall_s", "seeds"), [(60.0, (1, 0)), (60.1, (0,))])
+def test_a_long_run_is_made_again_alone(methods, wall_s, seeds):
+    job = Job(cell_on(load_task("ascending"), methods["test/random"]), 0, (0,))
+    (run,) = score(job, perform_job(job))
+    run = replace(run, outcome=replace(run.outcome, times=Times(wall_s=wall_s)))
+    jobs = reproduce.repeats_of(run)
+    assert tuple(each.numbers for each in jobs) == tuple((seed,) for seed in seeds)
+    repeats = [*reproduce.perform_in_order(jobs)]
+    doubt = next(reproduce.doubts_of(run, repeats))
+    assert ("the same seed after another run (" in doubt) == (len(seeds) == 2)
+    assert "with the same seed" in doubt

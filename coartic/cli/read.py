@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.terminal import complain, say, say_pairs, say_part, say_table
+from coartic.cli.terminal import Display, complain, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
@@ -45,10 +45,15 @@ def report(
     from coartic.analysis.study import load
 
     started = time.monotonic()
-    study = load(folder)
-    with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
-        files, failures = write_report(study, out, for_paper=for_paper, width=width, watch=say_part)
-    say_part("")
+    with (
+        Display() as display,
+        interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")),
+    ):
+        display.show(f"Reading {folder}")
+        study = load(folder)
+        files, failures = write_report(
+            study, out, for_paper=for_paper, width=width, watch=display.show
+        )
     made, what = Counter(Path(name).suffix for name in files), "CSV"
     if for_paper:
         what = f"CSV, {made['.tex']} as LaTeX) and {counted(made['.svg'], 'figure')} (SVG and PDF"
@@ -134,7 +139,8 @@ def verify(
         raise CoarticError("--method-file has no effect without --again or --run")
     is_right = True
     if not alone:
-        with open_store(folder), explain_errors(folder):  # these explain an error
+        with Display() as display, open_store(folder), explain_errors(folder):  # explain an error
+            display.show(f"Executing the solutions of {folder}")
             report = check_runs(folder)
         is_right = not (report.wrong or report.unfinished)
         say(
@@ -173,11 +179,14 @@ def _perform_again(
     if run_id is not None:
         _describe_run(runs[0], registered[methods[0]].code)
     unlike = 0
-    for stored, again in perform_runs_again(runs, registered):
-        changes = compare_runs(stored, again)
-        unlike += bool(changes)
-        for difference in changes:
-            say(f"Run {stored.id}, performed again: {difference}")
+    with Display() as display:
+        display.show(f"Performing {counted(len(runs), 'run')} again")
+        for number, (stored, again) in enumerate(perform_runs_again(runs, registered), 1):
+            changes = compare_runs(stored, again)
+            unlike += bool(changes)
+            for difference in changes:
+                say(f"Run {stored.id}, performed again: {difference}")
+            display.show(f"Performed {number} of {counted(len(runs), 'run')} again")
     say(f"{counted(len(runs), 'run')} performed again: {unlike or 'none'} with another result.")
     return unlike
 

@@ -120,6 +120,7 @@ def run(
         labels = {job.cell.label for job in asked} if names else set[str]()
         if include:
             only = {job.cell.task.name for job in asked} if tasks else None
+            display.show(f"Including the runs of {' and '.join(include)}")
             asked = include_folders(asked, include, out, only)
             display.line(f"Included the runs of {' and '.join(include)}.")
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
@@ -287,13 +288,19 @@ def check(
         check_kind(subject, "task")
         if verbose:
             raise CoarticError("--verbose has no effect: it shows what a method prints")
-        broken = _show_laws(subject, check_task_file(Path(subject), registered))
+        with Display() as display:
+            display.show(f"Performing runs on {subject}")
+            laws = check_task_file(Path(subject), registered)
+        broken = _show_laws(subject, laws)
     else:
         names = given.methods_meant([subject], registered)
         given.check_used(method_file, registered, names)
-        broken = sum(
-            _show_laws(name, check_method(registered[name], verbose=verbose)) for name in names
-        )
+        broken = 0
+        for name in names:
+            with Display() as display:
+                display.show(f"Performing runs of {name}")
+                laws = check_method(registered[name], verbose=verbose)
+            broken += _show_laws(name, laws)
     if broken:
         sys.exit(1)
 

@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 import textwrap
+import threading
 import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, TextIO
@@ -84,33 +85,60 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
             say("  ".join([f"{first:{widths[0]}}", *cells]))
 
 
-def say_part(name: str) -> None:
-    """Show the name of the part that is being made on a terminal, in one line that changes; an
-    empty name ends the line."""
-    if sys.stderr.isatty():
-        width = shutil.get_terminal_size().columns - 1
-        say("", stream=sys.stderr, end="\r")
-        say(f"{plain(name, width):{width}}", stream=sys.stderr, end="" if name else "\r")
-
-
 class Display:
-    """Progress on standard error: runs done, failures and time left. On a terminal one line
-    changes; elsewhere a line appears every half minute."""
+    """What a command is doing, on standard error, such as runs done, failures and time left. On a
+    terminal one line changes; elsewhere a line appears every ten seconds. What takes longer is
+    shown again, with its time so far."""
 
-    EVERY_S = 30.0
+    EVERY_S = 10.0
 
     def __init__(self) -> None:
         self.others = ""
         """Number and seeds of the runs of earlier commands in the folder, in words."""
         self._is_live = sys.stderr.isatty()
-        self._last = time.monotonic()
-        self._end = ""
+        self._doing = self._end = ""
+        self._since = self._last = time.monotonic()  # begin of what is done, and last line
+        self._over, self._one_line = threading.Event(), threading.Lock()
 
     def __enter__(self) -> Display:
+        threading.Thread(target=self._remind, daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        say("", stream=sys.stderr, end=self._end)
+        self._over.set()
+        self.line()
+
+    def show(self, doing: str, *, at_once: bool = False) -> None:
+        """Say what the command is doing from now on: on a terminal, with ``at_once``, and if ten
+        seconds have passed since the last line."""
+        self._doing, self._since = doing, time.monotonic()
+        if self._is_live or at_once or self._since - self._last >= self.EVERY_S:
+            self._print(doing)
+
+    def line(self, *texts: str) -> None:
+        """Print lines, and leave the line that changes."""
+        with self._one_line:
+            say("", stream=sys.stderr, end=self._end)
+            self._end = ""
+            for text in texts:
+                say(text, stream=sys.stderr)
+
+    def _print(self, text: str) -> None:
+        self._last = time.monotonic()
+        if not self._is_live:
+            self.line(text)
+            return
+        with self._one_line:
+            width = shutil.get_terminal_size().columns - 1
+            say("", stream=sys.stderr, end="\r")
+            say(f"{plain(text, width):{width}}", stream=sys.stderr, end="")
+            self._end = "\n"
+
+    def _remind(self) -> None:
+        while not self._over.wait(self.EVERY_S / 10):
+            now = time.monotonic()
+            if self._doing and now - self._last >= self.EVERY_S:
+                self._print(f"{self._doing} ({now - self._since:.0f} s so far)")
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
         """Show the progress and the cell of the last run; before the first run (``cell`` None) show
@@ -137,19 +165,11 @@ class Display:
         if seconds > 0:  # False for NaN
             left = f"{seconds / 60:.0f} min left" if seconds > 99 else f"{seconds:.0f} s left"
         failed = f"{progress.failed} failed" * bool(progress.failed)
-        text = "  ".join(filter(None, [f"{there}/{total}", failed, left]))
-        if self._is_live:
-            last = "starting processes"
-            if cell is not None:
-                last = f"{cell.task.label}, {title_of(cell.method.name)}"
-            say_part(f"{text}  {last}")
-            self._end = "\n"
-        elif there == total or (progress.done and time.monotonic() - self._last >= self.EVERY_S):
-            self._last = time.monotonic()
-            self.line(f"Runs: {text}")
-
-    def line(self, text: str) -> None:
-        """Print a line; the progress continues below the line."""
-        say("", stream=sys.stderr, end=self._end)
-        self._end = ""
-        say(text, stream=sys.stderr)
+        again = ""
+        if progress.repeats:
+            again = f"{counted(progress.repeats, 'run')} again, to see whether results repeat"
+        last = "starting processes"
+        if cell is not None:
+            last = f"{cell.task.label}, {title_of(cell.method.name)}"
+        parts = [f"Runs: {there}/{total}", failed, again, left, last * self._is_live]
+        self.show("  ".join(filter(None, parts)), at_once=there == total)

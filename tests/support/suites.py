@@ -32,7 +32,7 @@ class InProcess(Local):
     def __init__(self, jobs=1, verbose=False):
         self.workers = max(1, jobs)
 
-    def perform(self, jobs):
+    def perform(self, jobs, *, in_order=True):
         yield from ((job, perform_job(job)) for job in jobs)
 
 
