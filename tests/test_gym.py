@@ -370,33 +370,56 @@ def test_methods_of_others_have_the_information_that_they_declare():
     assert score("coartic/Ascending-v2", learner).reward["policy"] >= -319
 
 
-def test_wrappers_are_refused_by_name():
-    """But for those that Gymnasium adds by itself: what a wrapper does, score would leave out."""
+def test_an_environment_in_wrappers_is_taken_as_it_is():
+    """Wrappers that Gymnasium adds by itself change nothing."""
     made, vector = gymnasium.make(TWO), gymnasium.make_vec(TWO, num_envs=2)
-    two = np.float32([-2.0, 2.0])
-    for name, env in (
-        ("RescaleAction", wrappers.OrderEnforcing(wrappers.RescaleAction(made.unwrapped, *two))),
-        ("RescaleAction", wrappers.vector.RescaleAction(vector, *two)),
-        ("TimeLimit", gymnasium.make(TWO, max_episode_steps=2)),
-    ):
-        with pytest.raises(TypeError, match=f"env is wrapped in {name}, which score would"):
-            score(env)
-    zeros = {"zeros": lambda seen: np.zeros((len(seen), 10))}
-    due = score(TWO, zeros)
+    weights = np.random.default_rng(0).standard_normal((15, 10))
+
+    def policy(scale, seen):
+        return np.float32(scale * 0.125) * np.sin(seen @ weights).astype(np.float32)
+
+    due = score(TWO, partial(policy, 1.0))
     for env in (made, made.unwrapped, vector):
+        pd.testing.assert_frame_equal(score(env, partial(policy, 1.0)), due)
+    half = np.float32([-0.5, 0.5])
+    for env in (
+        wrappers.RescaleAction(made, *half),
+        wrappers.vector.RescaleAction(vector, *half),
+        wrappers.NormalizeReward(gymnasium.make(TWO)),
+    ):
+        scale = 1.0 if isinstance(env, wrappers.NormalizeReward) else 0.5
+        pd.testing.assert_frame_equal(score(env, partial(policy, scale)), due)
+    short = score(gymnasium.make(TWO, max_episode_steps=2), partial(policy, 1.0))
+    assert short.completed["policy"] == 0
+    assert np.isnan(short.reward["policy"])
+    with pytest.raises(ValueError, match="ahead: make the environment in the wrappers with this"):
+        score(wrappers.RescaleAction(made, *half), ahead=2)
+    learns = wrappers.NormalizeObservation(gymnasium.make(TWO))
+    count = learns.obs_rms.count
+    score(learns, partial(policy, 1.0))
+    assert (learns.obs_rms.count, learns.update_running_mean) == (count, True)
+
+
+def test_the_instances_of_a_family_in_wrappers_are_its_own():
+    options = {"task": "two-armed/v1", "count": 4}
+    zeros = {"zeros": lambda seen: np.zeros((len(seen), 11), np.float32)}
+    due = score("coartic/Task-v2", zeros, split="development", **options)
+    one = gymnasium.make("coartic/Task-v2", **options)
+    side = gymnasium.make_vec("coartic/Task-v2", num_envs=3, **options)
+    for env in (
+        wrappers.RescaleAction(one, *np.float32([-2, 2])),
+        wrappers.vector.RescaleAction(side, *np.float32([-2, 2])),
+    ):
         pd.testing.assert_frame_equal(score(env, zeros), due)
 
 
-def test_an_agent_is_scored_as_it_was_trained():
-    """In VecNormalize as there; behind other wrappers, which score would leave out, not at all."""
+def test_an_agent_is_scored_as_it_was_trained(tmp_path):
+    """In VecNormalize as there; in other wrappers if the environment has them; from a file, too."""
     sb3 = pytest.importorskip("stable_baselines3")
     from stable_baselines3.common import vec_env
 
     robots = partial(coartic.gym.sb3, TWO, num_envs=2)
     norm = vec_env.VecNormalize(robots())
-    made = vec_env.DummyVecEnv(
-        [lambda: wrappers.RescaleAction(gymnasium.make(TWO), *np.float32([-2, 2]))]
-    )
     small = {"n_steps": 64, "seed": 0, "device": "cpu"}
     agent = sb3.PPO("MlpPolicy", norm, **small).learn(256)
     policies = {
@@ -410,10 +433,35 @@ def test_an_agent_is_scored_as_it_was_trained():
     assert of_norm["agent"] == of_norm["by hand"] == rewards["agent"]
     assert score(robots(), policies, episodes=1).reward.equals(rewards)
     score(TWO, sb3.PPO("MlpPolicy", gymnasium.make(TWO), **small), episodes=1)
-    for env in (vec_env.VecFrameStack(robots(), 2), made):
+    # From a file: its observations as there, or a warning.
+    agent.save(tmp_path / "agent")
+    norm.save(tmp_path / "norm")
+    loaded = partial(sb3.PPO.load, tmp_path / "agent", device="cpu")
+    for given in (norm, tmp_path / "norm", str(tmp_path / "norm")):
+        again = score(TWO, loaded(), episodes=1, vec_normalize=given).reward
+        assert again["policy"] == rewards["agent"]
+    with pytest.warns(UserWarning, match="give score vec_normalize=FILE"):
+        assert score(TWO, loaded(), episodes=1).reward["policy"] == rewards["as seen"]
+    score(TWO, loaded(env=robots()), episodes=1)
+    for wrong, words in ((tmp_path / "agent.zip", "no VecNormalize.save wrote"), (0, "it must be")):
+        with pytest.raises(TypeError, match=words):
+            score(TWO, loaded(), vec_normalize=wrong)
+    # In wrappers that change what it sees or does.
+    scaled = wrappers.RescaleAction(gymnasium.make(TWO), *np.float32([-2, 2]))
+    stacked = vec_env.VecFrameStack(robots(), 2)
+    for number, env in enumerate((stacked, scaled)):
         agent = sb3.PPO("MlpPolicy", env, **small)
-        with pytest.raises(TypeError, match="the agent's environment is wrapped in"):
-            score(TWO, agent)
+        due = score(env, agent, episodes=1).reward["policy"]
+        agent.save(tmp_path / str(number))
+        loaded = sb3.PPO.load(tmp_path / str(number), device="cpu")
+        for each in (agent, loaded):
+            with pytest.raises(TypeError, match=r"the agent's \w+_space is Box"):
+                score(TWO, each)
+        with pytest.warns(UserWarning, match="no environment"):
+            assert score(env, loaded, episodes=1).reward["policy"] == due
+    agent = sb3.PPO("MlpPolicy", gymnasium.make(TWO, max_episode_steps=4), **small)
+    with pytest.raises(TypeError, match="is wrapped in TimeLimit: score the agent in"):
+        score(TWO, agent)
 
 
 def test_what_is_not_installed_is_named(monkeypatch):

@@ -90,41 +90,39 @@ class TaskEnv(Recorded, gymnasium.Env):
 def options_of(env: Any) -> dict[str, Any]:
     """Return the options ``task``, ``ahead`` and ``model`` of an environment of this package, or
     the options with which an id is registered, as a dictionary, not a copy: do not change it.
-    Raises ValueError for an unknown id, and TypeError for anything else and for an environment
-    in a wrapper that is not among :data:`ADDED`."""
+    Raises ValueError for an unknown id, and TypeError for anything else."""
     if isinstance(env, str):
         if env not in IDS:
             raise ValueError(unknown("environment", env, IDS))
         return IDS[env]
-    envs = getattr(env, "unwrapped", env)
-    if not isinstance(getattr(envs, "robots", envs), TaskVectorEnv):
+    return robots_of(env).options
+
+
+def robots_of(env: Any) -> TaskVectorEnv:
+    """Return the robots inside an environment of this package and its wrappers. Raises TypeError
+    for anything else."""
+    *_, inner = layers(env)
+    robots = getattr(inner, "robots", inner)
+    if not isinstance(robots, TaskVectorEnv):
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
-    env = without_wrappers(env, "env", normaliser_of(env))
-    options: dict[str, Any] = getattr(env, "robots", env).options
-    return options
+    return robots
 
 
-def normaliser_of(env: Any) -> Any:
-    """Return the environment itself if it is a ``VecNormalize`` of Stable-Baselines3, or None."""
-    return env if type(env).__name__ == "VecNormalize" else None
-
-
-def without_wrappers(env: Any, name: str, known: Any = None) -> Any:
-    """Return the environment inside its wrappers: wrappers that Gymnasium and Stable-Baselines3 add
-    by themselves (:data:`ADDED`), and ``known``, a wrapper, the object itself, if given. Raises
-    TypeError for any other wrapper, whose changes would be left out; the message calls the
-    environment ``name``."""
+def layers(env: Any) -> list[Any]:
+    """Return an environment and those inside it, from its outermost wrapper inwards."""
+    found = [env]
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
-        if env is not known and type(env).__name__ not in ADDED:
-            raise TypeError(
-                f"{name} is wrapped in {type(env).__name__}, which score would leave out: give the "
-                "environment without wrappers (env.unwrapped), and a policy that does to "
-                "observations and actions what they do"
-            )
         env = env.venv if hasattr(env, "venv") else env.env
-    return env
+        found.append(env)
+    return found
+
+
+def wrappers_of(env: Any) -> list[Any]:
+    """Return the wrappers of an environment, but for those that Gymnasium and Stable-Baselines3 add
+    by themselves (:data:`ADDED`), from the outermost inwards."""
+    return [each for each in layers(env)[:-1] if type(each).__name__ not in ADDED]
 
 
 def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+import pickle
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.estimates import Estimate, mean
-from coartic.gym.environment import normaliser_of, options_of, without_wrappers
+from coartic.gym.environment import layers, options_of, robots_of, wrappers_of
 from coartic.gym.vector import TaskVectorEnv
 from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import MOST_CELLS, MOST_RUN_SEED, brief_value, check_limits, real_array
@@ -37,6 +40,7 @@ def score(
     *,
     episodes: int = 20,
     seed: int = 0,
+    vec_normalize: str | Path | Any = None,
     **options: Any,
 ) -> pd.DataFrame:
     """Compare policies and planners with random actions and the best known solutions.
@@ -44,8 +48,10 @@ def score(
     Parameters
     ----------
     env : str, Env, VectorEnv or VecEnv
-        An environment of this package without wrappers, except ``VecNormalize``, or its id. Of a
-        family the instances of the test split are scored, or of the ``split`` that is given here.
+        An environment of this package, or its id. Of a family the instances of the test split are
+        scored, or of the ``split`` that is given here. An environment in wrappers is taken as it
+        is, with its own instances: policies see and do what the wrappers let them, and trials count
+        in ticks; what wrappers learn stays.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
@@ -55,9 +61,13 @@ def score(
     episodes : int
         Trials of random actions on each task.
     seed : int
-        Seed of random actions and of methods.
+        Seed of random actions, of methods and of an environment in wrappers.
+    vec_normalize : str, Path or VecNormalize, optional
+        Normalises what policies see, such as of an agent that was loaded from a file: the
+        ``VecNormalize`` of its training, or the file that its ``save`` wrote (a pickle: open only
+        files that you trust).
     **options
-        Options of :class:`TaskVectorEnv`.
+        Options of :class:`TaskVectorEnv`, for an environment without wrappers.
 
     Returns
     -------
@@ -73,14 +83,32 @@ def score(
     Raises
     ------
     ValueError, TypeError
-        The environment is not coartic's or has a wrapper, an option is wrong, or the policy is
-        no policy, or an agent that was trained in another wrapper.
+        The environment is not coartic's, an option is wrong, the policy is no policy, or an agent
+        whose spaces or wrappers differ from those of the environment.
+    OSError
+        The file of ``vec_normalize`` cannot be read.
+
+    Warns
+    -----
+    UserWarning
+        An agent has no environment, as after loading: nothing says whether it was trained in
+        ``VecNormalize``.
+
+    Examples
+    --------
+    >>> table = score("coartic/Ascending-v2", lambda seen: np.zeros((len(seen), 6)))
+    >>> table.reward.to_dict()  # doctest: +ELLIPSIS
+    {'policy': -462.0, 'random actions': ..., 'corrective process': -462.0, 'best known': -292.0}
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
-    given = options_of(env) | options
+    given, wrapped = options_of(env) | options, not isinstance(env, str) and wrappers_of(env)
+    if wrapped == [env] and is_normaliser(env):
+        vec_normalize, wrapped = vec_normalize or env, False
+    if wrapped and options:
+        raise ValueError(f"{', '.join(options)}: make the environment in the wrappers with this")
     if isinstance(task := given.get("task"), str | Path) and is_family(str(task)):
-        given = {"split": "test", **given}
+        given = {**(robots_of(env).instances if wrapped else {"split": "test"}), **given}
     setting = TaskVectorEnv(1, **given)
     model, shape = setting.model, setting.single_action_space.shape
     tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
@@ -90,7 +118,11 @@ def score(
         if isinstance(each, Method):
             rewards[name] = column(_reward_of(each, task, seed, model) for task in tasks)
         elif each is not None:
-            rewards[name] = _rollout(_acting(each, normaliser_of(env)), given, len(tasks))
+            act = _acting(each, env if wrapped else setting, _normaliser(vec_normalize))
+            if wrapped:
+                rewards[name] = _rollout_as_it_is(act, env, len(tasks), seed)
+            else:
+                rewards[name] = _rollout(act, given, len(tasks))
     rng = np.random.default_rng(seed)
     rewards["random actions"] = _rollout(
         lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), given, len(tasks), episodes
@@ -105,18 +137,63 @@ def column(rewards: Iterable[float | None]) -> Array:
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
 
 
-def _acting(policy: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a function from observations to actions for a policy, a function or an agent with
-    ``predict``; one that was trained in ``VecNormalize``, or is given with it (``normal``), gets
-    observations normalised as there. Raises TypeError for any other object and for an agent
-    trained in another wrapper."""
-    normal = getattr(policy, "get_vec_normalize_env", lambda: None)() or normal
+def is_normaliser(env: Any) -> bool:
+    """Return whether an environment is a ``VecNormalize`` of Stable-Baselines3."""
+    return type(env).__name__ == "VecNormalize"
+
+
+def _normaliser(given: str | Path | Any) -> Any:
+    """Return the ``VecNormalize`` that is given, or that is in the file that is given; None for
+    None. Raises OSError if the file cannot be read, and TypeError for anything else."""
+    what = f"vec_normalize is {brief_value(given)}"
+    if isinstance(given, str | Path):
+        try:
+            given = pickle.loads(Path(given).read_bytes())
+        except OSError:
+            raise
+        except Exception as error:
+            raise TypeError(f"{what}, which no VecNormalize.save wrote: {error}") from None
+    if not (given is None or is_normaliser(given)):
+        raise TypeError(f"{what}; it must be a VecNormalize, or the file that its save wrote")
+    return given
+
+
+def _acting(policy: Any, env: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
+    """Return a function from observations of ``env`` to actions for a policy, a function or an
+    agent with ``predict``. Observations are normalised by ``normal``, or else as an agent's own
+    environment does, if ``env`` does not. Raises TypeError for any other object, and for an agent
+    whose spaces are not those of ``env`` or whose wrappers an ``env`` without wrappers lacks."""
+    normalised = any(map(is_normaliser, layers(env)))
+    if normal is None and not normalised:
+        normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
     see = normal.normalize_obs if normal else np.asarray
     if hasattr(policy, "predict"):
-        get_env = getattr(policy, "get_env", lambda: None)
-        env = without_wrappers(get_env(), "the agent's environment", normal)
-        for each in getattr(env, "envs", ()):
-            without_wrappers(each, "the agent's environment")
+        for name in ("observation_space", "action_space"):
+            there = getattr(env, f"single_{name}", None) or getattr(env, name)
+            theirs = getattr(policy, name, there)
+            if theirs != there:
+                raise TypeError(
+                    f"the agent's {name} is {brief_value(theirs)}, and the environment's is "
+                    f"{brief_value(there)}: score the agent in the environment of its training, "
+                    "in its wrappers"
+                )
+        own = getattr(policy, "get_env", lambda: env)()
+        if own is None and not (normal or normalised):
+            warnings.warn(
+                "the agent has no environment, as after loading: if it was trained in VecNormalize,"
+                " give score vec_normalize=FILE, which VecNormalize.save writes; if not, load it "
+                "with env=coartic.gym.sb3(ID)",
+                stacklevel=3,
+            )
+        if not wrappers_of(env):
+            inner = layers(own)[-1]
+            behind = [*wrappers_of(own), *chain(*map(wrappers_of, getattr(inner, "envs", ())))]
+            for wrapper in behind:
+                if not is_normaliser(wrapper):
+                    raise TypeError(
+                        f"the agent's environment is wrapped in {type(wrapper).__name__}: score "
+                        "the agent in an environment with this wrapper"
+                    )
         return lambda seen: policy.predict(see(seen), deterministic=True)[0]
     if not callable(policy):
         raise TypeError(
@@ -154,6 +231,57 @@ def _rollout(
         totals[rows] += robots.state.rewards[rows]
         rows = np.flatnonzero(robots.state.going)
     return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
+
+
+def _rollout_as_it_is(
+    act: Callable[[NDArray[np.float32]], ArrayLike], env: Any, tasks: int, seed: int
+) -> Array:
+    """Let ``act`` make trials in an environment in wrappers, until each of its ``tasks`` tasks had
+    one; return the total rewards of its robots, ticks, shape ``(tasks, 1)``, NaN where a trial
+    failed or was cut short."""
+    robots, is_one = robots_of(env), isinstance(env, gymnasium.Env)
+    totals, rewards = np.zeros(robots.num_envs), dict[int, float]()
+
+    def begin(seed: int | None = None) -> Any:
+        if hasattr(env, "step_async"):  # of Stable-Baselines3
+            env.seed(seed)
+            return env.reset()
+        return env.reset(seed=seed)[0]
+
+    with _as_learned(env):
+        seen = begin(seed)
+        while len(rewards) < tasks:
+            numbers = robots.state.task.tolist()
+            actions = act(np.asarray(seen)[None] if is_one else seen)
+            seen, _, ended, *more = env.step(np.asarray(actions)[0] if is_one else actions)
+            cut = np.atleast_1d(more[0] if len(more) > 1 else np.zeros_like(ended))
+            totals += robots.state.rewards
+            for row in np.flatnonzero(np.atleast_1d(ended) | cut):
+                failed = cut[row] or totals[row] <= -FAILED
+                rewards.setdefault(numbers[row], np.nan if failed else totals[row])
+                totals[row] = 0
+                seen = begin() if is_one else seen
+    return column(rewards[number] for number in range(tasks))
+
+
+@contextmanager
+def _as_learned(env: Any) -> Iterator[None]:
+    """Keep wrappers from learning, such as the means by which they normalise."""
+    names = "training", "update_running_mean"
+    learning = [
+        (each, name)
+        for each in layers(env)
+        for name in names
+        if name in vars(each) or isinstance(getattr(type(each), name, None), property)
+    ]
+    before = [getattr(each, name) for each, name in learning]
+    try:
+        for each, name in learning:
+            setattr(each, name, False)
+        yield
+    finally:
+        for (each, name), value in zip(learning, before, strict=True):
+            setattr(each, name, value)
 
 
 @checked_arguments

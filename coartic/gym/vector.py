@@ -142,6 +142,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self.num_envs, self.model = num_envs, check_model(model)
         self.render_mode = render_mode
         self.options = {"task": task, "ahead": ahead, "model": model}
+        self.instances = {"split": split, "count": count, "year": year}  # of a family
         self.tasks: list[Task | str]  # or names of instances
         if isinstance(task, str | Path) and is_family(str(task)):
             task = str(task)

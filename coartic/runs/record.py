@@ -68,9 +68,10 @@ def mark_of(method: str, kind: str, files: Sequence[str]) -> str:
     ``files`` that were loaded too late (:data:`LATE`), or the tasks of these (:data:`EARLIER`)."""
     if kind == EARLIER:
         return f"{method}: results depend on earlier runs (seen on {', '.join(files)})"
+    some = ", ".join(files[:5]) + (f" and {len(files) - 5} more" if len(files) > 5 else "")
     was = "was" if len(files) == 1 else "were"
     return (
-        f"{method}: {', '.join(files)} {was} first loaded during a run, so that a change there is "
+        f"{method}: {some} {was} first loaded during a run, so that a change there is "
         "not seen, and its runs stay: import it at the top of the method file"
     )
 
