@@ -113,11 +113,13 @@ def cached(
     return of_study
 
 
-def load(folder: str | Path) -> Study:
+def load(folder: str | Path, *, against: str = "") -> Study:
     """Read a results folder, or by the name ``"shipped"`` the shipped results of suite
-    ``comparison``.
+    ``comparison``. With ``against``, a method of the folder, by id, label or title, table
+    ``differences`` compares all other methods with this one.
 
-    Raises CoarticError if the folder is no results folder, or lacks runs of its suite.
+    Raises CoarticError if the folder is no results folder, or lacks runs of its suite, or has no
+    method ``against``.
     """
     folder = folder_named(folder)
     with open_results(folder) as store:
@@ -129,7 +131,19 @@ def load(folder: str | Path) -> Study:
                 "or has a part of the runs. Repeat the `coartic run` command, which does what is "
                 "missing, or --include all parts in another folder."
             )
-        return Study(folder, plan, store.made_with(), runs, store.marks())
+        study = Study(folder, plan, store.made_with(), runs, store.marks())
+    return replace(study, against=_label_in(study, against)) if against else study
+
+
+def _label_in(study: Study, name: str) -> str:
+    """Return the label of the method that has this label, id, short id such as ``EC4`` or title in
+    a study. Raises CoarticError if no method has it."""
+    methods = study.methods
+    for names in (methods.index, methods.base, methods.title):
+        for wanted in (name, f"{METHOD_PREFIX}{name}"):
+            if (there := methods.index[names == wanted]).size:
+                return str(there[0])
+    raise CoarticError(unknown("method", name, [*methods.index]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,6 +160,9 @@ class Study:
     marks: dict[str, list[str]] = field(default_factory=dict)
     """What was found against methods, sentences by the method's id: code that was loaded too late,
     and results that depend on earlier runs."""
+    against: str = ""
+    """Label of the method with which table ``differences`` compares the others; empty: each method
+    from a file."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -201,7 +218,7 @@ class Study:
         kept = pd.MultiIndex.from_tuples([(job.cell.task.name, job.cell.label) for job in jobs])
         of = pd.MultiIndex.from_frame(self.runs[["task", "label"]])
         stored = self.stored[of.isin(kept)]
-        part = Study(self.folder, jobs, self.made_with, stored, self.marks)
+        part = Study(self.folder, jobs, self.made_with, stored, self.marks, self.against)
         vars(part)["optima"] = {
             name: self.optima[name] for name in part.tasks if name in self.optima
         }

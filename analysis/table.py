@@ -165,7 +165,7 @@ def caption_of(table: Table, frame: pd.DataFrame) -> str:
 def is_setting(frame: pd.DataFrame) -> pd.Series:
     """Return for each row of a :class:`Table`'s frame True if it is of a setting or ablation of a
     method that has a row, too."""
-    named = next((name for name in ("own", "method") if name in frame), "")
+    named = next((name for name in ("against", "method") if name in frame), "")
     label = frame[named] if named else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
 

@@ -482,6 +482,7 @@ REFUSED = (
     "check corrective-alone/given [--method-file mine.py]",
     "verify out --run {run} [--method-file mine.py]",
     "report out [--width 3.4]",
+    "report out [--against EC1]",
     "verify out --run {run} [--again 1]",
     "verify out [--method-file mine.py]",
     "verify out --again 1 [--method-file mine.py]",

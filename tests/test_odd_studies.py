@@ -41,7 +41,7 @@ def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
         behind([TWO, THREE], "dual-process/EC4", 30, 31, 32),
     )
     table = TABLES["differences"](study)
-    assert (is_setting(table) == (table.own == "mine sigma=0.1")).all()
+    assert (is_setting(table) == (table.against == "mine sigma=0.1")).all()
     assert 0 < is_setting(table).sum() == len(table) / 2
 
 

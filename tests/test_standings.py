@@ -15,6 +15,7 @@ from coartic.analysis.report import about, render
 from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
 from coartic.analysis.statistics import running_times
+from coartic.analysis.statistics.hypotheses import holm, stratified_test
 from coartic.analysis.study import Study
 from coartic.analysis.words import number
 from coartic.cli.read import say_ranking
@@ -319,11 +320,41 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert (rows.tasks == 1).all()
     texts = render.texts_of(table, rows, "difference")
     assert texts[0] == number(100 * rows.difference.iloc[0], 1)  # per cent, as the gaps
-    assert "positive: the own method is better" in table.caption
+    assert "positive: this method is better" in table.caption
     better = TABLES["differences"](study(TEN | strangers(("mine", 2), runs=10)))
     assert (better.difference_low > 0).all()
     same = TABLES["differences"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))
     assert same.difference_low.iloc[0] < 0  # runs with the same seeds are not matched
+
+
+def test_all_methods_are_compared_with_a_method_of_choice():
+    """Own and built-in methods alike, with p corrected for their number."""
+    plan = {("ascending", "corrective-alone/given"): [-319],
+            ("two-armed-1", "corrective-alone/given"): [-675]}  # fmt: skip
+    seen = study(TEN | CMA | plan | strangers(("a", 2), ("b", 0), runs=10))
+    others = {"b", "cma-es/bandit", "corrective-alone/given", "dual-process (EC1, EC4)"}
+    with_a, with_b = (
+        TABLES["differences"](MadeUp(seen, against=each, optima=seen.optima)) for each in "ab"
+    )
+    assert {*with_a.method} == others
+    assert (with_a.against == "a").all()
+    here, there = with_a.loc["a b"], with_b.loc["b a"]
+    ahead = np.mean([2 / -best.reward for best in seen.optima.values()])  # two ticks on each task
+    assert here.difference == -there.difference == pytest.approx(ahead)
+    gaps = {
+        name: [
+            values if len(values := of_task.to_numpy(float)) > 1 else values.item()
+            for _, of_task in standings.runs_on(seen, name, seen.tasks).groupby("task").gap
+        ]
+        for name in (*with_a.method, "a")
+    }
+    p = [stratified_test([*zip(gaps[name], gaps["a"], strict=True)]) for name in with_a.method]
+    assert with_a.p_holm.tolist() == pytest.approx(holm(p))
+    assert (with_a.p_holm < 0.05).all()
+    alone = TABLES["differences"](
+        MadeUp(seen, against="corrective-alone/given", optima=seen.optima)
+    )
+    assert alone.loc["corrective-alone/given a"].p_holm < 0.05
 
 
 def with_parameters():

@@ -64,6 +64,38 @@ def test_exchange_test_against_all_exchanges(a, b, alternative, resamples):
         assert test.resamples == 0
 
 
+def test_a_test_over_strata_against_all_exchanges():
+    """In each of two strata; and in one, where values stand beside an exact number."""
+    first, second = [[1, 2, 6], [0, 4, 5, 5]], [[0, 1, 3], [2, 3, 9]]
+    null = []
+    for chosen in itertools.product(*(itertools.combinations(range(len(a) + len(b)), len(a))
+                                      for a, b in zip(first, second, strict=True))):  # fmt: skip
+        pairs = []
+        for a, b, places in zip(first, second, chosen, strict=True):
+            pool = np.array([*a, *b], float)
+            pairs.append((pool[[*places]], np.delete(pool, places)))
+        null.append(of_strata(pairs))
+    pairs = [tuple(map(np.array, pair)) for pair in zip(first, second, strict=True)]
+    expected = share_as_extreme(null, of_strata(pairs), "two-sided")
+    strata = [tuple(np.array(each, float) for each in pair) for pair in pairs]
+    assert hypotheses.stratified_test(strata) == pytest.approx(expected, abs=0.02)
+    values = np.array([1.0, 2.0, 6.0, 6.0])
+    null = [studentised(x) for x in itertools.product(values - values.mean(), repeat=4)]
+    expected = share_as_extreme(null, studentised(values - 2.0), "two-sided")
+    for pair in ((values, 2.0), (2.0, values)):
+        assert hypotheses.stratified_test([pair]) == pytest.approx(expected, abs=0.02)
+    assert math.isnan(hypotheses.stratified_test([(1.0, 2.0)]))
+    assert math.isnan(hypotheses.stratified_test([(values, 2.0), (values[:2], values)]))
+    assert hypotheses.stratified_test([(values, values), (1.0, 1.0)]) == 1.0
+
+
+def of_strata(pairs):
+    """The sum of differences of means over the root of the sum of their variances."""
+    differences = sum(np.mean(a) - np.mean(b) for a, b in pairs)
+    error = sum(np.var(of, ddof=1) / len(of) for pair in pairs for of in pair)
+    return 0.0 if abs(differences) < 1e-12 else differences / math.sqrt(error)
+
+
 def test_rare_levels_do_not_reject():
     """2 of 20 runs are a tick better than 20 equal runs: Fisher's exact test has p = 0.24."""
     two_of_20, equal = [-291] * 2 + [-292] * 18, [-292] * 20

@@ -96,6 +96,7 @@ def finding(study: Study, section: Section) -> list[str]:
         "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
         "uses": GROUPS, "titles": study.methods.title,
         "reference": reference(study, common_tasks(study)),
+        "rivals": "other" if study.against else "built-in",
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
     return [shown(line.strip()) for line in text.split("\n") if line.strip()]

@@ -30,7 +30,7 @@ from coartic.internal.text import one_line
 IN_LATEX = {
     "contexts": "place, method, runs, distance, p_holm, control, p_random_search",
     "ranking": "method, gap, share, on *",
-    "differences": "own, method, difference, tasks",
+    "differences": "against, method, difference, p_holm, tasks",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "learning": "task, method, runs, after_*",
     "signatures": "task, method, hands, runs, first, first_control, first_p, arm, arm_p",

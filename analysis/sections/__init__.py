@@ -63,11 +63,12 @@ Gap to the {{ reference }}, {{ use }}{{ ", not with equal trials" if use in uneq
 {{ sentence }}
 
 {% endfor %}
-{% for own, group in others[0].groupby("own", sort=False) %}
-{{ titles[own] }} against built-in methods, percentage points by which its gap is smaller on the \
-tasks that it solved ({{ group.tasks.iloc[0] }}): \
+{% for against, group in others[0].groupby("against", sort=False) %}
+{{ titles[against] }} against {{ rivals }} methods, percentage points by which its gap is \
+smaller on the tasks that it solved ({{ group.tasks.iloc[0] }}): \
 {% for row in leading(group) %}
-{{ row.title }} {{ interval(row, "difference", scale=100) }}{{ "." if loop.last else "; " }}
+{{ row.title }} {{ interval(row, "difference", scale=100) }}\
+{{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 }}{{ "." if loop.last else "; " }}
 {%- endfor %}
 
 {% endfor %}""",

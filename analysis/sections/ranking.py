@@ -27,7 +27,12 @@ from coartic.analysis.standings import (
     shown_name,
     solved_tasks,
 )
-from coartic.analysis.statistics.hypotheses import bootstrap_test, exchange_test, holm
+from coartic.analysis.statistics.hypotheses import (
+    bootstrap_test,
+    exchange_test,
+    holm,
+    stratified_test,
+)
 from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.analysis.words import capital, interval, marked, number
@@ -147,53 +152,63 @@ def _ranked(study: Study) -> list[str]:
 
 
 @table(
-    "Own methods against built-in methods with the same use of the reward: gap of the built-in "
-    "method less that of the own method, on the tasks that the own method solved (positive: the "
-    "own method is better)",
-    "method: built-in method; own: own method; difference[]: difference of gaps (%) .1; tasks; "
-    "runs",
+    "Gaps of methods less the gap of the method against which they are compared, on the tasks that "
+    "this method solved (positive: this method is better)",
+    "method; against: compared with; difference[]: difference of gaps (%) .1; "
+    "p_holm: p (corrected) .p; tasks; runs",
 )
 def list_differences(study: Study) -> Rows:
-    """List for each method from a file the built-in methods with the same use of the reward, with
-    their gaps less its gap, on the tasks on which it solved every run; the smallest gap first.
+    """List other methods with their gaps less the gap of :attr:`.Study.against`, on the tasks on
+    which this method solved every run; the smallest gap first. Without :attr:`.Study.against` each
+    method from a file is compared with the built-in methods that have the same use of the reward.
 
-    Only built-in methods that solved every run there are listed, without settings and ablations.
-    Intervals are for other runs on the same tasks.
+    Only methods that solved every run there are listed, without settings and ablations. Intervals
+    are for other runs on the same tasks; p is two-sided (:func:`.stratified_test`), corrected for
+    the number of methods (Holm).
     """
     methods = study.methods
-    for own in own_methods(study):
-        tasks, found = solved_tasks(study, own), list[tuple[Estimate, str, pd.DataFrame]]()
-        alike = methods.built_in & (methods.information == methods.information[own])
-        for name in filter((alike & (methods.under == "")).get, compared(study)):
+    for against in [study.against] if study.against else own_methods(study):
+        tasks, found = solved_tasks(study, against), list[tuple[Estimate, str]]()
+        alike = methods.built_in & (methods.information == methods.information[against])
+        if study.against:
+            alike = methods.index != against
+        for name in methods.index[alike & (methods.under == "")].intersection([*compared(study)]):
             runs = runs_on(study, name, tasks)
             if len(runs) and runs.reward.notna().all():
-                found.append((_difference_of_gaps(study, name, own, tasks), name, runs))
-        for difference, name, runs in sorted(found, key=lambda each: each[0].value):
-            row: Row = {"method": name, "own": own, "tasks": len(tasks), "runs": len(runs)}
-            row |= difference.columns("difference")
-            yield f"{own} {name}", row | run_ids(runs, runs_on(study, own, tasks))
+                found.append((_difference_of_gaps(study, name, against, tasks), name))
+        adjusted = holm([each.p for each, _ in found]) if found else []
+        in_order = sorted(zip(found, adjusted, strict=True), key=lambda each: each[0][0].value)
+        for (difference, name), p in in_order:
+            runs = runs_on(study, name, tasks)
+            row: Row = {"method": name, "against": against, "tasks": len(tasks), "runs": len(runs)}
+            row |= {**difference.columns("difference"), "p_holm": p}
+            yield f"{against} {name}", row | run_ids(runs, runs_on(study, against, tasks))
 
 
 def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
     """Return the mean gap of the ``first`` method (a label) less the mean gap of the ``second``,
     each a mean over ``tasks``.
 
-    Tasks are not matched. Gaps of deterministic methods are taken as exact. The interval is for
-    other runs on these tasks; two exact gaps have no interval.
+    Gaps of deterministic methods are taken as exact. The interval is for other runs on these tasks;
+    two exact gaps have no interval and no p-value.
     """
     exact, weights, drawn = 0.0, list[float](), list[Array]()
+    pairs: dict[Any, list[Array | float]] = {task: [] for task in tasks}
     for sign, method in ((1, first), (-1, second)):
-        for _, of_task in runs_on(study, method, tasks).groupby("task").gap:
+        for task, of_task in runs_on(study, method, tasks).groupby("task").gap:
             weight, gaps = sign / len(tasks), of_task.to_numpy(np.float64)
             if study.methods.stochastic[method]:
                 weights.append(weight)
                 drawn.append(gaps)
+                pairs[task].append(gaps)
             else:
                 exact += weight * gaps.mean()
+                pairs[task].append(float(gaps.mean()))
     if not drawn:
         return Estimate(exact)
     sampled = mean_of_means(drawn, weights, FEWER_RESAMPLES)
-    return Estimate(sampled.value + exact, sampled.low + exact, sampled.high + exact)
+    ends = sampled.value + exact, sampled.low + exact, sampled.high + exact
+    return Estimate(*ends, p=stratified_test([(one, other) for one, other in pairs.values()]))
 
 
 @figure(

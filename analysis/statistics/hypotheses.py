@@ -13,7 +13,7 @@ A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, c
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations, islice
 from typing import Annotated, Literal
@@ -121,18 +121,71 @@ def exchange_test(
     tails = 2 if alternative == "two-sided" and n == m else 1
     least = max(tails / ways, 0.0 if exact else 1 / (1 + resamples))
     extreme = 0
-    observed = _statistics(pool, np.arange(n)[None], n)[0]
+    size = float(np.abs(pool).max())
+    observed = _studentised(*_moments(pool, np.arange(n)[None], n), size)[0]
     kept = chosen * min(n, m) <= _MOST_PLACES
     for places in (_kept_exchanges if kept else _exchanges)(n, m, chosen, exact):
-        extreme += _extreme(_statistics(pool, places, n), observed, alternative)
+        extreme += _extreme(_studentised(*_moments(pool, places, n), size), observed, alternative)
     p = extreme / ways if exact else (1 + extreme) / (1 + resamples)
     return Estimate(value, p=p, n=(n, m), resamples=0 if exact else resamples, least_p=least)
 
 
-def _statistics(pool: Array, places: NDArray[np.intp], n: int) -> Array:
-    """Return the difference of means (first less second sample) over its standard error for each
-    row of ``places``, shape ``(rows,)``. A row has the places in ``pool`` of the first sample, of
-    ``n`` values, or, with fewer places, of the second sample."""
+def stratified_test(
+    strata: Sequence[tuple[Array | float, Array | float]], resamples: int = RESAMPLES
+) -> float:
+    """Return the p-value, two-sided, of a difference of means that is itself a mean over strata,
+    such as tasks: pairs of samples, shapes ``(n,)`` and ``(m,)``, or a number that is exact.
+
+    In each stratum labels are exchanged, as in :func:`exchange_test`; beside an exact number the
+    values are drawn again, moved to its mean, as in :func:`bootstrap_test`. The statistic is the
+    sum of the differences over the root of the sum of their variances; p = (1 + resamples at least
+    as extreme) / (1 + resamples). p is NaN with fewer than three values in a sample, and without a
+    sample.
+
+    Examples
+    --------
+    >>> apart = np.array([1.0, 2.0, 3.0, 4.0]), np.array([5.0, 6.0, 7.0, 8.0])
+    >>> round(stratified_test([apart, apart]), 3)
+    0.001
+    """
+    rng = np.random.default_rng(SEED)
+    samples = [each for pair in strata for each in pair if not isinstance(each, float)]
+    if not samples or min(map(len, samples)) < FEWEST:
+        return math.nan
+    difference, variance, size = np.zeros(1), np.zeros(1), 0.0
+    differences, variances = np.zeros(resamples), np.zeros(resamples)
+    for first, second in strata:
+        if isinstance(first, float) and isinstance(second, float):
+            difference += first - second
+            continue
+        if isinstance(first, float) or isinstance(second, float):
+            values = np.ravel(first - second)
+            pool, n = centred(values), len(values)
+            moments = values.mean(), pool.var(ddof=1) / n
+        else:
+            pool, n = centred(np.concatenate([first, second])), len(first)
+            moments = _moments(pool, np.arange(n)[None], n)
+        difference, variance = difference + moments[0], variance + moments[1]
+        size += float(np.abs(pool).max())
+        for part in slices(resamples, max(1, IN_CACHE // len(pool))):
+            rows = part.stop - part.start
+            if n == len(pool):
+                drawn = pool[rng.integers(n, size=(rows, n))]
+                moments = drawn.mean(axis=1), drawn.var(axis=1, ddof=1) / n
+            else:
+                places = drawn_rows(len(pool), min(n, len(pool) - n), rows, rng)
+                moments = _moments(pool, places, n)
+            differences[part] += moments[0]
+            variances[part] += moments[1]
+    statistic = _studentised(difference, variance, size)[0]
+    extreme = _extreme(_studentised(differences, variances, size), statistic, "two-sided")
+    return float(1 + extreme) / (1 + resamples)
+
+
+def _moments(pool: Array, places: NDArray[np.intp], n: int) -> tuple[Array, Array]:
+    """Return the difference of means (first less second sample) and the variance of the difference
+    for each row of ``places``, shapes ``(rows,)``. A row has the places in ``pool`` of the first
+    sample, of ``n`` values, or, with fewer places, of the second sample."""
     few = places.shape[1]
     values = pool[places]
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
@@ -146,7 +199,7 @@ def _statistics(pool: Array, places: NDArray[np.intp], n: int) -> Array:
     )
     size = float(np.abs(pool).max())
     variances[variances < 1e-12 * size**2] = 0.0  # sums of squares round
-    return _studentised((mean - other) * (1 if few == n else -1), variances, size)
+    return (mean - other) * (1 if few == n else -1), variances
 
 
 def _studentised(differences: Array, variances: Array, size: float) -> Array:

@@ -36,12 +36,17 @@ def report(
         float | None,
         given.within("--width", "Width of these figures, inches: 3.4 for one column.", 2.5, 20),
     ] = None,
+    against: Annotated[
+        str | None,
+        given.option("METHOD", "Compare all methods with this one, in table differences."),
+    ] = None,
 ) -> None:
     """Write the report of a results folder."""
     if width is not None and not for_paper:
         raise CoarticError("--width has no effect without --for-paper")
     out = folder / "report" if out is None else out
     from coartic.analysis.report.build import write_report
+    from coartic.analysis.sections import TABLES
     from coartic.analysis.study import load
 
     started = time.monotonic()
@@ -50,7 +55,12 @@ def report(
         interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")),
     ):
         display.show(f"Reading {folder}")
-        study = load(folder)
+        study = load(folder, against=against or "")
+        if against and not len(TABLES["differences"](study)):
+            raise CoarticError(
+                f"--against {against} has no effect: no other method solved every run on the tasks "
+                "on which this one did"
+            )
         files, failures = write_report(
             study, out, for_paper=for_paper, width=width, watch=display.show
         )
