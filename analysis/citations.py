@@ -6,7 +6,7 @@ The works are entries of ``references.bib``.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -34,6 +34,7 @@ def bibliography(
     *,
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,
+    imports: Mapping[str, Sequence[str]] | None = None,
 ) -> str:
     """Return BibTeX for the software, the paper and the methods, each work once.
 
@@ -47,6 +48,9 @@ def bibliography(
     environment : mapping, optional
         Environment of a results folder (:attr:`.Study.made_with`), whose version and commit are
         cited; by default the version of this program.
+    imports : mapping, optional
+        Names and versions of the packages that files of methods import (:attr:`.Study.imports`): a
+        comment names them.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
@@ -81,6 +85,8 @@ def bibliography(
         else:
             words = f"{name}: it declares no citation; ask its authors what to cite"
             entries.append(_comment(words))
+        if used := (imports or {}).get(name):
+            entries.append(_comment(f"{name} ran with {', '.join(used)}: cite these, too"))
     return "\n\n".join(entries) + "\n"
 
 

@@ -131,7 +131,7 @@ def load(folder: str | Path, *, against: str = "") -> Study:
                 "or has a part of the runs. Repeat the `coartic run` command, which does what is "
                 "missing, or --include all parts in another folder."
             )
-        study = Study(folder, plan, store.made_with(), runs, store.marks())
+        study = Study(folder, plan, store.made_with(), runs, store.marks(), imports=store.imports())
     return replace(study, against=_label_in(study, against)) if against else study
 
 
@@ -163,6 +163,8 @@ class Study:
     against: str = ""
     """Label of the method with which table ``differences`` compares the others; empty: each method
     from a file."""
+    imports: dict[str, list[str]] = field(default_factory=dict)
+    """Names and versions of the packages that files of methods import, by the method's id."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -218,7 +220,7 @@ class Study:
         kept = pd.MultiIndex.from_tuples([(job.cell.task.name, job.cell.label) for job in jobs])
         of = pd.MultiIndex.from_frame(self.runs[["task", "label"]])
         stored = self.stored[of.isin(kept)]
-        part = Study(self.folder, jobs, self.made_with, stored, self.marks, self.against)
+        part = replace(self, plan=jobs, stored=stored)
         vars(part)["optima"] = {
             name: self.optima[name] for name in part.tasks if name in self.optima
         }

@@ -40,12 +40,24 @@ def code_of(method: type[Method], file: Path) -> str:
     """
     files = {*own_files(), str(file)}
     texts = [content_of(path) for path in files]
-    imported = {name for path in files if path.endswith(".py") for name in _imports(path)}
+    imported = _imported_by(frozenset(files))
     parts = [f"{MODEL_VERSION}.{method.version}".encode(), *texts]
     parts += [(file.parent / name).read_bytes() for name in method.files]
     parts += [line.encode() for line in (*_built_in_versions(imported), *_packages(imported))]
     hashes = sorted(hashlib.sha256(part).digest() for part in parts)
     return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]
+
+
+def imported_packages(file: str) -> list[str]:
+    """Return a line with name and version for each installed package that a method file, or a
+    user's file that it loaded, imports, without the packages that this project itself needs."""
+    return _packages(_imported_by(frozenset({*own_files(), file})))
+
+
+@cache
+def _imported_by(files: Collection[str]) -> set[str]:
+    """Return the names of all that these files import (:func:`_imports`)."""
+    return {name for path in files if path.endswith(".py") for name in _imports(path)}
 
 
 def own_files(known: Collection[str] = ()) -> set[str]:

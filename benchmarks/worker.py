@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from coartic.benchmarks.own_code import libraries, own_files
+from coartic.benchmarks.own_code import imported_packages, libraries, own_files
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.text import counted, error_line
 from coartic.method import (
@@ -138,7 +138,8 @@ def perform_job(job: Job) -> list[Outcome]:
     pairs = zip(results, sessions, strict=True)
     outcomes = [_outcome_of(cell.method, result, session, times) for result, session in pairs]
     if not cell.method.is_ours:
-        used = {"libraries": libraries()}
+        imports = imported_packages(cell.method.where)
+        used = {"libraries": libraries(), "imports": imports}
         outcomes = [replace(each, environment=used) for each in outcomes]
         if late := sorted(Path(path).name for path in own_files(modules)):
             outcomes = [replace(each, details=each.details | {LATE: late}) for each in outcomes]

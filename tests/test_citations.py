@@ -105,6 +105,9 @@ def test_command(tmp_path, coartic):
     commit = '{"id": "0123456789abcdef", "dirty": true}'
     change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
     edit_plan(tmp_path / "results", change, commit)
+    change = "UPDATE environments SET content = json_set(content, '$.imports', json(?))"
+    edit_plan(tmp_path / "results", change, '["solver 1.2", "other 3"]')
     text = coartic("cite", tmp_path / "results")[1]
     assert ", commit 0123456789abcdef with changes}," in text
     assert keys_in(text) == ["coartic", THE_PAPER, "whitney1969", "method-test-good"]
+    assert "% test/good ran with other 3, solver 1.2: cite these, too\n" in text

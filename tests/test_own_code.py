@@ -106,6 +106,7 @@ def test_a_changed_library_makes_runs_again(coartic, tmp_path, library):
                "--method-file", path, "--out", tmp_path / "out")  # fmt: skip
     assert coartic(*command, "--runs", 2)[0] == 0
     before = load(tmp_path / "out").runs
+    assert load(tmp_path / "out").imports == {}  # an editable install counts as files of the user
     library.write_text("STEP = 0.5\n", encoding="utf-8")
     code, text, error = coartic(*command, "--runs", 3)
     assert (code, "reused" in text) == (0, False), text
@@ -133,6 +134,15 @@ def test_a_file_that_is_loaded_late_is_named(place, coartic, tmp_path, library):
     assert (code, "2 reused" in text) == (0, True)
     assert error.count(f"{module}.py was first loaded during a run") == 1
     assert load(tmp_path / "out").methods.title["mine"] == "mine ‡"
+
+
+def test_packages_that_a_file_imports_are_named_without_those_of_this_project(tmp_path):
+    cma = pytest.importorskip("cma")
+    path = tmp_path / "mine.py"
+    path.write_text("import json, numpy\nfrom cma import fmin2\n", encoding="utf-8")
+    lines = own_code.imported_packages(str(path))
+    assert f"cma {cma.__version__.split()[0]}" in lines
+    assert not [line for line in lines if line.startswith("numpy")]
 
 
 def test_declared_data_and_compiled_files_count_byte_by_byte(tmp_path):

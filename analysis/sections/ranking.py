@@ -167,7 +167,8 @@ def list_differences(study: Study) -> Rows:
     the number of methods (Holm).
     """
     methods = study.methods
-    for against in [study.against] if study.against else own_methods(study):
+    chosen = [study.against] if study.against in compared(study) else []
+    for against in chosen if study.against else own_methods(study):
         tasks, found = solved_tasks(study, against), list[tuple[Estimate, str]]()
         alike = methods.built_in & (methods.information == methods.information[against])
         if study.against:

@@ -245,7 +245,7 @@ def cite(
         text = bibliography(built_in(), analysis=analysis)
     else:
         with open_store(folder) as store:
-            plan, made_with = store.plan(), store.made_with()
+            plan, made_with, imports = store.plan(), store.made_with(), store.imports()
         declared = {job.cell.method.name: job.cell.method for job in plan}
-        text = bibliography(declared, analysis=analysis, environment=made_with)
+        text = bibliography(declared, analysis=analysis, environment=made_with, imports=imports)
     say(*text.rstrip("\n").split("\n"))

@@ -298,6 +298,15 @@ class Store:
                 found[method].append(mark_of(method, kind, [str(value) for _, value in rows]))
         return dict(found)
 
+    def imports(self) -> dict[str, list[str]]:
+        """Return, by method from a file, names and versions of the packages that its file imports,
+        of all runs of the plan."""
+        query = """SELECT DISTINCT method, value FROM asked
+            JOIN environments ON environments.id = environment, json_each(content, '$.imports')
+            WHERE json_type(content, '$.imports') = 'array' ORDER BY method, value"""
+        rows = groupby(self._rows(query), itemgetter(0))
+        return {method: [plain(str(value), 100) for _, value in of] for method, of in rows}
+
     def others(self) -> Counter[int]:
         """Return the number of runs in the folder that the plan does not ask for, by the seed of
         their suite; runs of another version or code of their method (:meth:`stale`) are among
