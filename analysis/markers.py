@@ -202,10 +202,10 @@ def hits_from_markers(
             cause = (f"{also([f'trial {trial[begin[n]]:g}' for n in wrong])}. {swapped}Is this "
                      "another arm, another unit, or are markers misplaced?")  # fmt: skip
             raise CoarticError(words.format(where, _listed(each[wrong[0]]), cause))
-        middle = pd.DataFrame(lengths[hand]).median().to_numpy()
-        if (np.abs(middle / links - 1) > _TOLERANCE / 5).any():
+        usual = pd.DataFrame(lengths[hand]).median().to_numpy()
+        if (np.abs(usual / links - 1) > _TOLERANCE / 5).any():
             more = ": a task with the lengths of this person fits better"
-            warn(words.format(f"{source}:", _listed(middle), more))
+            warn(words.format(f"{source}:", _listed(usual), more))
         jumps = np.abs(np.diff(lengths[hand], axis=0, prepend=np.nan))
         jumped = (jumps > _TOLERANCE * links) & ~begins[:, None]
         swaps |= jumped.any(axis=1)
@@ -242,15 +242,14 @@ def hits_from_markers(
         back = (radii < min(3.0, to_goal - 1)).all(axis=0)
         back[: found[0][0] if found else None] = False
         if back.any():
-            again = slice(int(back.argmax()), None)
-            more = _hits(tips[:, again], task, clock[again], q[part][again])
-            twice[first + again.start] = len(more) == len(task.goals)
+            second = int(back.argmax())
+            rest = _hits(tips[:, second:], task, clock[second:], q[part][second:])
+            twice[first + second] = len(rest) == len(task.goals)
         if (done := len(found)) < len(task.goals):
             used[part] = True
-            goal = f"goal {done + 1} in trial {trial[first]:g}"
             after = tips[:, found[-1][0] + 1 if found else 0 :] - task.goal_array[done]
             nearest = np.linalg.norm(after, axis=2).min(initial=np.inf) - task.radius
-            unfinished.append(f"{goal} by {nearest:.2g}")
+            unfinished.append(f"goal {done + 1} in trial {trial[first]:g} by {nearest:.2g}")
             continue
         used[first : first + found[-1][0] + 1] = True
         away[first] = (np.linalg.norm(tips[:, 0] - origins, axis=1) > largest).any()
@@ -279,9 +278,9 @@ def hits_from_markers(
     missed = (f"{source}: {len(unfinished)} of {counted(len(parts), 'trial')} are unfinished and "
               f"have no hits: {missed}")  # fmt: skip
     if 2 * len(unfinished) > len(parts):
-        usual = [np.nanmedian(places[hand][begin, -1], axis=0) for hand in hands]
+        middles = [np.nanmedian(places[hand][begin, -1], axis=0) for hand in hands]
         raise CoarticError(
-            f"{missed}. It begins at {_points(usual)} in the median trial, at {_points(origins)} "
+            f"{missed}. It begins at {_points(middles)} in the median trial, at {_points(origins)} "
             "in the task. Are places in the unit of the task, with its origin and directions (y "
             "upwards), not filtered, and goals in its order? Else leave out trials broken off"
         )
