@@ -480,7 +480,7 @@ def _implausible(
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
     most, outer = 2 * radius, float(np.quantile(off, 0.75))
     if outer <= most:
-        most = max(most, 5 * outer - 3 * radius)
+        most = max(most, 8 * outer - 6 * radius)
     for k in (k for k, axis in enumerate("xy") if axis in task.locked_base):
         words = f"base_{'xy'[k]} is {{:g}}, but task {task.name!r} locks it at {task.q0[k]:g}"
         mark(np.abs(q[:, k] - task.q0[k]) > most, words, q[:, k])

@@ -151,20 +151,25 @@ def hits_from_markers(
     def medians(values: Array) -> Array:
         return pd.DataFrame(values).groupby(number).median().to_numpy()
 
-    def agree(name: str, each: Array, most: float, doubtful: float, words: str) -> None:
-        """Refuse, or warn of, a quantity that changes between trials; ``each``: of a trial."""
+    def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
+        """Refuse, or warn of, a quantity that changes between trials; ``each``: in a trial;
+        ``share``: of the trials at either end that are left out."""
         long = np.flatnonzero(many & np.isfinite(each))
-        ends = sorted((min(long, key=each.item), max(long, key=each.item))) if len(long) else [0, 0]
-        change = abs(each[ends[1]] - each[ends[0]])
-        one, other = (f"{each[n]:.3g} in trial {trial[begin[n]]:g}" for n in ends)
-        text = f"{source}, {names[begin[ends[1]]]}: {name} is {other}, but {one}; {words}"
-        if change > most:
+        if not len(long):
+            return
+        ordered, out = long[np.argsort(each[long], kind="stable")], int(share * len(long))
+        one, other = sorted([ordered[out], ordered[-1 - out]])
+        text = (
+            f"{source}, {names[begin[other]]}: {name} is {each[other]:.3g} in trial "
+            f"{trial[begin[other]]:g}, but {each[one]:.3g} in trial {trial[begin[one]]:g}; {words}"
+        )
+        if (change := abs(each[other] - each[one])) > most:
             raise CoarticError(text)
-        if change > doubtful:
+        if change > doubt:
             warn(text)
 
     paces = pd.Series(np.where(even, steps, np.nan)).groupby(number).mean()
-    agree("the time between samples", np.array(paces), _TOLERANCE * step, np.inf,
+    agree("the time between samples", np.array(paces), 0, _TOLERANCE * step, np.inf,
           "correct the clock, or sample all trials at one rate")  # fmt: skip
     held = np.zeros(len(frame), dtype=bool)
     places, missing_for = {}, np.zeros(len(frame))  # s, at the first sample of a gap
@@ -207,11 +212,12 @@ def hits_from_markers(
             more = ": a task with the lengths of this person fits better"
             warn(words.format(f"{source}:", _listed(usual), more))
         jumps = np.abs(np.diff(lengths[hand], axis=0, prepend=np.nan))
-        jumped = (jumps > _TOLERANCE * links) & ~begins[:, None]
+        noise = 9 * pd.DataFrame(jumps).median().to_numpy()
+        jumped = (jumps > np.maximum(_TOLERANCE * links, noise)) & ~begins[:, None]
         swaps |= jumped.any(axis=1)
         for link in range(len(links)):
             culprit[jumped[:, link] & (missing_for == 0)] = f"{hand}_{link + 1}: "
-            agree(f"the length of {hand} link {link + 1}", each[:, link], np.inf,
+            agree(f"the length of {hand} link {link + 1}", each[:, link], 0.1, np.inf,
                   _TOLERANCE / 2 * links[link], "did a marker move?")  # fmt: skip
     shoulders = {hand: np.array(task.robot.arm(hand)[2:]) for hand in hands}
     bases = [places[hand][:, 0] - shoulders[hand] for hand in hands]
@@ -222,14 +228,14 @@ def hits_from_markers(
     q = np.tile(task.q0, (len(frame), 1))
     q[:, :2] = np.mean(bases, axis=0)
     for k in ("xy".index(axis) for axis in task.locked_base):
-        agree(f"base_{'xy'[k]}", medians(q[:, k])[:, 0], 2 * task.radius, task.radius,
+        agree(f"base_{'xy'[k]}", medians(q[:, k])[:, 0], 0.1, 2 * task.radius, task.radius,
               f"task {task.name!r} locks it: did the person or the camera move?")  # fmt: skip
     for hand in hands:
         way = np.diff(places[hand], axis=1)
         q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
     rows, used, unfinished, starts = [], np.zeros(len(frame), dtype=bool), [], []
     away, rests, twice = np.zeros((3, len(frame)), dtype=bool)
-    largest = _TOLERANCE * max(task.robot.reach(hand)[1] for hand in hands)
+    largest = 0.25 * max(task.robot.reach(hand)[1] for hand in hands)
     origins = np.stack([task.robot.forward_kinematics(task.q0, hand) for hand in hands])
     for part in parts:
         first, clock = part.start, time[part]
@@ -239,7 +245,7 @@ def hits_from_markers(
         # A second start: from where the hands are back, all goals are reached again.
         radii = np.linalg.norm(tips - tips[:, :1], axis=2) / task.radius
         to_goal = np.linalg.norm(tips[:, 0] - task.goal_array[0], axis=1).min() / task.radius
-        back = (radii < min(3.0, to_goal - 1)).all(axis=0)
+        back = (radii < min(3.0, to_goal - 2)).all(axis=0)
         back[: found[0][0] if found else None] = False
         if back.any():
             second = int(back.argmax())

@@ -176,7 +176,7 @@ WRONG = {
     ),
     "no column right_3_x .also right_3_y": lambda t: t.drop(columns=["right_3_x", "right_3_y"]),
     "no sample": lambda t: t[:0],
-    "4 of 4 trials are unfinished.*goal 1 in trial 1.*begins at .0.0879, -0.486.*y upwards": lambda t: (
+    r"4 of 4 trials are unfinished.*goal 1 in trial 1.*at \(0.0879, -0.486\).*upwards": lambda t: (
         t.assign(**{name: -t[name] for name in t if name.endswith("_y")})
     ),
 }
