@@ -58,15 +58,15 @@ def read_hits(
     Blank lines, lines that begin with ``#``, commas at the end of a line, and other columns do not
     count; columns of an arm or a joint that the task does not use are left out with a warning.
     Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
-    start of the task on, with a warning. They stay, also with a warning, if the hand is more than
-    two radii from its goal in the median hit. Warns, too, if ticks rise from goal to goal, if an
-    arm of the task would be much faster or slower, if trials are there twice, and if a name is
-    spelt in two ways.
+    start of the task on, with a warning. Warns, too, if an arm of the task would be much faster or
+    slower, if trials are there twice, and if a name is spelt in two ways.
 
-    Else each hit is checked. Implausible is a hit whose hand is more than two radii from its goal
-    (more if motor noise puts a quarter of all hits outside of their goals), whose base moves where
-    it is locked, whose arm has one number in place of all its angles, or whose time is over
-    20 times the longest subtask of the corrective process, or too short for a straight movement.
+    Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
+    radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
+    whose base moves where it is locked, whose arm has an angle of more than 20 rad or one number in
+    place of all its angles, or whose time is over 20 times the longest subtask of the corrective
+    process, or too short for a straight movement. Implausible hits are refused, or with
+    ``implausible="drop"`` left out; if they are most hits of a subject they are always refused.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def read_hits(
         Ticks in a unit of ``duration``, such as 100 for seconds; by default 1. Refused if the file
         has ``ticks``.
     implausible : {"refuse", "drop"}
-        "drop" leaves implausible hits out, with a warning that counts them.
+        "drop" leaves implausible hits out, with a warning that counts them, unless most are.
 
     Returns
     -------
@@ -93,8 +93,9 @@ def read_hits(
     Raises
     ------
     CoarticError
-        The file is no such table, hits are implausible, or a wrapped joint turns by more than
-        2.5 rad between hits. A sentence says where and what is needed.
+        The file is no such table, hits are implausible, times are rounded or those of a clock that
+        runs on, or a wrapped joint turns by more than 2.5 rad between hits. A sentence says where
+        and what is needed.
     """
     if ticks_per_unit is not None and not 0 < ticks_per_unit < np.inf:
         raise CoarticError(
@@ -511,6 +512,14 @@ def _implausible(
             )
     usual, path = (float(np.median(each[known])) if known.any() else 1.0
                    for each in (ticks, straight))  # fmt: skip
+    times = np.unique(ticks)
+    least = float(np.diff(times, prepend=0.0).min())
+    is_coarse = least > max(_COARSE, 0.2 * usual) and len(times) < len(np.unique(q, axis=0))
+    if len(ticks) >= _MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
+        raise CoarticError(
+            f"{source}: all times are multiples of {least:g} ticks, the median hit takes {usual:g}:"
+            " they are rounded or constant; needed are times to a tenth of a hit or better"
+        )
     ratio = usual / max(path, 1.0)
     if known.any() and (usual > _SLOWEST * slowest or not 0.1 < ratio < 8):
         likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * ratio)))
@@ -532,14 +541,6 @@ def _implausible(
         mark(early > allowed, words, ticks, straight)
         words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
         mark(ticks > _SLOWEST * slowest, words, ticks)
-    times = np.unique(ticks)
-    least = float(np.diff(times, prepend=0.0).min())
-    is_coarse = least > max(_COARSE, 0.2 * usual) and len(times) < len(np.unique(q, axis=0))
-    if len(ticks) >= _MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
-        raise CoarticError(
-            f"{source}: all times are multiples of {least:g} ticks, the median hit takes {usual:g}:"
-            " they are rounded or constant; needed are times to a tenth of a hit or better"
-        )
     return why
 
 

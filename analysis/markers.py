@@ -87,10 +87,13 @@ def hits_from_markers(
     Raises
     ------
     CoarticError
-        The recording is no such table or of several people, the median length of a link differs
-        from the task's by more than 10 %, a marker has a longer gap, a link's length jumps by more
-        than 10 % (markers swap), two shoulders contradict each other, or :func:`.read_hits` would
-        refuse the hits.
+        The recording is no such table, of several people, or of less than 25 samples in a second;
+        the median length of a link in a trial differs from the task's by more than 10 %; trials
+        differ in the time between samples by more than 10 %, or in a locked base by more than two
+        radii; a trial begins far from the task's start or with a rest, or has a second start; most
+        trials are unfinished; a marker has a longer gap; a link's length jumps by more than 10 %
+        (markers swap); two shoulders contradict each other; or :func:`.read_hits` would refuse the
+        hits.
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")

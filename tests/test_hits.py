@@ -132,6 +132,55 @@ def test_a_hit_that_nobody_can_have_made_is_named_or_left_out(people, read, reas
     assert len(trials.runs) == len(solutions_of(TASK, people).runs) - 1
 
 
+RIGHT_ARM = [f"right_{joint}" for joint in (1, 2, 3, 4)]
+ANGLES = [*TASK.robot.joint_names[2:]]
+MOSTLY = {
+    "degrees": lambda t: t.assign(**np.degrees(t[ANGLES])),
+    "columns in another order": lambda t: t.assign(
+        **dict(zip(RIGHT_ARM, t[RIGHT_ARM[::-1]].to_numpy().T, strict=True))
+    ),
+    "clockwise": lambda t: t.assign(**-t[ANGLES]),
+    "of segments": lambda t: t.assign(**t[RIGHT_ARM].cumsum(axis=1)),
+    "of the next row": lambda t: t.assign(**t[ANGLES].shift(-1).ffill()),
+    "goals in another order": lambda t: t.assign(goal=5 - t.goal),
+    "hands swapped": lambda t: t.assign(hand=t.hand.map({"left": "right", "right": "left"})),
+    "no base": lambda t: t.assign(base_x=t.base_x + 0.5),
+}
+
+
+@pytest.mark.parametrize("change", MOSTLY)
+def test_a_person_whose_hits_are_mostly_impossible_is_refused_by_row(people, read, change):
+    ofb = people.subject == "b"
+    frame = pd.concat([people[~ofb], MOSTLY[change](people[ofb])])
+    sentence = (
+        r"line \d+: .*(radii from its goal|no angle in rad).*most hits of b: angles are in rad"
+    )
+    for implausible in ("refuse", "drop"):
+        with pytest.raises(CoarticError, match=sentence):
+            read(frame, implausible=implausible)
+        with pytest.raises(CoarticError, match="most hits of b"):
+            solutions_of(TASK, frame, implausible=implausible)
+
+
+TIMES = {
+    r"b: all times are multiples of 100 ticks, the median hit takes \d+: they are rounded": (
+        lambda ticks: (ticks / 100).round().clip(lower=1) * 100
+    ),
+    "b: all times are multiples of 150 ticks, .* or constant": lambda ticks: 0 * ticks + 150,
+    "b: in every trial times rise .* clock that runs on": np.cumsum,
+    r"b: the median hit takes .*ms \(ticks_per_unit=0.1\)": lambda ticks: 1000 * ticks + 7,
+}
+
+
+@pytest.mark.parametrize("sentence", TIMES)
+def test_times_of_a_person_that_are_none_are_refused(people, read, sentence):
+    seconds = people.assign(duration=people.ticks / 100).drop(columns="ticks")
+    change = TIMES[sentence](people.ticks[people.subject == "b"]) / 100
+    seconds.loc[people.subject == "b", "duration"] = change
+    with pytest.raises(CoarticError, match=sentence):
+        read(seconds, ticks_per_unit=100)
+
+
 def test_hands_farther_than_two_radii_are_plausible_with_motor_noise_alone(people, read):
     noisy, joints = people.copy(), [*TASK.robot.joint_names]
     noisy[joints] += 0.02 * np.random.default_rng(0).standard_normal(noisy[joints].shape)
@@ -252,6 +301,10 @@ def test_recordings_that_are_there_twice_are_said(people, read):
     later = people[people.trial > 4].assign(trial=lambda t: t.trial + 50)
     with pytest.warns(UserWarning, match="26 trials are equal .* trial 10 of b and trial 60 of b"):
         solutions_of(TASK, pd.concat([people, later]))
+    held = people[(people.subject == "b") & (people.trial == 6)].assign(trial=7)
+    stuck = people[(people.subject != "b") | (people.trial != 7)]
+    with pytest.warns(UserWarning, match="trials are equal .* trial 6 of b and trial 7 of b"):
+        read(pd.concat([stuck, held]))
 
 
 NO_TABLE = {
@@ -269,6 +322,10 @@ NO_TABLE = {
     "is a quotation mark open": lambda text: text.replace("\na,", '\n"a,', 1),
     "two columns 'ticks'": lambda text: text.replace("goal", "ticks", 1),
     "no column subject": lambda text: "",
+    "line 42: the headings are there again": lambda text: "\n".join(
+        line + ("\n" + text.partition("\n")[0]) * (n == 40)
+        for n, line in enumerate(text.splitlines())
+    ),
 }
 
 
