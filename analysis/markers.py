@@ -158,18 +158,18 @@ def hits_from_markers(
         """Refuse, or warn of, a quantity that changes between trials; ``each``: in a trial;
         ``share``: of the trials at either end that are left out."""
         long = np.flatnonzero(many & np.isfinite(each))
-        if not len(long):
+        ordered, out = np.sort(each[long]), int(share * len(long))
+        if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):
             return
-        ordered, out = long[np.argsort(each[long], kind="stable")], int(share * len(long))
-        one, other = sorted([ordered[out], ordered[-1 - out]])
+        high = each[long] > ordered[out] + change / 2
+        one, other = sorted((long[high.argmin()], long[high.argmax()]))
         text = (
             f"{source}, {names[begin[other]]}: {name} is {each[other]:.3g} in trial "
             f"{trial[begin[other]]:g}, but {each[one]:.3g} in trial {trial[begin[one]]:g}; {words}"
         )
-        if (change := abs(each[other] - each[one])) > most:
+        if change > most:
             raise CoarticError(text)
-        if change > doubt:
-            warn(text)
+        warn(text)
 
     paces = pd.Series(np.where(even, steps, np.nan)).groupby(number).mean()
     agree("the time between samples", np.array(paces), 0, _TOLERANCE * step, np.inf,
@@ -370,9 +370,13 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int
     ``time`` and ``q`` times ``(n,)`` and postures ``(n, dof)`` of the samples."""
     found: list[tuple[int, int, float, Array]] = []
     ways = np.diff(tips, axis=1, prepend=tips[:, :1])  # to each sample from the one before
+    starts, lengths = tips - ways, np.linalg.norm(ways, axis=2)
     for goal in task.goal_array:
         first = found[-1][0] + 1 if found else 0
-        way, start = ways[:, first:], (tips - ways)[:, first:] - goal
+        off = np.linalg.norm(tips[:, first:] - goal, axis=2)
+        near_goal = (off <= task.radius + lengths[:, first:]).any(axis=0)
+        samples = first + np.flatnonzero(near_goal)
+        way, start = ways[:, samples], starts[:, samples] - goal
         square = np.maximum((way**2).sum(axis=2), 1e-18)
         slope = (start * way).sum(axis=2)
         near = start + np.clip(-slope / square, 0, 1)[..., None] * way
@@ -381,7 +385,7 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int
         if not inside.any():
             return found
         place = int(inside.argmax())
-        hand, sample = int(off[:, place].argmin()), first + place
+        hand, sample = int(off[:, place].argmin()), int(samples[place])
         excess = (start[hand, place] ** 2).sum() - task.radius**2
         root = slope[hand, place] ** 2 - square[hand, place] * excess
         share = (-slope[hand, place] - np.sqrt(max(root, 0.0))) / square[hand, place]
