@@ -370,13 +370,9 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int
     ``time`` and ``q`` times ``(n,)`` and postures ``(n, dof)`` of the samples."""
     found: list[tuple[int, int, float, Array]] = []
     ways = np.diff(tips, axis=1, prepend=tips[:, :1])  # to each sample from the one before
-    starts, lengths = tips - ways, np.linalg.norm(ways, axis=2)
     for goal in task.goal_array:
         first = found[-1][0] + 1 if found else 0
-        off = np.linalg.norm(tips[:, first:] - goal, axis=2)
-        near_goal = (off <= task.radius + lengths[:, first:]).any(axis=0)
-        samples = first + np.flatnonzero(near_goal)
-        way, start = ways[:, samples], starts[:, samples] - goal
+        way, start = ways[:, first:], (tips - ways)[:, first:] - goal
         square = np.maximum((way**2).sum(axis=2), 1e-18)
         slope = (start * way).sum(axis=2)
         near = start + np.clip(-slope / square, 0, 1)[..., None] * way
@@ -385,7 +381,7 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int
         if not inside.any():
             return found
         place = int(inside.argmax())
-        hand, sample = int(off[:, place].argmin()), int(samples[place])
+        hand, sample = int(off[:, place].argmin()), first + place
         excess = (start[hand, place] ** 2).sum() - task.radius**2
         root = slope[hand, place] ** 2 - square[hand, place] * excess
         share = (-slope[hand, place] - np.sqrt(max(root, 0.0))) / square[hand, place]
