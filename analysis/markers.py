@@ -262,10 +262,12 @@ def hits_from_markers(
             continue
         used[first : first + found[-1][0] + 1] = True
         away[first] = (np.linalg.norm(tips[:, 0] - origins, axis=1) > largest).any()
-        ways = [np.linalg.norm(places[hand][part] - places[hand][first], axis=2) for hand in hands]
-        moved = np.append(np.concatenate(ways, axis=1).max(axis=1), np.inf) / task.radius
+        to_hit = slice(first, first + found[0][0] + 1)
+        ways = np.hstack([places[hand][to_hit] - places[hand][first] for hand in hands])
+        moved = np.linalg.norm(ways, axis=2).max(axis=1) / task.radius
+        moved[-1] = np.inf
         # A smooth movement has gone 8 times as far after twice the time: the rest is before it.
-        leaves, is_far = (np.append(clock, clock[-1])[np.argmax(moved > far)] for far in (0.5, 4))
+        leaves, is_far = (clock[np.argmax(moved > far)] for far in (0.5, 4))
         rests[first] = 2 * leaves - is_far - clock[0] > _LONGEST_REST
         starts.append(np.linalg.norm(q[first] - task.q0))
         before = clock[0]
@@ -369,20 +371,20 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int
     the last two where the tip enters the goal. ``tips`` are places of hands, ``(hands, n, 2)``,
     ``time`` and ``q`` times ``(n,)`` and postures ``(n, dof)`` of the samples."""
     found: list[tuple[int, int, float, Array]] = []
-    ways = np.diff(tips, axis=1, prepend=tips[:, :1])  # to each sample from the one before
-    for goal in task.goal_array:
+    at, goals = tips @ [1, 1j], task.goal_array @ [1, 1j]
+    ways = np.diff(at, axis=1, prepend=at[:, :1])  # to each sample from the one before
+    for goal in goals:
         first = found[-1][0] + 1 if found else 0
-        way, start = ways[:, first:], (tips - ways)[:, first:] - goal
-        square = np.maximum((way**2).sum(axis=2), 1e-18)
-        slope = (start * way).sum(axis=2)
-        near = start + np.clip(-slope / square, 0, 1)[..., None] * way
-        off = np.linalg.norm(near, axis=2)
+        way, start = ways[:, first:], (at - ways)[:, first:] - goal
+        square = np.maximum(way.real**2 + way.imag**2, 1e-18)
+        slope = (start * way.conj()).real
+        off = np.abs(start + np.clip(-slope / square, 0, 1) * way)
         inside = (off <= task.radius).any(axis=0)
         if not inside.any():
             return found
         place = int(inside.argmax())
         hand, sample = int(off[:, place].argmin()), first + place
-        excess = (start[hand, place] ** 2).sum() - task.radius**2
+        excess = abs(start[hand, place]) ** 2 - task.radius**2
         root = slope[hand, place] ** 2 - square[hand, place] * excess
         share = (-slope[hand, place] - np.sqrt(max(root, 0.0))) / square[hand, place]
         share = np.clip(share, 0, 1) if sample else 1.0
