@@ -293,7 +293,8 @@ def hits_from_markers(
         raise CoarticError(
             f"{missed}. It begins at {_points(middles)} in the median trial, at {_points(origins)} "
             "in the task. Are places in the unit of the task, with its origin and directions (y "
-            "upwards), not filtered, and goals in its order? Else leave out trials broken off"
+            "upwards), not filtered, cut at the start, and goals in its order? Else leave out trials "
+            "that were broken off"
         )
     refuse(away, f"the hand is not within {largest:.2g} of {_points(origins)}, where task "
            f"{task.name!r} starts; needed are trials cut at the start, or the start of people in "
@@ -331,7 +332,7 @@ def _listed(lengths: Array) -> str:
 
 def _points(places: Iterable[Array]) -> str:
     """Return places as text, such as ``(0.088, 0.486)``."""
-    return " and ".join(f"({_listed(place)})" for place in places)
+    return " and ".join(f"({_listed(np.round(place, 6) + 0.0)})" for place in places)
 
 
 def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
