@@ -293,8 +293,8 @@ def hits_from_markers(
         raise CoarticError(
             f"{missed}. It begins at {_points(middles)} in the median trial, at {_points(origins)} "
             "in the task. Are places in the unit of the task, with its origin and directions (y "
-            "upwards), not filtered, cut at the start, and goals in its order? Else leave out trials "
-            "that were broken off"
+            "upwards), not filtered, cut at the start, and goals in its order? Else leave out "
+            "trials that were broken off"
         )
     refuse(away, f"the hand is not within {largest:.2g} of {_points(origins)}, where task "
            f"{task.name!r} starts; needed are trials cut at the start, or the start of people in "
