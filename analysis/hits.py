@@ -37,6 +37,10 @@ _SLOWEST = 20
 """Longest plausible time of a hit, in longest subtasks of the corrective process alone."""
 _UNITS = {"s": 100.0, "ms": 0.1, "min": 6000.0, "control steps": 1.0}
 """Ticks in units of a duration, for a person who takes a second for each rad."""
+_MANY = 20
+"""Fewest hits of a subject whose times are looked at for rounding."""
+_COARSE = 10.0
+"""Ticks to which times may be rounded in any case."""
 _NAMED = 5  # of a kind
 _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
@@ -54,15 +58,15 @@ def read_hits(
     Blank lines, lines that begin with ``#``, commas at the end of a line, and other columns do not
     count; columns of an arm or a joint that the task does not use are left out with a warning.
     Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
-    start of the task on, with a warning. They stay, also with a warning, if the hand is more than
-    two radii from its goal in the median hit. Warns, too, if ticks rise from goal to goal, if an
-    arm of the task would be much faster or slower, if trials are there twice, and if a name is
-    spelt in two ways.
+    start of the task on, with a warning. Warns, too, if an arm of the task would be much faster or
+    slower, if trials are there twice, and if a name is spelt in two ways.
 
-    Else each hit is checked. Implausible is a hit whose hand is more than two radii from its goal
-    (more if motor noise puts a quarter of all hits outside of their goals), whose base moves where
-    it is locked, whose arm has one number in place of all its angles, or whose time is over
-    20 times the longest subtask of the corrective process, or too short for a straight movement.
+    Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
+    radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
+    whose base moves where it is locked, whose arm has an angle of more than 20 rad or one number in
+    place of all its angles, or whose time is over 20 times the longest subtask of the corrective
+    process, or too short for a straight movement. Implausible hits are refused, or with
+    ``implausible="drop"`` left out; if they are most hits of a subject they are always refused.
 
     Parameters
     ----------
@@ -78,7 +82,7 @@ def read_hits(
         Ticks in a unit of ``duration``, such as 100 for seconds; by default 1. Refused if the file
         has ``ticks``.
     implausible : {"refuse", "drop"}
-        "drop" leaves implausible hits out, with a warning that counts them.
+        "drop" leaves implausible hits out, with a warning that counts them, unless most are.
 
     Returns
     -------
@@ -89,8 +93,9 @@ def read_hits(
     Raises
     ------
     CoarticError
-        The file is no such table, hits are implausible, or a wrapped joint turns by more than
-        2.5 rad between hits. A sentence says where and what is needed.
+        The file is no such table, hits are implausible, times are rounded or those of a clock that
+        runs on, or a wrapped joint turns by more than 2.5 rad between hits. A sentence says where
+        and what is needed.
     """
     if ticks_per_unit is not None and not 0 < ticks_per_unit < np.inf:
         raise CoarticError(
@@ -126,6 +131,41 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
         kind = "in UTF-16, as Excel and Notepad write 'Unicode'" if wide else "not in UTF-8"
         kind = f"damaged from byte {content.find(0)} on" if len(text) > 1 and not wide else kind
         raise CoarticError(f"{path} is {kind}: save it as CSV in UTF-8")
+    frame, lines = _plain_table(text) or _odd_table(path, text)
+    again = np.flatnonzero(frame.iloc[:, :1] == frame.columns[:1]).tolist()
+    if again:
+        others = also([lines[row] for row in again])
+        raise CoarticError(f"{path}, {lines[again[0]]}: the headings are there again{others}")
+    return frame, lines
+
+
+def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
+    """Return the table of :func:`read_table`, fast, or None for a text with quotes, comments, blank
+    lines, rows that differ in length, or odd headings."""
+    head, _, body = text.replace("\r\n", "\n").removesuffix("\n").partition("\n")
+    headings, rows = [*map(_written, head.split(","))], body.count("\n") + 1
+    if (
+        any(odd in text for odd in '"#')
+        or "\r" in body
+        or not all(headings)
+        or not 1 < len({*headings}) == len(headings)
+        or body.count(",") != rows * (len(headings) - 1)
+    ):
+        return None
+    try:
+        frame = pd.read_csv(
+            io.StringIO(body), names=headings, dtype={"subject": str, "hand": str}, na_values=[""],
+            keep_default_na=False, skipinitialspace=True, low_memory=False,
+        )  # fmt: skip
+    except ValueError:  # of rows with more values
+        return None
+    if len(frame) != rows or frame.isna().all(axis=1).any():
+        return None
+    return frame, [f"line {row}" for row in range(2, rows + 2)]
+
+
+def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
+    """Return the table of :func:`read_table`, line by line."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
     rows, lines, wrong, hidden = [], [], [], []
@@ -300,7 +340,7 @@ def checked_hits(
         if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
             value = frame[column].tolist()[rows[0]]
             needs = wanted if isinstance(wanted, str) else wanted(value)
-            shown = "empty" if value == "" else brief_value(value)
+            shown = "empty" if value == "" or pd.isna(value) else brief_value(value)
             key = "duration" if column == "ticks" and is_file and timed else column
             others = also([called[row] for row in rows])
             raise CoarticError(f"{source}, {called[rows[0]]}: {key} is {shown}; {needs}{others}")
@@ -338,29 +378,41 @@ def checked_hits(
     for name in joints[:2]:
         far = "needed is a place in the length unit of the task"
         refuse(frame[name].abs() > LARGEST_ENTRY, name, far)
-    for name in joints[2:]:
-        if (frame[name].abs() > _LARGEST_ANGLE).mean() > 0.5:
-            wanted = "angles are in rad: convert degrees with numpy.radians"
-            refuse(frame[name].abs() > _LARGEST_ANGLE, name, wanted)
     keys = frame.trial * (last + 1) + frame.goal
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
     frame, called = frame.iloc[order].reset_index(drop=True), [called[n] for n in order]
-    why, is_far = _implausible(frame, task, source, unit)
-    reasons, count = [], len(frame)
-    while wrong := np.flatnonzero(why != "").tolist():  # without them others may stand out
-        reasons += [f"{called[row]}: {why[row]}" for row in wrong]
-        if implausible == "refuse" or len(reasons) == count:
-            raise CoarticError(f'{source}, {reasons[0]}{also(reasons)}. Mend the recording, or '
-                               'leave such hits out with implausible="drop"')  # fmt: skip
-        frame = frame[why == ""].reset_index(drop=True)
+    initial, counts = initial_solution(task), frame.subject.value_counts()
+    slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * len(joints)])
+    reasons: list[str] = []
+    whose: list[str] = []
+    while True:  # without implausible hits others may stand out
+        why = np.full(len(frame), "", dtype=object)
+        for subject, rows in frame.groupby("subject", sort=False).indices.items():
+            hits = frame.iloc[rows].reset_index(drop=True)
+            why[rows] = _implausible(hits, task, f"{source}, {subject}", unit, slowest)
+        wrong = why != ""
+        reasons += [f"{called[row]}: {why[row]}" for row in np.flatnonzero(wrong).tolist()]
+        whose += frame.subject[wrong].tolist()
+        most = [name for name in counts.index if 2 * whose.count(name) > counts[name]]
+        if not wrong.any():
+            break
+        if implausible == "refuse" or most:
+            advice = 'Mend the recording, or leave such hits out with implausible="drop"'
+            if most:
+                advice = (
+                    f"So are most hits of {most[0]}: angles are in rad (numpy.radians converts), "
+                    "anticlockwise, each measured from the link before. Is each in its column and "
+                    "row, are hands and goals right, is the base in the length unit of the task, "
+                    f"and is the task {task.name!r}?"
+                )
+            raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {advice}")
+        frame = frame[~wrong].reset_index(drop=True)
         called = [name for name, words in zip(called, why, strict=True) if not words]
-        why, is_far = _implausible(frame, task, source, unit)
     if reasons:
-        warn(f"{source}: {len(reasons)} of {counted(count, 'hit')} are left out as implausible, "
-              f"{reasons[0]}{also(reasons)}")  # fmt: skip
+        warn(f"{source}: {len(reasons)} of {counted(counts.sum(), 'hit')} are left out as "
+             f"implausible, {reasons[0]}{also(reasons)}")  # fmt: skip
     _warn_of_copies(frame, source)
-    if not is_far:
-        _unwrap(frame, task, source, called)
+    _unwrap(frame, task, source, called)
     return frame
 
 
@@ -402,16 +454,14 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
 
 
 def _implausible(
-    frame: pd.DataFrame, task: Task, source: str, unit: float
-) -> tuple[NDArray[np.object_], bool]:
-    """Return why sorted hits are implausible, a text for each, empty for a plausible hit, and
-    whether the hand is more than two radii from its goal in the median hit: then places are not
-    checked.
+    frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
+) -> NDArray[np.object_]:
+    """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
+    hit. ``unit``: ticks in a unit of time; ``slowest``: longest subtask of the corrective process.
 
-    Warns of a median hit so far off, of ticks that rise from goal to goal in every trial, and of an
-    arm that is faster or slower than people's. Raises CoarticError if the median hit contradicts
-    the base that the task locks, or takes a number of ticks that no arm of the task could take;
-    ``unit``: ticks in a unit of time.
+    Warns of an arm that is faster or slower than people's. Raises CoarticError if times are those
+    of a clock that runs on, rounded or constant, or if the median hit takes a number of ticks that
+    no arm of the task could take.
     """
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
     goal, ticks = frame.goal.to_numpy(np.int64), frame.ticks.to_numpy(np.float64)
@@ -426,47 +476,52 @@ def _implausible(
         rows = (frame.hand == hand).to_numpy()
         places = task.robot.forward_kinematics(q[rows], hand)
         off[rows] = np.linalg.norm(places - task.goal_array[goal[rows] - 1], axis=1)
-    if is_far := bool(np.median(off) > 2 * radius):
-        warn(
-            f"{source}: in the median hit the hand is {np.median(off):.2g} length units from its "
-            "goal. Are the angles in rad, each measured from the link before, the base in the "
-            f"length unit of the task, and is the task {task.name!r}?"
-        )
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
         mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
     most, outer = 2 * radius, float(np.quantile(off, 0.75))
     if outer <= most:
-        most = max(most, 5 * outer - 3 * radius)
+        most = max(most, 8 * outer - 6 * radius)
     for k in (k for k, axis in enumerate("xy") if axis in task.locked_base):
-        moved = np.abs(q[:, k] - task.q0[k])
         words = f"base_{'xy'[k]} is {{:g}}, but task {task.name!r} locks it at {task.q0[k]:g}"
-        if np.median(moved) > most:
-            middle = words.format(np.median(q[:, k]))
-            raise CoarticError(f"{source}: in the median hit {middle}")
-        mark(moved > most, words, q[:, k])
-    trial = frame.groupby(["subject", "trial"], sort=False).ngroup().to_numpy()
+        mark(np.abs(q[:, k] - task.q0[k]) > most, words, q[:, k])
+    trial = frame.groupby("trial", sort=False).ngroup().to_numpy()
     for hand in task.hands:
         arm, start = q[:, task.robot.joints(hand)], task.q0[task.robot.joints(hand)]
         left = pd.Series((arm != start).any(axis=1)).groupby(trial).cummax().to_numpy()
         one = (arm == arm[:, :1]).all(axis=1) & left & (len(start) > 1)
         mark(one, f"all angles of the {hand} arm are {{:g}}", arm[:, 0])
-    if not is_far:
-        mark(off > most, "the hand is {:.3g} radii from its goal", off / radius)
-    begins, follows = goal == 1, np.zeros(len(frame), dtype=bool)
-    follows[1:] = (trial[1:] == trial[:-1]) & (goal[1:] == goal[:-1] + 1)
+    mark(off > most, "the hand is {:.3g} radii from its goal", off / radius)
     whole = why == ""
-    follows[1:] &= whole[:-1]
+    if 2 * whole.sum() < len(whole):
+        return why
+    begins, follows = goal == 1, np.zeros(len(frame), dtype=bool)
+    follows[1:] = (trial[1:] == trial[:-1]) & (goal[1:] == goal[:-1] + 1) & whole[:-1]
     way = np.where(begins[:, None], q - task.q0, q - np.roll(q, 1, axis=0))
     way[:, 2:] -= 2 * np.pi * np.rint(way[:, 2:] / (2 * np.pi))
     straight = np.linalg.norm(way, axis=1) / PAPER.step
     known = (begins | follows) & whole
-    initial = initial_solution(task)
-    slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * len(task.q0)])
+    later = follows & whole
+    rises, paths = np.diff(ticks, prepend=0.0)[later], np.maximum(straight[later], 1.0)
+    if later.sum() >= _MANY and (rises > 0).all():
+        spread, of_rises = (np.std(np.log(each / paths)) for each in (ticks[later], rises))
+        if of_rises < spread:
+            raise CoarticError(
+                f"{source}: in every trial times rise from goal to goal, as those of a clock that "
+                "runs on; needed are times from the hit before"
+            )
     usual, path = (float(np.median(each[known])) if known.any() else 1.0
                    for each in (ticks, straight))  # fmt: skip
+    times = np.unique(ticks)
+    least = float(np.diff(times, prepend=0.0).min())
+    is_coarse = least > max(_COARSE, 0.2 * usual) and len(times) < len(np.unique(q, axis=0))
+    if len(ticks) >= _MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
+        raise CoarticError(
+            f"{source}: all times are multiples of {least:g} ticks, the median hit takes {usual:g}:"
+            " they are rounded or constant; needed are times to a tenth of a hit or better"
+        )
     ratio = usual / max(path, 1.0)
-    if known.any() and not is_far and (usual > _SLOWEST * slowest or not 0.1 < ratio < 8):
+    if known.any() and (usual > _SLOWEST * slowest or not 0.1 < ratio < 8):
         likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * ratio)))
         words = (
             f"{source}: the median hit takes {usual:g} ticks with {unit:g} ticks per unit; a "
@@ -476,7 +531,7 @@ def _implausible(
         if usual > _SLOWEST * slowest or ratio <= 0.1:
             raise CoarticError(words)
         warn(words)
-    elif not is_far:
+    else:
         early = np.where(known, straight - ticks, -1.0) * PAPER.step
         if np.quantile(early, 0.75) > 0.1:
             step = f"whose step is {PAPER.step:g} a tick. Are there more ticks in a unit?"
@@ -486,23 +541,17 @@ def _implausible(
         mark(early > allowed, words, ticks, straight)
         words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
         mark(ticks > _SLOWEST * slowest, words, ticks)
-    table = frame.pivot_table("ticks", ["subject", "trial"], "goal").dropna()
-    if len(table) >= 10 and (table.diff(axis=1).iloc[:, 1:] > 0).to_numpy().all():
-        warn(
-            f"{source}: in every trial ticks rise from goal to goal. Are they from the hit before, "
-            "and not from the start of the trial?"
-        )
-    return why, is_far
+    return why
 
 
 def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
-    """Warn if at least three different trials are there twice or more, equal in all numbers, of one
-    subject or of several."""
+    """Warn if trials of a subject, or at least three different trials of several, are there twice
+    or more, equal in all numbers."""
     hits = pd.util.hash_pandas_object(frame.drop(columns=["subject", "trial"]), index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
     copies = trials[trials.duplicated(keep=False)]
-    if copies.nunique() >= 3:
+    if copies.nunique() >= 3 or copies.reset_index(name="sum").duplicated(["subject", "sum"]).any():
         first = [f"trial {trial:g} of {subject}" for subject, trial in
                  copies.index[copies == copies.iloc[-1]][:2]]  # fmt: skip
         warn(f"{source}: {len(copies)} trials are equal to others in all numbers, such as "
-              f"{' and '.join(first)}. Is a recording there twice?")  # fmt: skip
+              f"{' and '.join(first)}. Is a recording there twice, or a trial copied?")  # fmt: skip

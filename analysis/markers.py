@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import chain
+from collections.abc import Iterable, Sequence
+from itertools import chain, combinations
 from pathlib import Path
 from typing import Literal
 
@@ -32,6 +33,12 @@ _TOLERANCE = 0.1
 """Largest difference, as a share, of the length of a link, and of places of the base."""
 _RARE = 0.05
 """Share of samples in which a marker is still below which long rests are in doubt."""
+_MANY = 20
+"""Fewest samples of a trial that is compared with others."""
+_LONGEST_STEP = 0.0401
+"""Longest time between samples, s: else hands pass goals between samples."""
+_LONGEST_REST = 0.2
+"""Longest rest at the begin of a trial, s."""
 _FAR_START = 0.3
 """Distance of the posture in which trials begin from the task's start, with a warning."""
 
@@ -80,10 +87,13 @@ def hits_from_markers(
     Raises
     ------
     CoarticError
-        The recording is no such table or of several people, the median length of a link differs
-        from the task's by more than 10 %, a marker has a longer gap, a link's length jumps by more
-        than 10 % (markers swap), two shoulders contradict each other, or :func:`.read_hits` would
-        refuse the hits.
+        The recording is no such table, of several people, or of less than 25 samples in a second;
+        the median length of a link in a trial differs from the task's by more than 10 %; trials
+        differ in the time between samples by more than 10 %, or in a locked base by more than two
+        radii; a trial begins far from the task's start or with a rest, or has a second start; most
+        trials are unfinished; a marker has a longer gap; a link's length jumps by more than 10 %
+        (markers swap); two shoulders contradict each other; or :func:`.read_hits` would refuse the
+        hits.
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")
@@ -108,7 +118,7 @@ def hits_from_markers(
     def refuse(wrong: NDArray[np.bool_], words: str) -> None:
         if rows := np.flatnonzero(wrong).tolist():
             others = also([names[row] for row in rows])
-            raise CoarticError(f"{source}, {names[rows[0]]}: {culprit[rows[0]]}{words}{others}")
+            raise CoarticError(f"{source}, {names[rows[0]]}: {words}{others}")
 
     culprit = np.full(len(frame), "", dtype=object)  # the marker to be named at a sample
 
@@ -117,21 +127,53 @@ def hits_from_markers(
     refuse((people == "").to_numpy(), "subject is empty; needed is a name")
     refuse(others.to_numpy(), "another subject; needed is a file for each person")
     trial, time = as_numbers(frame.trial), as_numbers(frame.time)
-    refuse(~((trial % 1 == 0) & (trial >= 1)), "trial is no whole number from 1")
-    refuse(~np.isfinite(time), "time is no number in s")
+    for name, numbers in (("trial", trial), ("time", time)):
+        for row in np.flatnonzero(~np.isfinite(numbers))[:1].tolist():
+            value = frame[name][row]
+            refuse(~np.isfinite(numbers), f"{name} is {value!r}; {why_no_number(value)}")
+    refuse((trial % 1 != 0) | (trial < 1), "trial is no whole number from 1")
     begins = np.append(True, np.diff(trial) != 0)
     again = pd.Series(np.where(begins, trial, np.nan)).duplicated().to_numpy() & begins
     refuse(again, "a trial of this number ended above; number trials through from session to "
-           "session, and sort samples by time")  # fmt: skip
+           "session, sort samples by time, and give people of one name a file each")  # fmt: skip
     steps = np.append(0.0, np.diff(time))
-    refuse(~begins & (steps <= 0), "time does not increase; needed are the samples in order")
-    step = float(np.median(steps[~begins])) if not begins.all() else np.nan
-    if not 0.0005 <= step <= 0.2:
+    refuse(~begins & (steps <= 0), "time does not increase; needed is each sample once, in order, "
+           "with a time that is not rounded, and a trial for each start of the clock")  # fmt: skip
+    begin, number = np.flatnonzero(begins), np.cumsum(begins) - 1
+    paces = pd.Series(np.where(begins, np.nan, steps)).groupby(number).transform("median")
+    even = ~begins & (steps <= 2.5 * paces.to_numpy())  # without gaps; clocks may be rounded
+    step = float(steps[even].mean()) if even.any() else np.nan
+    if not 0.0005 <= step <= _LONGEST_STEP:
         raise CoarticError(
-            f"{source}: the median time between samples is {step:g} s; needed are 5 to 2000 in a "
-            "second. Is time in s, and not in ms or frames?"
+            f"{source}: the time between samples is {step:g} s; needed are 25 to 2000 "
+            "samples in a second. Is time in s, and not in ms or frames, and are all samples there?"
         )
-    begin = np.flatnonzero(begins)
+    parts = [slice(*ends) for ends in zip(begin, [*begin[1:], len(frame)], strict=True)]
+    many = np.bincount(number, even) >= _MANY
+
+    def medians(values: Array) -> Array:
+        return pd.DataFrame(values).groupby(number).median().to_numpy()
+
+    def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
+        """Refuse, or warn of, a quantity that changes between trials; ``each``: in a trial;
+        ``share``: of the trials at either end that are left out."""
+        long = np.flatnonzero(many & np.isfinite(each))
+        ordered, out = np.sort(each[long]), int(share * len(long))
+        if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):
+            return
+        high = each[long] > ordered[out] + change / 2
+        one, other = sorted((long[high.argmin()], long[high.argmax()]))
+        text = (
+            f"{source}, {names[begin[other]]}: {name} is {each[other]:.3g} in trial "
+            f"{trial[begin[other]]:g}, but {each[one]:.3g} in trial {trial[begin[one]]:g}; {words}"
+        )
+        if change > most:
+            raise CoarticError(text)
+        warn(text)
+
+    paces = pd.Series(np.where(even, steps, np.nan)).groupby(number).mean()
+    agree("the time between samples", np.array(paces), 0, _TOLERANCE * step, np.inf,
+          "correct the clock, or sample all trials at one rate")  # fmt: skip
     held = np.zeros(len(frame), dtype=bool)
     places, missing_for = {}, np.zeros(len(frame))  # s, at the first sample of a gap
     for hand in hands:
@@ -147,33 +189,39 @@ def hits_from_markers(
         at[(at == 0).all(axis=2) & far] = np.nan  # near the origin a marker may be there
         for marker, name in enumerate(markers[hand]):
             still = ~begins & (np.diff(at[:, marker], axis=0, prepend=np.nan) == 0).all(axis=1)
-            if still.mean() < _RARE:
+            if 0 < still.mean() < _RARE:
                 kept = np.where(still[:, None], np.nan, at[:, marker])
-                held |= _bridge(kept, time, begin, step) > _LONGEST_GAP
-            durations = _bridge(at[:, marker], time, begin, step)
+                held |= _bridge(kept, time, parts, step) > _LONGEST_GAP
+            durations = _bridge(at[:, marker], time, parts, step)
             culprit[durations > missing_for] = f"{hand}_{name}: "
             missing_for = np.maximum(missing_for, durations)
-    leap = ~begins & (steps > 1.5 * step)
+    leap = ~begins & (steps > 1.9 * step)  # clocks may be rounded
     missing_for[leap] = np.maximum(missing_for[leap], steps[leap] - step)
     lengths = {hand: np.linalg.norm(np.diff(places[hand], axis=1), axis=2) for hand in hands}
     swaps = np.zeros(len(frame), dtype=bool)
     for hand in hands:
-        links = task.robot.arm(hand).links
+        links, each = task.robot.arm(hand).links, medians(lengths[hand])
+        off = np.abs(each / links - 1)
+        words = (f"{{}} the links of the {hand} arm are {{}} long in the median sample, those of "
+                 f"task {task.name!r} {_listed(links)}{{}}")  # fmt: skip
+        if wrong := np.flatnonzero((off > _TOLERANCE).any(axis=1)).tolist():
+            where = f"{source}, {names[begin[wrong[0]]]}: in trial {trial[begin[wrong[0]]]:g}"
+            swapped = _swapped(places[hand][parts[wrong[0]]], links, markers[hand])
+            cause = (f"{also([f'trial {trial[begin[n]]:g}' for n in wrong])}. {swapped}Is this "
+                     "another arm, another unit, or are markers misplaced?")  # fmt: skip
+            raise CoarticError(words.format(where, _listed(each[wrong[0]]), cause))
         usual = pd.DataFrame(lengths[hand]).median().to_numpy()
-        off = np.abs(usual / links - 1)
-        words = (f"{source}: the links of the {hand} arm are {_listed(usual)} long in the median "
-                 f"sample, those of task {task.name!r} {_listed(links)}")  # fmt: skip
-        if (off > _TOLERANCE).any():
-            raise CoarticError(f"{words}. Is this another arm, or another unit?")
-        if (off > _TOLERANCE / 5).any():
-            warn(f"{words}: a task with the lengths of this person fits better")
-        each = pd.DataFrame(lengths[hand]).groupby(np.cumsum(begins)).transform("median")
-        jumps = np.diff(lengths[hand], axis=0, prepend=lengths[hand][:1])
-        jumps[begins] = each[begins] - usual
-        jumped = np.abs(jumps) > _TOLERANCE * links
+        if (np.abs(usual / links - 1) > _TOLERANCE / 5).any():
+            more = ": a task with the lengths of this person fits better"
+            warn(words.format(f"{source}:", _listed(usual), more))
+        jumps = np.abs(np.diff(lengths[hand], axis=0, prepend=np.nan))
+        noise = 9 * pd.DataFrame(jumps).median().to_numpy()
+        jumped = (jumps > np.maximum(_TOLERANCE * links, noise)) & ~begins[:, None]
         swaps |= jumped.any(axis=1)
         for link in range(len(links)):
             culprit[jumped[:, link] & (missing_for == 0)] = f"{hand}_{link + 1}: "
+            agree(f"the length of {hand} link {link + 1}", each[:, link], 0.1, np.inf,
+                  _TOLERANCE / 2 * links[link], "did a marker move?")  # fmt: skip
     shoulders = {hand: np.array(task.robot.arm(hand)[2:]) for hand in hands}
     bases = [places[hand][:, 0] - shoulders[hand] for hand in hands]
     apart = np.linalg.norm(np.ptp(bases, axis=0), axis=1)
@@ -182,31 +230,77 @@ def hits_from_markers(
 
     q = np.tile(task.q0, (len(frame), 1))
     q[:, :2] = np.mean(bases, axis=0)
+    for k in ("xy".index(axis) for axis in task.locked_base):
+        agree(f"base_{'xy'[k]}", medians(q[:, k])[:, 0], 0.1, 2 * task.radius, task.radius,
+              f"task {task.name!r} locks it: did the person or the camera move?")  # fmt: skip
     for hand in hands:
         way = np.diff(places[hand], axis=1)
         q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
     rows, used, unfinished, starts = [], np.zeros(len(frame), dtype=bool), [], []
-    for first, end in zip(begin, [*begin[1:], len(frame)], strict=True):
-        part = slice(first, end)
+    away, rests, twice = np.zeros((3, len(frame)), dtype=bool)
+    largest = 0.25 * max(task.robot.reach(hand)[1] for hand in hands)
+    origins = np.stack([task.robot.forward_kinematics(task.q0, hand) for hand in hands])
+    for part in parts:
+        first, clock = part.start, time[part]
         q[part, 2:] = np.unwrap(np.vstack([task.q0[2:], q[part, 2:]]), axis=0)[1:]
         tips = np.stack([places[hand][part, -1] for hand in hands])
-        found = _hits(tips, task, time[part], q[part])
-        used[first : end if len(found) < len(task.goals) else first + found[-1][0] + 1] = True
-        if len(found) < len(task.goals):
-            unfinished.append(f"goal {len(found) + 1} in trial {trial[first]:g}")
+        found = _hits(tips, task, clock, q[part])
+        # A second start: from where the hands are back, all goals are reached again.
+        radii = np.linalg.norm(tips - tips[:, :1], axis=2) / task.radius
+        to_goal = np.linalg.norm(tips[:, 0] - task.goal_array[0], axis=1).min() / task.radius
+        back = (radii < min(3.0, to_goal - 2)).all(axis=0)
+        back[: found[0][0] if found else None] = False
+        if back.any():
+            second = int(back.argmax())
+            rest = _hits(tips[:, second:], task, clock[second:], q[part][second:])
+            twice[first + second] = len(rest) == len(task.goals)
+        if (done := len(found)) < len(task.goals):
+            used[part] = True
+            after = tips[:, found[-1][0] + 1 if found else 0 :] - task.goal_array[done]
+            nearest = np.linalg.norm(after, axis=2).min(initial=np.inf) - task.radius
+            unfinished.append(f"goal {done + 1} in trial {trial[first]:g} by {nearest:.2g}")
             continue
+        used[first : first + found[-1][0] + 1] = True
+        away[first] = (np.linalg.norm(tips[:, 0] - origins, axis=1) > largest).any()
+        to_hit = slice(first, first + found[0][0] + 1)
+        ways = np.hstack([places[hand][to_hit] - places[hand][first] for hand in hands])
+        moved = np.linalg.norm(ways, axis=2).max(axis=1) / task.radius
+        moved[-1] = np.inf
+        # A smooth movement has gone 8 times as far after twice the time: the rest is before it.
+        leaves, is_far = (clock[np.argmax(moved > far)] for far in (0.5, 4))
+        rests[first] = 2 * leaves - is_far - clock[0] > _LONGEST_REST
         starts.append(np.linalg.norm(q[first] - task.q0))
-        before = time[first]
+        before = clock[0]
         for goal, (_, arm, when, posture) in enumerate(found, 1):
             ticks = max((when - before) * ticks_per_unit, 1.0)
             rows.append([people[0], trial[first], goal, hands[arm], round(ticks, 6), *posture])
             before = when
-    refuse(used & (missing_for > _LONGEST_GAP + 1e-9), "a marker is missing for more than "
+    lost = used & (missing_for > _LONGEST_GAP + 1e-9)
+    refuse(lost, f"{culprit[lost.argmax()]}a marker is missing for more than "
            f"{1000 * _LONGEST_GAP:.0f} ms; fill the gap, or leave the trial out")  # fmt: skip
-    refuse(used & swaps, "the length of a link jumps by more than "
+    swaps &= used
+    refuse(swaps, f"{culprit[swaps.argmax()]}the length of a link jumps by more than "
            f"{100 * _TOLERANCE:.0f} %: markers swap, or a flag stands for a gap")  # fmt: skip
     refuse(used & torn, "the places of the two shoulders do not belong to one base: they differ "
            f"from the task's by more than {100 * _TOLERANCE:.0f} %")  # fmt: skip
+    refuse(twice, "the hand is back at the start of the trial and reaches all goals again; needed "
+           "is a number for each trial")  # fmt: skip
+    missed = f"the tip misses {' '.join(unfinished[:1])}{also(unfinished)}"
+    missed = (f"{source}: {len(unfinished)} of {counted(len(parts), 'trial')} are unfinished and "
+              f"have no hits: {missed}")  # fmt: skip
+    if 2 * len(unfinished) > len(parts):
+        middles = [np.nanmedian(places[hand][begin, -1], axis=0) for hand in hands]
+        raise CoarticError(
+            f"{missed}. It begins at {_points(middles)} in the median trial, at {_points(origins)} "
+            "in the task. Are places in the unit of the task, with its origin and directions (y "
+            "upwards), not filtered, cut at the start, and goals in its order? Else leave out "
+            "trials that were broken off"
+        )
+    refuse(away, f"the hand is not within {largest:.2g} of {_points(origins)}, where task "
+           f"{task.name!r} starts; needed are trials cut at the start, or the start of people in "
+           "the task")  # fmt: skip
+    refuse(rests, f"the trial begins with a rest of more than {1000 * _LONGEST_REST:.0f} ms, which "
+           "would count as movement; cut trials where the movement begins")  # fmt: skip
     if frozen := [names[row] for row in np.flatnonzero(used & held & (missing_for == 0))]:
         warn(f"{source}, {frozen[0]}: a marker keeps its place to the last digit for more than "
              f"50 ms, unlike elsewhere. Does its last place fill a gap?{also(frozen)}")  # fmt: skip
@@ -214,18 +308,12 @@ def hits_from_markers(
         row, longest = bridged[0], 1000 * missing_for[bridged].max()
         words = f"a gap is bridged by a straight line; the longest takes {longest:.0f} ms"
         warn(f"{source}, {names[row]}: {culprit[row]}{words}{also([names[n] for n in bridged])}")
-    if not rows:
-        raise CoarticError(
-            f"{source}: in no trial are all goals reached; missed are {', '.join(unfinished[:5])}. "
-            "Are places in the length unit of the task, y upwards, from the origin of its goals?"
-        )
     if unfinished:
-        warn(f"{source}: {len(unfinished)} of {counted(len(begin), 'trial')} are unfinished and "
-             f"have no hits: the tip does not reach {unfinished[0]}{also(unfinished)}")  # fmt: skip
+        warn(missed)
     if absent := [hand for hand in task.hands if hand not in hands]:
         warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
-    if (away := float(np.median(starts))) > _FAR_START:
-        warn(f"{source}: the median trial begins {away:.2g} (length unit, rad) from the start of "
+    if (start := float(np.median(starts))) > _FAR_START:
+        warn(f"{source}: the median trial begins {start:.2g} (length unit, rad) from the start of "
              f"task {task.name!r}")  # fmt: skip
     table = pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks",
                                         *task.robot.joint_names])  # fmt: skip
@@ -242,19 +330,36 @@ def _listed(lengths: Array) -> str:
     return ", ".join(f"{length:.3g}" for length in lengths)
 
 
-def _bridge(place: Array, time: Array, begin: NDArray[np.intp], step: float) -> Array:
+def _points(places: Iterable[Array]) -> str:
+    """Return places as text, such as ``(0.088, 0.486)``."""
+    return " and ".join(f"({_listed(np.round(place, 6) + 0.0)})" for place in places)
+
+
+def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
+    """Return which two markers of an arm may be swapped, in words; empty if no two of them, in
+    place of each other, give the lengths of links; ``places``: ``(n, markers, 2)``."""
+    for one, other in combinations(range(len(markers)), 2):
+        order = [*range(len(markers))]
+        order[one], order[other] = other, one
+        ways = np.diff(places[:, order], axis=1)
+        usual = pd.DataFrame(np.linalg.norm(ways, axis=2)).median().to_numpy()
+        if (np.abs(usual / links - 1) <= _TOLERANCE).all():
+            return f"Markers {markers[one]} and {markers[other]} may be swapped. "
+    return ""
+
+
+def _bridge(place: Array, time: Array, parts: Sequence[slice], step: float) -> Array:
     """Fill the gaps (NaN) of a marker, ``(n, 2)``, in place by straight lines in time, in each of
-    the trials that begin at samples ``begin``. Return, at the first sample of each gap, its
-    duration in s, and 0 elsewhere; ``step``: time between samples, s."""
+    the trials, slices of samples. Return, at the first sample of each gap, its duration in s, and
+    0 elsewhere; ``step``: time between samples, s."""
     gap, durations = np.isnan(place[:, 0]), np.zeros(len(place))
-    for first, end in zip(begin, [*begin[1:], len(place)], strict=True):
-        part = slice(first, end)
+    for part in parts if gap.any() else ():
         if not gap[part].any():
             continue
         there, clock = ~gap[part], time[part]
         edges = np.flatnonzero(np.diff(np.concatenate([[True], there, [True]]).astype(int)))
         around = np.concatenate([[clock[0] - step], clock, [clock[-1] + step]])
-        durations[first + edges[::2]] = around[edges[1::2] + 1] - around[edges[::2]] - step
+        durations[part.start + edges[::2]] = around[edges[1::2] + 1] - around[edges[::2]] - step
         for axis in (0, 1) if there.any() else ():
             at = place[part, axis]
             at[~there] = np.interp(clock[~there], clock[there], at[there])
@@ -267,20 +372,20 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int
     the last two where the tip enters the goal. ``tips`` are places of hands, ``(hands, n, 2)``,
     ``time`` and ``q`` times ``(n,)`` and postures ``(n, dof)`` of the samples."""
     found: list[tuple[int, int, float, Array]] = []
-    ways = np.diff(tips, axis=1, prepend=tips[:, :1])  # to each sample from the one before
-    for goal in task.goal_array:
+    at, goals = tips @ [1, 1j], task.goal_array @ [1, 1j]
+    ways = np.diff(at, axis=1, prepend=at[:, :1])  # to each sample from the one before
+    for goal in goals:
         first = found[-1][0] + 1 if found else 0
-        way, start = ways[:, first:], (tips - ways)[:, first:] - goal
-        square = np.maximum((way**2).sum(axis=2), 1e-18)
-        slope = (start * way).sum(axis=2)
-        near = start + np.clip(-slope / square, 0, 1)[..., None] * way
-        off = np.linalg.norm(near, axis=2)
+        way, start = ways[:, first:], (at - ways)[:, first:] - goal
+        square = np.maximum(way.real**2 + way.imag**2, 1e-18)
+        slope = (start * way.conj()).real
+        off = np.abs(start + np.clip(-slope / square, 0, 1) * way)
         inside = (off <= task.radius).any(axis=0)
         if not inside.any():
             return found
         place = int(inside.argmax())
         hand, sample = int(off[:, place].argmin()), first + place
-        excess = (start[hand, place] ** 2).sum() - task.radius**2
+        excess = abs(start[hand, place]) ** 2 - task.radius**2
         root = slope[hand, place] ** 2 - square[hand, place] * excess
         share = (-slope[hand, place] - np.sqrt(max(root, 0.0))) / square[hand, place]
         share = np.clip(share, 0, 1) if sample else 1.0

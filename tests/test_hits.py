@@ -57,7 +57,7 @@ WRONG = {
     "line 2: ticks is .*column duration": lambda t: t.assign(ticks=t.ticks / 100),
     "less than a tick": lambda t: t.assign(duration=t.ticks / 1000).drop(columns="ticks"),
     "base_x is 1e\\+300": put("base_x", 0, 1e300),
-    "line 2: left_2 is 'inf'": put("left_2", 0, np.inf),
+    "line 2: left_2 is inf": put("left_2", 0, np.inf),
     "no column subject.*found are who, trial": lambda t: t.rename(columns={"subject": "who"}),
 }
 
@@ -130,6 +130,55 @@ def test_a_hit_that_nobody_can_have_made_is_named_or_left_out(people, read, reas
     with pytest.warns(UserWarning, match=rf"left out as implausible, row {row}"):
         trials = solutions_of(TASK, frame, implausible="drop")
     assert len(trials.runs) == len(solutions_of(TASK, people).runs) - 1
+
+
+RIGHT_ARM = [f"right_{joint}" for joint in (1, 2, 3, 4)]
+ANGLES = [*TASK.robot.joint_names[2:]]
+MOSTLY = {
+    "degrees": lambda t: t.assign(**np.degrees(t[ANGLES])),
+    "columns in another order": lambda t: t.assign(
+        **dict(zip(RIGHT_ARM, t[RIGHT_ARM[::-1]].to_numpy().T, strict=True))
+    ),
+    "clockwise": lambda t: t.assign(**-t[ANGLES]),
+    "of segments": lambda t: t.assign(**t[RIGHT_ARM].cumsum(axis=1)),
+    "of the next row": lambda t: t.assign(**t[ANGLES].shift(-1).ffill()),
+    "goals in another order": lambda t: t.assign(goal=5 - t.goal),
+    "hands swapped": lambda t: t.assign(hand=t.hand.map({"left": "right", "right": "left"})),
+    "no base": lambda t: t.assign(base_x=t.base_x + 0.5),
+}
+
+
+@pytest.mark.parametrize("change", MOSTLY)
+def test_a_person_whose_hits_are_mostly_impossible_is_refused_by_row(people, read, change):
+    ofb = people.subject == "b"
+    frame = pd.concat([people[~ofb], MOSTLY[change](people[ofb])])
+    sentence = (
+        r"line \d+: .*(radii from its goal|no angle in rad).*most hits of b: angles are in rad"
+    )
+    for implausible in ("refuse", "drop"):
+        with pytest.raises(CoarticError, match=sentence):
+            read(frame, implausible=implausible)
+        with pytest.raises(CoarticError, match="most hits of b"):
+            solutions_of(TASK, frame, implausible=implausible)
+
+
+TIMES = {
+    r"b: all times are multiples of 100 ticks, the median hit takes \d+: they are rounded": (
+        lambda ticks: (ticks / 100).round().clip(lower=1) * 100
+    ),
+    "b: all times are multiples of 150 ticks, .* or constant": lambda ticks: 0 * ticks + 150,
+    "b: in every trial times rise .* clock that runs on": np.cumsum,
+    r"b: the median hit takes .*ms \(ticks_per_unit=0.1\)": lambda ticks: 1000 * ticks + 7,
+}
+
+
+@pytest.mark.parametrize("sentence", TIMES)
+def test_times_of_a_person_that_are_none_are_refused(people, read, sentence):
+    seconds = people.assign(duration=people.ticks / 100).drop(columns="ticks")
+    change = TIMES[sentence](people.ticks[people.subject == "b"]) / 100
+    seconds.loc[people.subject == "b", "duration"] = change
+    with pytest.raises(CoarticError, match=sentence):
+        read(seconds, ticks_per_unit=100)
 
 
 def test_hands_farther_than_two_radii_are_plausible_with_motor_noise_alone(people, read):
@@ -252,6 +301,10 @@ def test_recordings_that_are_there_twice_are_said(people, read):
     later = people[people.trial > 4].assign(trial=lambda t: t.trial + 50)
     with pytest.warns(UserWarning, match="26 trials are equal .* trial 10 of b and trial 60 of b"):
         solutions_of(TASK, pd.concat([people, later]))
+    held = people[(people.subject == "b") & (people.trial == 6)].assign(trial=7)
+    stuck = people[(people.subject != "b") | (people.trial != 7)]
+    with pytest.warns(UserWarning, match="trials are equal .* trial 6 of b and trial 7 of b"):
+        read(pd.concat([stuck, held]))
 
 
 NO_TABLE = {
@@ -269,6 +322,10 @@ NO_TABLE = {
     "is a quotation mark open": lambda text: text.replace("\na,", '\n"a,', 1),
     "two columns 'ticks'": lambda text: text.replace("goal", "ticks", 1),
     "no column subject": lambda text: "",
+    "line 42: the headings are there again": lambda text: "\n".join(
+        line + ("\n" + text.partition("\n")[0]) * (n == 40)
+        for n, line in enumerate(text.splitlines())
+    ),
 }
 
 
@@ -316,18 +373,18 @@ def test_angles_whose_direction_is_in_doubt_are_named_by_subject_and_line(people
     away = TASK.start.model_copy(update={"left": (left[0] - 3.14, *left[1:])})
     straddling = TASK.model_copy(update={"start": away})  # from trial to trial, not hit to hit
     with pytest.raises(CoarticError, match="of subject a turns by"):
-        solutions_of(straddling, people.assign(ticks=500))
+        solutions_of(straddling, people.assign(ticks=people.ticks + 400))
 
 
 def test_one_armed_people_need_no_columns_of_the_other_arm(read):
     task = metres_task()
-    rows = [["s", t, g, "right", 30, 0.5 + t / 100, 1.5] for t in (1, 2) for g in (1, 2, 3)]
+    ends = [correct(task.robot, task.q0, "right", goal, locked_base=("x", "y")).q[-2:]
+            for goal in task.goals]  # fmt: skip
+    rows = [["s", t, g, "right", 90, *ends[g - 1] + t / 200] for t in (1, 2) for g in (1, 2, 3)]
     names = ["subject", "trial", "goal", "hand", "ticks", "right_1", "right_2"]
     frame = pd.DataFrame(rows, columns=names)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of hands far from goals
-        given = read(frame, task)
-        assert len(solutions_of(task, frame).runs) == 2
+    given = read(frame, task)
+    assert len(solutions_of(task, frame).runs) == 2
     assert (given[["base_x", "base_y", "left_1"]] == 0).to_numpy().all()
     with pytest.raises(CoarticError, match="no column base_x, left_1"):
         read(frame)
@@ -339,11 +396,13 @@ def test_reader_takes_durations_and_warns_of_small_degrees(people, read):
     with pytest.raises(CoarticError, match="in no trial are all 4 goals hit"):
         solutions_of(TASK, people[people.goal < 4])
     since_start = people.groupby(["subject", "trial"]).ticks.cumsum()
-    with pytest.warns(UserWarning, match="from the hit before"):
+    with pytest.raises(
+        CoarticError, match="of a clock that runs on; needed .* from the hit before"
+    ):
         read(people.assign(ticks=since_start))
     angles = [name for name in people if name[-1].isdigit()]
-    with pytest.warns(UserWarning, match="Are the angles in rad"):
-        read(people.assign(**np.degrees(people[angles] / 10)))
+    with pytest.raises(CoarticError, match="most hits of [ab]: angles are in rad"):
+        read(people.assign(**np.degrees(people[angles] / 10)), implausible="drop")
 
 
 @pytest.mark.parametrize("bad", [np.nan, -np.inf, 1e300])

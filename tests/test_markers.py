@@ -160,7 +160,7 @@ WRONG = {
     "row 0: right_2: a marker is missing": lose(8, first=0),
     "row 46: a marker is missing": lambda t: t.drop(index=range(40, 46)),
     "row 50: right_.: the length of a link jumps.*swap": swap(50, 60),
-    "row 0: .*the length of a link jumps": swap(0, 10**4 // 40),
+    "row 0: in trial 1 the links.*0.09. Markers 2 and 3 may be swapped": swap(0, 10**4 // 40),
     "row 50: .*the length of a link .*flag": lose(1, first=50, value=9999.0),
     r"are 330, 270, 90 long .*'metres' 0.33, 0.27, 0.09.*another unit": scaled(1000),
     "another arm": scaled(0.85),
@@ -176,8 +176,71 @@ WRONG = {
     ),
     "no column right_3_x .also right_3_y": lambda t: t.drop(columns=["right_3_x", "right_3_y"]),
     "no sample": lambda t: t[:0],
-    "in no trial are all goals reached; missed are goal 1 in trial 1.*y upwards": lambda t: (
+    r"4 of 4 trials are unfinished.*goal 1 in trial 1.*at \(0.0879, -0.486\).*upwards": lambda t: (
         t.assign(**{name: -t[name] for name in t if name.endswith("_y")})
+    ),
+}
+
+
+def from_trial_3(column, change):
+    """A change of columns of the second session, trials 3 and 4."""
+
+    def changed(t):
+        names = [name for name in t if name.startswith(column)]
+        return t.assign(**{name: t[name].where(t.trial < 3, change(t[name])) for name in names})
+
+    return changed
+
+
+def in_one(t, trial=1):
+    """All trials have one number, and the clock runs on."""
+    return t.assign(trial=trial, time=0.01 * np.arange(len(t)))
+
+
+def earlier(number, of_trial):
+    """A change: trials begin with samples of trial 1, as ``of_trial`` gives them."""
+
+    def change(t):
+        parts = [
+            pd.concat([of_trial(t[t.trial == 1]), part]) if trial in number else part
+            for trial, part in t.groupby("trial")
+        ]
+        return pd.concat(
+            part.assign(trial=trial, time=0.01 * np.arange(len(part)))
+            for trial, part in enumerate(parts, 1)
+        ).reset_index(drop=True)
+
+    return change
+
+
+WRONG |= {
+    r"row \d+: the time between samples is 0.02 in trial \d, but 0.01 in trial \d;": from_trial_3(
+        "time", lambda x: 2 * x
+    ),
+    r"row \d+: the time between samples is 0.03 in trial 2, but 0.01": lambda t: t.assign(
+        time=t.time.where(t.trial != 2, 3 * t.time)
+    ),
+    r"row \d+: base_y is -0.03 in trial \d, but 0 in trial \d; task 'metres' locks": from_trial_3(
+        "right_1_y", lambda y: y - 0.03
+    ),
+    r"in trial 3 the links of the right arm are 33, 27, 9 .*also trial 4.*unit": from_trial_3(
+        "right", lambda x: 100 * x
+    ),
+    r"row \d+: the hand is back at the start of the trial and reaches all goals again": in_one,
+    r"row \d+: the hand is back at the start": lambda t: pd.concat(
+        [in_one(t[(t.trial == 1) & (t.time < 2.5) | (t.trial == 2)], 2), t[t.trial > 2]],
+        ignore_index=True,
+    ),
+    r"row 0: the trial begins with a rest of more than 200 ms": earlier(
+        {1}, lambda t: t.iloc[[0] * 50]
+    ),
+    r"row \d+: the hand is not within 0.17 of \(0.0879, 0.486\), where": earlier(
+        {3}, lambda t: t.iloc[::-5]
+    ),
+    "time between samples is 0.1 s; needed are 25 to 2000 samples": lambda t: t[::10].reset_index(),
+    "row 1: time does not increase; .* not rounded": lambda t: t.assign(time=t.time.round(1)),
+    "sort samples by time, and give people of one name a file each": lambda t: pd.concat(
+        [t, t.assign(right_tip_x=t.right_tip_x + 0.001)], ignore_index=True
     ),
 }
 
@@ -186,6 +249,39 @@ WRONG = {
 def test_a_recording_that_is_wrong_is_refused(sentence):
     with pytest.raises(CoarticError, match=sentence):
         hits_from_markers(WRONG[sentence](recorded(RIGHT)), RIGHT)
+
+
+def noisy(t, share=0.001, seed=0):
+    """Places with noise, as a share of the length of the arm."""
+    noise = share * 0.69 * np.random.default_rng(seed).standard_normal((len(t), 8))
+    return t.assign(**dict(zip(t.columns[3:], (t.iloc[:, 3:] + noise).to_numpy().T, strict=True)))
+
+
+CLEAN = {
+    "little noise": lambda: noisy(recorded(RIGHT)),
+    "much noise": lambda: noisy(recorded(RIGHT), 0.002),
+    "rounded clock": lambda: recorded(RIGHT, rate=75).round({"time": 2}),
+    "slow": lambda: recorded(RIGHT, rate=300).assign(time=lambda t: 3 * t.time),
+    "returns": lambda: pd.concat(
+        pd.concat([t, t[::-1]]).assign(time=0.01 * np.arange(2 * len(t)))
+        for _, t in recorded(RIGHT).groupby("trial")
+    ),
+}
+
+
+@pytest.mark.parametrize("recording", CLEAN)
+def test_a_clean_recording_passes_without_a_warning(recording):
+    hits, truth = hits_from_markers(CLEAN[recording](), RIGHT), true_hits(RIGHT)
+    assert len(hits) == len(truth)
+    ticks = truth.ticks * (3 if recording == "slow" else 1)
+    assert np.abs(hits.ticks - ticks).median() < 3  # noise moves the way into a goal
+
+
+def test_a_base_that_moves_a_little_is_said():
+    with pytest.warns(UserWarning, match=r"base_y is -0.015 in trial \d, but 0 in trial \d"):
+        hits = hits_from_markers(from_trial_3("right_1_y", lambda y: y - 0.015)(recorded(RIGHT)),
+                                 RIGHT)  # fmt: skip
+    assert len(hits) == 16
 
 
 def test_arms_that_contradict_each_other_or_the_task_are_refused():

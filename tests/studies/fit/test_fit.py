@@ -120,8 +120,10 @@ def test_degenerate_trials_are_left_out_with_the_reason(people):
     first = people[people.trial == 1]
     degenerate = {
         "two trials": first,
-        "postures are equal": pd.concat(first.assign(trial=n) for n in range(1, 31)),
-        "take 2000 ticks, as by a met": people.assign(ticks=500),
+        "postures are equal": pd.concat(
+            first.assign(trial=n, ticks=first.ticks + n) for n in range(1, 31)
+        ),
+        "take 2000 ticks, as by a met": people.assign(ticks=495 + 2 * people.goal),
     }
     every = pd.concat([of.assign(subject=why) for why, of in degenerate.items()])
     with pytest.warns(UserWarning, match="is left out: ") as warned:
