@@ -417,9 +417,11 @@ def checked_hits(
 
 
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
-    """Unwrap the angles of sorted hits in place, hit by hit, each trial from the task's start on.
+    """Unwrap the angles of hits in place, hit by hit, each trial from the task's start on.
 
-    Warns if angles change. Raises CoarticError if the joint of a subject is wrapped and turns by
+    ``frame``, sorted, with rows from 0, has columns ``subject``, ``trial``, ``goal`` and one for
+    each joint, rad; in messages ``source`` names the recording and ``names`` each row. Warns if
+    angles change. Raises CoarticError if a joint of a subject jumps by 2π somewhere and turns by
     more than :data:`_AMBIGUOUS` between hits: then its direction is in doubt.
     """
     joints = [*task.robot.joint_names][2:]

@@ -307,12 +307,14 @@ class TrajectoryProblem:
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
-    """Return the least cost of a segment between given end states, as a CasADi expression.
+    """Return the least cost of a segment between given end states, as a CasADi expression; of jerk
+    of the hand only the part of the joints, without its weight; not for path length.
 
     ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals are
     written out in the end states, so that nothing is discretised. ``step``: change of the joints,
-    ``(dof,)``; ``time``: duration above 0, which squared displacement ignores; ``rates``: pair of
-    the velocities at both ends, and for jerk pair of the accelerations, ``(dof,)`` each.
+    ``(dof,)``; ``time``: duration above 0; ``rates``: pair of the velocities at both ends, and for
+    both kinds of jerk pair of the accelerations, ``(dof,)`` each. Squared displacement ignores the
+    two.
     """
     if cost == "squared-displacement":
         return casadi.sumsqr(step)

@@ -389,8 +389,9 @@ def _limit_cpu_time(limit_s: float) -> None:
 
 
 def _bound_resources(workers: int) -> None:
-    """Limit memory and file size of this process, one of ``workers`` that share the machine,
-    so that a method gets an error before the machine swaps."""
+    """Limit the memory of this process, one of ``workers`` that share the machine, and the size of
+    its files, so that a method gets an error before the machine swaps or the disk is full; nothing
+    where the system has no such limits."""
     try:
         import resource
 

@@ -77,9 +77,10 @@ more than the project's, in a form of ``matplotlib.style.use``.
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that turns a drawing function of a study into a figure of the report.
 
-    The figure is in the style of all figures; its id is the function's name without ``draw_``. The
-    caption gets an explanation of the dagger if a task is reconstructed; ``{n}`` in it is the range
-    of the column ``runs`` of the drawn numbers.
+    The figure is in the style of all figures; its id is the function's name without ``draw_``, with
+    dashes for underscores. The caption gets an explanation of the dagger if one of the tasks that
+    the function returns is reconstructed; ``{n}`` in it is the range of column ``runs`` of the
+    drawn numbers, empty without this column.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:

@@ -94,7 +94,9 @@ def list_family_gaps(study: Study) -> Rows:
     "runs), for methods that solved every run.",
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
-    """Draw gaps to the best known rewards of instances, by method and family."""
+    """Draw the gap to the best known reward, mean over runs, of each instance that a method solved
+    in every run, a panel for each family and a row for each method, without settings whose method
+    is there; None without such runs."""
     runs, rows = on_instances(study), study.methods
     methods = without_settings(rows[rows.index.isin(runs.method) & (rows.parts.map(len) == 1)])
     runs = runs[runs.method.isin(methods.index)]

@@ -222,7 +222,8 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
     "files, whose marks are larger.",
 )
 def draw_ranking(study: Study) -> Parts | None:
-    """Draw the gap of every method, a mean over tasks, with its name."""
+    """Draw the gap of each method of :func:`.board`, a mean over tasks, with interval and name,
+    without settings whose method is there; None without a method."""
     rows, tasks = board(study), common_tasks(study)
     rows = without_settings(rows).reset_index(names="method")
     if not len(rows):

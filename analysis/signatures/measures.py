@@ -97,9 +97,12 @@ def gain_at_next(runs: Solutions) -> Array:
 
 @checked_arguments
 def ticks_slower(runs: Solutions) -> Array:
-    """Return the ticks by which each chosen hand is slower for its goal alone, shape ``(n, G)``.
+    """Return the ticks by which each chosen hand is slower for its goal alone, shape ``(n, G)`` for
+    n runs and G goals.
 
-    r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h).
+    r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h): the ticks of the
+    corrective process with the hand h(i, g) from the configuration at the hit before, less those
+    with the fastest hand.
 
     A hand with more than 0 ticks is not the choice for this goal alone. Infinite if the reach with
     the chosen hand ends without a hit.

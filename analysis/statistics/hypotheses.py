@@ -62,8 +62,8 @@ def bootstrap_test(
     least as extreme) / (1 + resamples), never 0 (Davison & Hinkley 1997): the smallest p is 0.0001
     by default. ``"greater"``: one-tailed, the mean of ``values`` is higher.
 
-    Without spread, p is the p-value of the exact test of as many values, by signs. p is NaN with
-    fewer than two values, or without spread and difference.
+    Without spread, p is that of the sign test of as many values, but at least the smallest p. p is
+    NaN with fewer than two values, or without spread and difference.
     """
     sample = vector(values) - vector([bound])[0]
     difference, n, shifted = float(sample.mean()), len(sample), centred(sample)

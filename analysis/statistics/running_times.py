@@ -98,7 +98,8 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
 @lru_cache(maxsize=4)  # methods mostly have as many runs as another
 def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     """Return the number of times that each resample draws each run, shape ``(resamples, runs)``,
-    for tasks with ``sizes`` runs. The array is cached: do not change it."""
+    for tasks with ``sizes`` runs, in their order: 1,999 resamples, fewer for very many runs, at
+    least 200. The array is cached: do not change it."""
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MOST_RUNS_DRAWN // sum(sizes), 200))
     drawn = (rng.multinomial(size, np.full(size, 1 / size), resamples) for size in sizes)

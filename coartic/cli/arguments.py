@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for a file or a folder, by its flags ``names``; ``metavar`` names its value
-    in the help, ``what`` is its help."""
+    """Return an option that reads a file or a folder, which need not exist, as a Path, by its flags
+    ``names``, without any by the name of its parameter; ``metavar`` names its value in the help,
+    ``what`` is its help. An empty or impossible name raises CoarticError."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 

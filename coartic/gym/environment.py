@@ -126,13 +126,14 @@ def wrappers_of(env: Any) -> list[Any]:
 
 
 def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
-    """Make ``num_envs`` robots side by side a ``VecEnv`` of Stable-Baselines3.
+    """Return a ``VecEnv`` of Stable-Baselines3 with ``num_envs`` robots side by side.
 
     ``env`` is an id, such as ``"coartic/TwoArmed1-v2"``; ``options`` are options of
     :class:`TaskVectorEnv`. Trials start again by themselves, actions are clipped, and rewards are
-    minus the ticks, as shares of what the corrective process takes for the whole trial. Raises
-    ValueError or TypeError for an id of another package and for a wrong option, and CoarticError
-    if Stable-Baselines3 is not installed.
+    minus the ticks, as shares of what the corrective process takes for the whole trial, at least -2
+    a step (:class:`~coartic.gym.stable_baselines.RobotEnvs`). Raises ValueError or TypeError for an
+    id of another package and for a wrong option, and CoarticError for a task that cannot be used,
+    and if Stable-Baselines3 is not installed.
     """
     try:
         from coartic.gym.stable_baselines import RobotEnvs

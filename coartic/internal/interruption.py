@@ -29,8 +29,9 @@ _words = ["Interrupted."]
 
 
 def catch_signals() -> None:
-    """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
-    on. A signal that this process was started to ignore, as under ``nohup``, stays ignored."""
+    """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP), unblocked, raise KeyboardInterrupt
+    from now on, but not in the seconds after one that did. A signal that this process was started
+    to ignore, as under ``nohup``, stays ignored."""
 
     def interrupt(number: int, _: object) -> None:
         if not _heard or time.monotonic() > _heard[-1][1] + _CLEANING_S:

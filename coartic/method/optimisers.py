@@ -317,7 +317,8 @@ class Objective:
 
     @property
     def solution(self) -> tuple[Movement, ...]:
-        """The movements of the best trial, for :func:`coartic.execute`."""
+        """The movements of the best trial, for :func:`coartic.execute`; ValueError before the first
+        trial that succeeds."""
         return movements_of(self.best_hands, self._best_targets)
 
     def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:

@@ -144,8 +144,8 @@ class Meter:
     that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add each count to the counter of that name (not to the times), in place. Neither the sign
-        of a count nor the sum is checked, nor a budget."""
+        """Add each count to the counter of that name, in place; times are not to be named. Names,
+        signs, sums and budgets are not checked."""
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 

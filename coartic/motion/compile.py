@@ -130,7 +130,9 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """Build the generator, in a kernel, whose state and two drawing functions are at addresses."""
+    """Build, in a kernel, NumPy's generator whose state and drawing functions are at these addresses
+    (:func:`addresses`). As an intrinsic of Numba does, it gets the types of its arguments after the
+    typing context, and returns signature and builder."""
     from numba.core import cgutils, types
 
     kind = types.NumPyRandomGeneratorType("generator")
@@ -163,11 +165,12 @@ def import_numba() -> Any:
 
 @cache
 def _set_up_numba() -> Any:
-    """Import Numba, set it up, once a process, and return the module.
+    """Import Numba, set it up, once a process, and return the module: it reads no settings from a
+    file in the current folder, names types of records alike in every process, and lets inlined
+    blocks share variables.
 
-    LLVM gets its options before Numba first asks it for machine code. Only how fast the kernels are
-    depends on them. A program that has compiled something else with Numba before it calls a kernel
-    keeps the vectors that LLVM prefers.
+    LLVM gets options on which only the speed of kernels depends. In a program that has compiled
+    something else with Numba before, they come too late: its vectors stay narrow.
     """
     modules: dict[str, Any] = sys.modules
     kept = {name: modules[name] for name in ("yaml",) if name in modules}

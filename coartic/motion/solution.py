@@ -672,7 +672,8 @@ def initial_hands(
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
     """Return the reward, minus the ticks, of a trial by the corrective process alone with a task's
-    initial hands; None if the trial fails, or a policy finds no hands that complete the task."""
+    initial hands; None if the trial fails, or a policy finds no hands that complete the task, or
+    has too many sequences to try."""
     try:
         hands = initial_hands(task, model=model)
     except NotApplicableError:

@@ -234,8 +234,9 @@ def find_corrections(count: int, robot: Any, batch: Any) -> None:
 @shared
 def find_pulled_corrections(count: int, robot: Any, batch: Any) -> None:
     """Have **A**, pulled to each run's preferred posture, find a ``target`` that hits the goal for
-    each of the first ``count`` runs that missed it; ``converged`` says where **A** did. No run
-    moves (:func:`_find_by`)."""
+    each of the first ``count`` runs of ``batch`` (records of a kernel, as ``robot`` is) that missed
+    it, go on and may be corrected. Their ``target``, the last iterate, and ``converged`` change in
+    place. No run moves (:func:`_find_by`)."""
     _find_by(count, robot, batch, pull_slots)
 
 

@@ -70,7 +70,8 @@ def draw_robot(
 
 
 def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
-    """Draw every goal as an open circle of its radius; return the circles, in goal order."""
+    """Draw every goal as an open circle of its radius, with lines ``weight`` times as wide as
+    usual; return the circles, in goal order."""
     options: Any = {"fill": False, "edgecolor": _BLACK, "linewidth": 0.7 * weight, "zorder": 3}
     circles = [Circle(goal, task.radius, **options) for goal in task.goals]
     for circle in circles:

@@ -20,7 +20,8 @@ UP_OR_DOWN = ("ascending", "descending")
 
 
 def play_page(task: Task | None = None) -> str:
-    """Return the page as HTML; it begins with ``task``, by default with :func:`up_or_down`."""
+    """Return the page of ``coartic play``, one HTML file that needs no other: it begins with
+    ``task``, by default with :func:`up_or_down`, and offers all shipped tasks."""
     presets = [preset_of(each) for each in shipped_tasks().values()]
     if task is None:
         presets.insert(0, up_or_down())

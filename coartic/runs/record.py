@@ -355,7 +355,7 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
     """Execute solutions of a task side by side under the paper's model; scores come from here.
 
     Returns for each solution, in order, its execution, or, as an object, the error of a solution
-    that breaks the rules of the task, or has more than 10,000 movements or 1,000,000 steps.
+    that breaks the rules of the task, or is too long (:func:`too_long`).
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]

@@ -821,15 +821,16 @@ def _why_not_opened(path: Path) -> str:
 
 def _unpack(blob: bytes, trials: int | None) -> Array:
     """Return the rewards of the trials of a run from table ``learning``, whose ``blob`` holds them
-    packed (:func:`reward_bytes`), shape ``(trials,)``; NaN stands for a trial that failed or whose
-    reward is not kept.
+    packed (:func:`reward_bytes`), shape ``(k,)`` with k up to ``trials``; NaN stands for a trial
+    that failed or whose reward is not kept.
 
-    Raises ValueError for damaged rewards, and for more rewards than trials.
+    Raises ValueError for a blob that is damaged or cut short, and for more rewards than trials.
     """
     size = 4 * (1 + min(trials or 0, MOST_TRIALS))
     try:
-        content = zlib.decompressobj().decompress(blob, size + 1)
-        if len(content) > size:
+        packed = zlib.decompressobj()
+        content = packed.decompress(blob, size + 1)
+        if len(content) > size or not packed.eof:
             raise ValueError
         numbers = np.frombuffer(content, np.uint8).reshape(4, -1).T.copy().view("<u4").ravel()
         best = numbers[:1].view("<i4")

@@ -37,7 +37,8 @@ def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
 
 
 def hash_key(name: str) -> tuple[int, int]:
-    """Return the key of a name: two words of 32 bits, the first 64 bits of its SHA-256."""
+    """Return the key of a name: the first two words, 32 bits each, little-endian, of the SHA-256 of
+    its UTF-8."""
     digest = hashlib.sha256(name.encode()).digest()
     return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
 

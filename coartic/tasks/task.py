@@ -215,9 +215,10 @@ class Task(FileData):
     @model_validator(mode="before")
     @classmethod
     def _with_start(cls, content: Any) -> Any:
-        """Return the content of a task with ``q0``, if given, as ``start``, or, without either,
-        with both arms along +x. Raises a validation error for both, for another shape of ``q0``,
-        and for a ``penalty``."""
+        """Return the content of a task with ``q0``, shape ``(dof,)``, if given, as ``start``, or,
+        without either, with the base at (0, 0) and both arms along +x; what is no dictionary comes
+        back unchanged. Raises a validation error for both, for a ``q0`` of another shape or with
+        entries that are no finite numbers, and for a ``penalty``."""
         if not isinstance(content, dict):
             return content
         if "penalty" in content:
