@@ -2,9 +2,10 @@
 
 A process performs jobs of one method, one after the other. It works in its own folder and writes
 each answer into a file there, which is complete or missing: nothing that a method does, breaks or
-prints affects other methods; of what it prints the end is kept. A process that ends loses its current job; a new process performs the
-other jobs. Processes that a worker has started end with the worker, unless they have left its
-group. If the common folder is removed or full, answers are lost, and the suite ends.
+prints affects other methods; of what it prints the end is kept. A process that ends loses its
+current job; a new process performs the other jobs. Processes that a worker has started end with the
+worker, unless they have left its group. If the common folder is removed or full, answers are lost,
+and the suite ends.
 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
 used up its limit: other work on the machine changes no result. The CPU time of processes that a

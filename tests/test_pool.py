@@ -225,7 +225,8 @@ PRINTS = """print('x' * (3 * 10**8), flush=True)
 
 
 def test_the_last_words_of_a_run_are_kept(tmp_path):
-    """Of 300 MB, more than files may have, in little memory; those of an earlier run are not those of a crash."""
+    """Of 300 MB, more than files may have, in little memory; those of an earlier run are not those
+    of a crash."""
     resource = pytest.importorskip("resource")
     says = "print('x', flush=True); return Result(corrected(session))"
     cells = cells_of(tmp_path, says=says, quits="os._exit(0)", prints=PRINTS)
