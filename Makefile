@@ -49,9 +49,10 @@ docs: $(VENV)/.docs
 speed: $(READY)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py $(if $(LONG),--long)
 
-# The wheel and the source distribution of the last commit, each run in an empty environment.
+# The wheel and the source distribution of the last commit, each run in an empty environment, by
+# each Python of this machine; what is not tried is named.
 release-check: shipped-check
-	COARTIC_PACKAGES=1 $(BIN)/python -m pytest tests/test_packages.py
+	COARTIC_PACKAGES=1 $(BIN)/python -m pytest -rs tests/test_packages.py
 
 # Shipped runs, performed again: one of each cell of the comparison, and of each method on each family.
 shipped-check: $(READY)

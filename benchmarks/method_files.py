@@ -8,14 +8,18 @@ from __future__ import annotations
 
 import atexit
 import errno
+import itertools
 import json
 import multiprocessing
+import os
 import signal
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from pydantic import TypeAdapter
 
 from coartic.benchmarks.own_code import code_of
 from coartic.benchmarks.pool import CONTEXT, MORE_FILES, start_process
@@ -27,15 +31,23 @@ from coartic.runs.method_info import MethodInfo, answer, load_file, method_info,
 
 _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to import
 _LONGEST_ANSWER = 2**24  # bytes of an answer
+_KINDS: dict[str, TypeAdapter[Any]] = {
+    "methods": TypeAdapter(list[MethodInfo]),
+    "complete": TypeAdapter(dict[str, Any]),
+    "why_not": TypeAdapter(str | None),
+    "rules": TypeAdapter(dict[str, dict[str, Any]]),
+}
+"""What the answer to a question must be."""
 
 
 def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """Start a process that imports a method file, and return a function that asks the process about
     a method. ``shown`` is the name of the file in messages. The function takes the id of a method,
     a question of :class:`MethodInfo` and its arguments; the question ``methods``, with an empty id,
-    is the first: it imports the file, and gives the infos of all methods as dictionaries. The
-    function raises CoarticError for an error, and for no answer in 5 minutes. The process, with all
-    processes that it starts, ends with this process. Raises CoarticError if no process begins."""
+    is the first: it imports the file, and gives the infos of all methods. The function raises
+    CoarticError for an error, for an answer of another kind, and for no answer in 5 minutes. The
+    process, with all processes that it starts, ends with this process. Raises CoarticError if no
+    process begins."""
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, path, shown
@@ -48,14 +60,16 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
         raise CoarticError(f"{words}. Repeat the command{how}") from None
     atexit.register(end_group, process.pid)
     theirs.close()
+    numbers = itertools.count()
 
     def ask(method: str, question: str, *arguments: Any) -> Any:
+        number = next(numbers)
         try:
-            pipe.send_bytes(json.dumps([method, question, *arguments]).encode())
+            pipe.send_bytes(json.dumps([number, method, question, *arguments]).encode())
             if not pipe.poll(_ANSWER_S):
                 end_group(process.pid)
                 raise CoarticError(f"{shown}: gives no answer within {_ANSWER_S:g} s")
-            said = json.loads(pipe.recv_bytes(_LONGEST_ANSWER))
+            text = pipe.recv_bytes(_LONGEST_ANSWER)
         except (OSError, EOFError):
             process.join(1.0)
             code = process.exitcode
@@ -67,21 +81,30 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
                 ) from None
             how = f"its process ended with exit code {code}"
             raise CoarticError(f"{shown}: cannot be imported: {how}") from None
-        if "error" in said:
-            raise CoarticError(plain(str(said["error"])))
-        return said["answer"]
+        try:
+            answered, kind, content = json.loads(text)
+            if answered != number:
+                raise ValueError(f"question {number} has the answer to question {answered}")
+            if kind == "answer":
+                return _KINDS[question].validate_python(content)
+        except (ValueError, TypeError, RecursionError) as error:
+            why = error_line(error)
+            raise CoarticError(f"{shown}: its answers cannot be read: {why}") from None
+        raise CoarticError(plain(str(content)))
 
     return ask
 
 
 def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
-    """Answer questions (:func:`begin_reader`) that come through a pipe as JSON, by ``answer`` or by
-    a sentence ``error``, until the pipe is closed."""
+    """Answer questions (:func:`begin_reader`) that come through a pipe as JSON, by the number of
+    the question, ``"answer"`` and the answer, or the number, ``"error"`` and a sentence, until the
+    pipe is closed. A child that the file has forked ends instead of answering."""
     begin_worker()
+    reader = os.getpid()
     methods: dict[str, type[Method]] = {}
     while True:
         try:
-            name, question, *arguments = json.loads(pipe.recv_bytes())
+            number, name, question, *arguments = json.loads(pipe.recv_bytes())
         except EOFError:
             return
         try:
@@ -104,11 +127,13 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
                 content = [asdict(info) for info in infos]
             else:
                 content = answer(methods[name], question, *arguments)
-            text = json.dumps({"answer": content})
+            text = json.dumps([number, "answer", content])
         except CoarticError as error:
-            text = json.dumps({"error": str(error)})
+            text = json.dumps([number, "error", str(error)])
         except BaseException as error:
-            text = json.dumps({"error": f"{shown}: cannot be used: {error_line(error)}"})
+            text = json.dumps([number, "error", f"{shown}: cannot be used: {error_line(error)}"])
+        if os.getpid() != reader:
+            os._exit(0)
         pipe.send_bytes(text.encode())
 
 

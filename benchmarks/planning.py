@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import BeforeValidator, Field, PlainValidator, ValidationError
 
 from coartic import CoarticError, Task, builtin_tasks, load_task
@@ -23,6 +22,7 @@ from coartic.benchmarks.suites import (
     load_suite,
     tasks_of,
 )
+from coartic.internal.arguments import plain_scalar
 from coartic.internal.limits import (
     MOST_CELLS,
     MOST_RUNS,
@@ -68,7 +68,7 @@ def _runs_asked(value: Any) -> int | range | None:
 
 
 _Files = tuple[Path, ...]
-_plain = BeforeValidator(lambda value: value.item() if isinstance(value, np.number) else value)
+_plain = BeforeValidator(plain_scalar)
 
 
 class Request(FileData):

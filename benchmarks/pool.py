@@ -2,9 +2,10 @@
 
 A process performs jobs of one method, one after the other. It works in its own folder and writes
 each answer into a file there, which is complete or missing: nothing that a method does, breaks or
-prints affects other methods. A process that ends loses its current job; a new process performs the
-other jobs. Processes that a worker has started end with the worker, unless they have left its
-group. If the common folder is removed or full, answers are lost, and the suite ends.
+prints affects other methods; of what it prints the end is kept. A process that ends loses its
+current job; a new process performs the other jobs. Processes that a worker has started end with the
+worker, unless they have left its group. If the common folder is removed or full, answers are lost,
+and the suite ends.
 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
 used up its limit: other work on the machine changes no result. The CPU time of processes that a
@@ -23,6 +24,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Generator, Iterator, Sequence
@@ -55,11 +57,11 @@ from coartic.runs.record import Outcome
 _POLL_S = 0.2  # pause between looks for answers and at limits
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
 _LEAST_MEMORY = 2**30  # bytes of a process, four times the need of the built-in methods
-_LARGEST_FILE = 2**28  # bytes of an answer, and of a job's output
+_LARGEST_FILE = 2**28  # bytes of an answer, and of any other file
 _LEAST_FILES = 64  # open files, of which a process and its server need up to twenty
 _ROOM = 2**20  # bytes that must be free for answers
 _LAST_LINES = 3  # last lines of a dead process's output in a reason
-_PRINTED = 4000  # bytes of the output that are read
+_PRINTED = 4000  # bytes of the output that are kept
 _STARTS = 5  # processes in a row that end before their first job: then the suite ends
 _UNKEPT = 74  # exit code of a process that could not write its answer
 _REPEATED = (None, -9, 255, _UNKEPT)  # exit codes (late, killed, lost server): repeat a job once
@@ -68,7 +70,8 @@ _SPINS_S = 2.0  # CPU time beyond its limit after which a job is ended from outs
 _END_S = 1.0  # time for a killed process to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 MORE_FILES = "after `ulimit -n 1024`, which allows more open files"
-_BEGUN, _SAID = "begun", "said"  # files among the answers of a process
+_BEGUN = "begun"  # file among the answers of a process
+_NEXT_JOB = b"\0next job\0"  # in the output of a process
 
 
 class Local:
@@ -215,9 +218,11 @@ class Worker:
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
         theirs, self._ours = multiprocessing.Pipe(duplex=False)
-        arguments = self._folder, theirs, local.workers, local.verbose
+        output, prints = multiprocessing.Pipe(duplex=False)
+        arguments = self._folder, theirs, prints, local.workers, local.verbose
         self.process = CONTEXT.Process(target=_perform_jobs, args=arguments)
-        self._theirs = theirs
+        self._theirs, self._printed = (theirs, prints), bytearray()
+        self._reader = threading.Thread(target=_read, args=(output, self._printed), daemon=True)
 
     def give(self, jobs: Sequence[Job]) -> None:
         """Send jobs to the process, and start it if it is new; if it cannot start, nothing is
@@ -228,10 +233,12 @@ class Worker:
         try:
             if self.process.pid is None:
                 start_process(self.process)
-                self._theirs.close()
+                for end in self._theirs:
+                    end.close()
+                self._reader.start()
             self._ours.send(jobs)
         except (OSError, EOFError) as error:
-            (self._folder / _SAID).write_text(error_line(error), encoding="utf-8")
+            self._printed[:] = error_line(error).encode()
             return
         # This process executes solutions: it compiles kernels meanwhile.
         with contextlib.suppress(Exception):  # the worker reports the same error
@@ -282,10 +289,10 @@ class Worker:
     @property
     def last_output(self) -> str:
         """Words on how the process ended, and the last three lines that it wrote."""
-        text, code = b"", self.exit_code or 0
-        with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
-            text = file.read()
+        code = self.exit_code or 0
+        if self._reader.is_alive():
+            self._reader.join(_END_S)
+        text = bytes(self._printed).rpartition(_NEXT_JOB)[2]
         lines = text.decode(errors="replace").strip().splitlines()
         last = "\n".join(line[:300] for line in lines[-_LAST_LINES:])
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
@@ -311,11 +318,20 @@ class Worker:
             self.process.join(_END_S)
 
 
-def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
+def _read(output: connection.Connection, kept: bytearray) -> None:
+    """Read what a process prints, so that it never waits, until nobody can print there any more;
+    ``kept`` has the last bytes of it."""
+    with output:
+        while text := os.read(output.fileno(), 2**16):
+            kept[:] = (kept + text)[-_PRINTED:]
+
+
+def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: bool) -> None:
     """Perform the jobs that come through a pipe, lists of jobs, in this worker process, and write
-    an answer to each into ``folder``, files ``0``, ``1`` and so on. File ``begun`` appears when the
-    kernels of a list are loaded: then the clock of its first job starts. End when the pipe is
-    closed, or when no job has come for a minute."""
+    an answer to each into ``folder``, files ``0``, ``1`` and so on; what the process prints goes
+    into pipe ``prints``. File ``begun`` appears when the kernels of a list are loaded: then the
+    clock of its first job starts. End when the pipe is closed, or when no job has come for a
+    minute."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:
@@ -323,9 +339,8 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
         logging.getLogger("coartic").setLevel(logging.DEBUG)
         sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     else:
-        descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
         for stream in (1, 2):
-            os.dup2(descriptor, stream)
+            os.dup2(prints.fileno(), stream)
     _bound_resources(workers)
     process, number = os.getpid(), 0
     while pipe.poll(_IDLE_S):
@@ -345,7 +360,9 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
             os.chdir(place)
         (folder / _BEGUN).touch()
         for job in jobs:
-            text = _answer_to(job, folder)
+            with contextlib.suppress(OSError):  # an earlier job may have closed it
+                os.write(prints.fileno(), _NEXT_JOB)
+            text = _answer_to(job)
             if os.getpid() != process:  # a child that a method has forked
                 os._exit(1)
             try:
@@ -356,12 +373,9 @@ def _perform_jobs(folder: Path, pipe: Any, workers: int, verbose: bool) -> None:
     end_group(process)  # no job came in time
 
 
-def _answer_to(job: Job, folder: Path) -> bytes:
+def _answer_to(job: Job) -> bytes:
     """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
-    cannot hold them; the system ends this process at the job's limit of CPU time. Empties the log
-    in ``folder`` first."""
-    with contextlib.suppress(OSError):  # the file is missing
-        os.truncate(folder / _SAID, 0)
+    cannot hold them; the system ends this process at the job's limit of CPU time."""
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
     outcomes = perform_job(job)
     _limit_cpu_time(0)

@@ -98,6 +98,12 @@ AT_IMPORT = {
     "os.kill(os.getpid(), 9)": "is not read: SIGKILL ended the process that reads it",
     "def f(): f()\nf()": "cannot be imported: RecursionError",
     "METHODS = ['nearest-hand']": "",
+    "os.fork()": "",
+    "os.fork() or os._exit(1)": "",
+    "import json; json.dumps = lambda _: 'x'": "its answers cannot be read: JSONDecodeError",
+    "import json; json.dumps = lambda _: '[7, 0, 0]'": "has the answer to question 7",
+    "import json; json.dumps = lambda _: '[0, \"answer\", [0]]'": "cannot be read: ValidationError",
+    "import json; json.dumps = lambda _: 7": "its process ended with exit code 1",
     f"{TEXT}\nclass Twice(NearestHand): pass": "two classes are called 'nearest-hand'",
 }
 

@@ -71,7 +71,7 @@ def works(environment, place):
     assert version.startswith("coartic ")
 
 
-PYTHONS = [paths[-1] for minor, paths in sorted(pythons().items()) if minor >= 11]
+PYTHONS = {minor: paths[-1] for minor, paths in pythons().items() if minor >= 11}
 DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
 
 
@@ -84,20 +84,36 @@ def installed(python, tmp_path, *what):
     return environment, place
 
 
-@pytest.mark.parametrize("python", PYTHONS, ids=lambda path: path.name)
+@pytest.mark.parametrize("minor", sorted({11, 12, 13, *PYTHONS}))
 @pytest.mark.parametrize("versions", ["lowest", "newest"])
-def test_the_lowest_and_the_newest_versions(built, tmp_path, python, versions):
+def test_the_lowest_and_the_newest_versions(built, tmp_path, minor, versions):
     """Of what the package depends on directly. The lowest ones are tried on the oldest Python: of
     some there is no file for newer ones."""
-    if versions == "lowest" and python != PYTHONS[0]:
+    if minor not in PYTHONS:
+        pytest.skip(f"not tried: there is no python3.{minor} on this machine")
+    if versions == "lowest" and minor != min(PYTHONS):
         pytest.skip("the lowest versions have files for the oldest Python alone")
     lowest = [text.replace(">=", "==") for text in DEPENDENCIES] if versions == "lowest" else []
-    environment, place = installed(python, tmp_path, built[1], *lowest)
+    environment, place = installed(PYTHONS[minor], tmp_path, built[1], *lowest)
     works(environment, place)
     coartic = environment / "bin" / "coartic"
     assert "Usage: coartic" in do(coartic, "run", "--help", cwd=place)
     do(coartic, "report", "results", "--for-paper", cwd=place)
     assert len([*(place / "results" / "report").rglob("*.tex")]) > 3
+
+
+def test_a_checkout_without_symbolic_links_gets_a_sentence(tmp_path):
+    clone, words = tmp_path / "clone", "has no symbolic links. Install the wheel, or"
+    do("git", "clone", "-q", "-c", "core.symlinks=false", ROOT, clone, cwd=tmp_path)
+    for command in (("make", "setup"), (sys.executable, "-m", "coartic", "list")):
+        done = subprocess.run([*command], cwd=clone, capture_output=True, text=True)
+        assert done.returncode
+        assert words in done.stdout + done.stderr
+        assert "Traceback" not in done.stderr
+    assert not (clone / ".venv").exists()
+    do("git", "config", "core.symlinks", "true", cwd=clone)
+    do("git", "checkout", "--", "coartic", cwd=clone)
+    assert (clone / "coartic" / "benchmarks").is_dir()
 
 
 def test_the_source_distribution_with_the_pinned_versions(built, tmp_path):

@@ -219,14 +219,14 @@ def test_what_a_method_forks_ends_with_it():
     assert comes(lambda: not left())  # killed they are; on a busy machine they end later
 
 
-PRINTS = """for _ in range(1000):
-            os.write(1, b'x' * 10**5)
+PRINTS = """print('x' * (3 * 10**8), flush=True)
         os.write(2, b'\\none\\ntwo\\nthe end')
         os._exit(3)"""
 
 
 def test_the_last_words_of_a_run_are_kept(tmp_path):
-    """Of 100 MB, in little memory; those of an earlier run are not those of a crash."""
+    """Of 300 MB, more than files may have, in little memory; those of an earlier run are not those
+    of a crash."""
     resource = pytest.importorskip("resource")
     says = "print('x', flush=True); return Result(corrected(session))"
     cells = cells_of(tmp_path, says=says, quits="os._exit(0)", prints=PRINTS)

@@ -5,6 +5,7 @@ import random
 import shutil
 import signal
 import sqlite3
+import subprocess
 import sys
 import time
 import warnings
@@ -26,7 +27,7 @@ from coartic.benchmarks.worker import fail, perform_job
 from coartic.runs import store as store_module
 from coartic.runs.record import Score
 from coartic.runs.store import FORMAT, RUNS_FILE, explain_errors, open_store, writing
-from tests.support.processes import started
+from tests.support.processes import ROOT, python, started
 from tests.support.strategies import failing_task, tiny_task
 from tests.support.suites import (
     KNOWN,
@@ -256,6 +257,45 @@ def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lo
 
     with pytest.raises(CoarticError, match="out/.* was removed, renamed or replaced while"):
         perform(PLAN, tmp_path / "out", executor=InProcess(2), watch=watch)
+
+
+SYNC = """
+#include <errno.h>
+#include <stdlib.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+static int fails(void) { return access(getenv("SYNC_FAILS"), F_OK) == 0 && (errno = EIO); }
+int fsync(int file) { return fails() ? -1 : syscall(SYS_fsync, file); }
+int fdatasync(int file) { return fails() ? -1 : syscall(SYS_fdatasync, file); }
+"""
+UNTIL_IT_FAILS = """
+import sys
+from pathlib import Path
+from tests.test_store import PLAN, InProcess, perform
+def watch(progress, _):
+    if progress.done:
+        Path(sys.argv[2]).touch()
+perform(PLAN, sys.argv[1], executor=InProcess(2), watch=watch)
+"""
+
+
+@pytest.mark.process
+@pytest.mark.skipif(
+    sys.platform != "linux" or shutil.which("cc") is None, reason="compiles a library for Linux"
+)
+def test_a_disk_that_does_not_keep_what_is_written_gets_a_sentence(undisturbed, tmp_path):
+    """What it kept before stays, and the repeated command makes the same runs."""
+    (tmp_path / "sync.c").write_text(SYNC)
+    library, fails, out = tmp_path / "sync.so", tmp_path / "fails", tmp_path / "out"
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, tmp_path / "sync.c"], check=True)
+    faulty = {"LD_PRELOAD": str(library), "SYNC_FAILS": str(fails)}
+    done = python("-c", UNTIL_IT_FAILS, out, fails, cwd=ROOT, fails=True, **faulty)
+    assert "CoarticError: cannot use" in done.stderr.splitlines()[-1]
+    assert "the system cannot read or write it" in done.stderr.splitlines()[-1]
+    with open_store(out) as store:
+        assert 0 < len(store.ids()) < 9
+    perform_here(out)
+    same_results(load(out), undisturbed)
 
 
 def test_an_error_of_the_watch_ends_no_run(tmp_path):

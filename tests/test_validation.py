@@ -48,6 +48,7 @@ from coartic.analysis.statistics.hypotheses import (
     share_test,
 )
 from coartic.benchmarks.planning import plan_suite
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import run_suite
 from coartic.internal.text import RENAMED, did_you_mean
@@ -627,3 +628,17 @@ def test_advice_about_instances_and_their_families_is_taken(tmp_path):
         plan_suite("paper", family_files=[family])
     advice = str(caught.value).rpartition("such as ")[2]
     assert len(plan_suite("paper", family_files=[family], tasks=[advice], methods=["EC4"])) == 10
+
+
+def test_a_span_of_time_is_no_number():
+    """NumPy counts it among whole numbers."""
+    span = np.timedelta64(3)
+    for call in (
+        lambda: coartic.learn(coartic.load_task("ascending"), "EC1", trials=span, seed=0),
+        lambda: plan_suite("paper", runs=span),
+        lambda: plan_suite("paper", seed=span),
+        lambda: mean(np.array([1.0, 2.0, span], dtype=object)),
+        lambda: Local(span),
+    ):
+        with pytest.raises((CoarticError, ValueError), match="timedelta64|should be real numbers"):
+            call()

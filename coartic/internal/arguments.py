@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic import ConfigDict, PlainValidator, ValidationError, validate_call
 
 from coartic.errors import CoarticError
-from coartic.internal.limits import real_numbers
+from coartic.internal.limits import is_span, real_numbers
 from coartic.internal.validation import explain_call
 
 Asked = ParamSpec("Asked")
@@ -38,8 +38,8 @@ def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Co
 
     @wraps(function)
     def call(*args: Asked.args, **named: Asked.kwargs) -> Computed:
-        places = [*map(_plain_scalar, args)]
-        given: dict[Any, Any] = {name: _plain_scalar(value) for name, value in named.items()}
+        places = [*map(plain_scalar, args)]
+        given: dict[Any, Any] = {name: plain_scalar(value) for name, value in named.items()}
         try:
             return checked()(*places, **given)
         except ValidationError as error:
@@ -49,5 +49,7 @@ def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Co
     return call
 
 
-def _plain_scalar(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
+def plain_scalar(value: Any) -> Any:
+    """Return a scalar of NumPy as a scalar of Python; any other value, and a span of time, which
+    NumPy counts among whole numbers, as it is."""
+    return value.item() if isinstance(value, np.generic) and not is_span(value) else value

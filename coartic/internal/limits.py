@@ -35,11 +35,16 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
-    if not is_number or not least <= float(value) <= most:
+    if not is_number or is_span(value) or not least <= float(value) <= most:
         raise ValueError(
             f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
             f"from {least:{'' if whole else 'g'}} to {most:{',' if isinstance(most, int) else 'g'}}"
         )
+
+
+def is_span(value: Any) -> bool:
+    """Return whether a value is a span of time of NumPy, which counts among whole numbers there."""
+    return getattr(getattr(value, "dtype", None), "kind", "") == "m"
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
@@ -64,7 +69,9 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
         array = np.asarray(value)
     except ValueError:
         raise ValueError("should be real numbers, in rows of one length") from None
-    if array.dtype == object and all(isinstance(each, numbers.Real) for each in array.flat):
+    if array.dtype == object and all(
+        isinstance(each, numbers.Real) and not is_span(each) for each in array.flat
+    ):
         array = array.astype(np.float64)  # a nullable column of pandas
     if array.dtype.kind not in "uif":
         raise ValueError("should be real numbers")

@@ -34,6 +34,7 @@ from coartic.robot import chain, lever
 PACKAGE = Path(__file__).parent.parent
 _KEPT_S = 30 * 24 * 3600.0  # how long machine code of other sources stays
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
+_TOLD_S = 5.0  # wait for another process after which a message names the process
 _IMPORTING = Lock()  # LLVM takes an option once
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -290,12 +291,12 @@ def _cache_folder() -> Path | None:
 
 def _remove_old(root: Path, current: Path) -> None:
     """Remove the folders of machine code below ``root`` that no process has used for 30 days;
-    ``current`` counts as used now."""
+    ``current`` counts as used now, whatever the clock says."""
     with contextlib.suppress(OSError):
         os.utime(current)
     for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
         with contextlib.suppress(OSError):
-            if folder.stat().st_mtime < time.time() - _KEPT_S:
+            if folder != current and folder.stat().st_mtime < time.time() - _KEPT_S:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -303,6 +304,14 @@ def _remove_old(root: Path, current: Path) -> None:
 def _log_compilation() -> None:
     """Log a message, once a process, that compiling takes up to a minute (logger ``coartic``)."""
     logging.getLogger("coartic").info("Compiling (once): this takes up to a minute.")
+
+
+@cache
+def _log_wait(process: str, lock: str) -> None:
+    """Log a message, once for each, that this process waits for a process with a lock."""
+    logging.getLogger("coartic").info(
+        f"Waiting for process {process}, which compiles, or is stopped: it holds {lock}"
+    )
 
 
 class _MachineCode:
@@ -352,18 +361,24 @@ class _MachineCode:
         self.unlock()
 
     def wait_for_lock(self) -> bool:
-        """Lock this function's code for this process, and return True; return False if the system
-        has no locks, or another process holds the lock for more than 120 s."""
+        """Lock this function's code for this process, whose number the file of the lock gets, and
+        return True; return False if the system has no locks, or another process holds the lock for
+        more than 120 s. A message names that process after 5 s."""
         with contextlib.suppress(ImportError, OSError):
             import fcntl
 
-            file = open(f"{self.cache_path}/{self.name}.lock", "wb")  # noqa: SIM115
-            for _ in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
+            file = open(f"{self.cache_path}/{self.name}.lock", "a+b", 0)  # noqa: SIM115
+            for tries in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
                 with contextlib.suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     self.lock = file
+                    with contextlib.suppress(OSError):  # a full disk
+                        file.truncate(0)
+                        file.write(str(os.getpid()).encode())
                     return True
                 time.sleep(_RETRY_S)
+                if tries == round(_TOLD_S / _RETRY_S):
+                    _log_wait(os.pread(file.fileno(), 20, 0).decode(errors="replace"), file.name)
             file.close()
         return False
 

@@ -146,6 +146,8 @@ _PLANNED = (
 LONGEST_VALUE = 50_000_000  # bytes of a value in the file
 LONGEST_TASK = 100_000  # characters of the definition of a task
 _LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
+_ROWS_AT_ONCE = 5_000  # of a frame, as objects
+_UNIQUE = "run_id", "result", "date", "path"  # columns whose texts differ: others are kept once
 WAIT_S = 1.0  # wait for another program
 _LONGEST_PATH = 500  # letters of the path of a file; SQLite adds those of its journal
 
@@ -539,10 +541,15 @@ class Store:
 
         # astype refuses numbers that are too large
         with explain_errors(self.folder), np.errstate(invalid="ignore"):
-            rows = self._execute(query)
+            rows, parts, once = self._execute(query), list[pd.DataFrame](), dict[str, str]()
             names = [column[0] for column in rows.description]
-            frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
-            return frame.astype({name: _DTYPES[name] for name in names})
+            while (some := rows.fetchmany(_ROWS_AT_ONCE)) or not parts:
+                frame = pd.DataFrame(list(map(tuple, some)), columns=names, dtype=object)
+                for name in names:
+                    if _DTYPES[name] == "string" and name not in _UNIQUE:
+                        frame[name] = [once.setdefault(text, text) for text in frame[name]]
+                parts.append(frame.astype({name: _DTYPES[name] for name in names}))
+            return pd.concat(parts, ignore_index=True)
 
     def _wait_for(self, statement: str) -> None:
         """Execute a statement; wait as long as other programs that have the file open lock it."""

@@ -75,10 +75,9 @@ def judge_rules(study, names, rules, tests):
             findings[name], run_ids[name] = rules[name](read), read.run_ids
         except MissingError as missing:
             findings[name] = Finding(None, str(missing))
-    groups = CLAIMS.loc[names].groupby("group", sort=False).groups.values()
     judged = [
-        judge({name: (CLAIMS.text[name], tests[name], findings[name]) for name in group})
-        for group in groups
+        judge({name: (CLAIMS.text[name], tests[name], findings[name]) for name in group.index})
+        for _, group in CLAIMS.loc[names].groupby("group", sort=False)
     ]
     return pd.concat([judge({}), *judged]).loc[names], run_ids
 

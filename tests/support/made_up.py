@@ -94,7 +94,7 @@ def study_of(rows, tasks=(), *, deterministic=(), **parts):
     runs = pd.DataFrame(rows).reset_index(drop=True)
     runs = runs.astype({"reward": "Int64"})
     by_name, plan = {task.name: task for task in tasks}, []
-    for name, method, setting in runs.groupby(["task", "method", "setting"], sort=False).groups:
+    for (name, method, setting), _ in runs.groupby(["task", "method", "setting"], sort=False):
         parameters = dict(item.split("=") for item in setting.split(", ") if item)
         task = by_name.get(name) or load_task(name)
         cell = Cell(task, declared(method, deterministic), parameters)
