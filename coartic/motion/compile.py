@@ -131,7 +131,7 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """Build, in a kernel, NumPy's generator whose state and drawing functions are at these addresses
+    """Build, in a kernel, NumPy's generator whose state and drawing functions are at addresses
     (:func:`addresses`). As an intrinsic of Numba does, it gets the types of its arguments after the
     typing context, and returns signature and builder."""
     from numba.core import cgutils, types
