@@ -384,8 +384,7 @@ def _check_rewards(row: Any) -> bytes:
     damage, and if the stored best trial is not the first with the reward of the run."""
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
-        packed = zlib.decompressobj()
-        content = packed.decompress(row["rewards"] or EMPTY, size + 1)
+        content = (packed := zlib.decompressobj()).decompress(row["rewards"] or EMPTY, size + 1)
         need(len(content) <= size and packed.eof, "")
         numbers = np.frombuffer(content, "u1").reshape(4, -1)
         best = int.from_bytes(numbers[:, 0].tobytes(), "little", signed=True)
@@ -400,10 +399,8 @@ def _check_rewards(row: Any) -> bytes:
 
 
 def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
-    """Return the movements of a run, given by its row in table ``results``, by part (empty without
-    movements), and a list of all as stored, part by part, which the result's hash covers. Raises
-    ValueError for a missing movement and for a part that is too long; a malformed movement can
-    raise other errors, too."""
+    """Return the movements of row ``run`` of table ``results``, by part, and a list of all as
+    stored, which the result's hash covers. Raises an error for a missing or malformed movement."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
     query = "SELECT part, sum(length(path)) FROM movements WHERE result_id = ? GROUP BY part"
     for part, length in db.execute(query, [run]):

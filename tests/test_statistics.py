@@ -2,8 +2,11 @@
 
 import itertools
 import math
+import re
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -282,3 +285,18 @@ def test_the_least_number_of_values_on_both_sides():
         assert math.isnan(tested.p) == (none and min(len(first), len(second)) < 3)
     assert math.isnan(hypotheses.bootstrap_test([1.0], 0).p)
     assert not math.isnan(hypotheses.bootstrap_test(two, 0).p)
+
+
+def test_the_page_has_the_calibration_that_is_stored():
+    docs = Path(__file__).parents[1] / "docs"
+    stored = pd.read_csv(docs / "stored" / "two-samples" / "candidates.csv", index_col=0)
+    page = (docs / "statistics.md").read_text("utf-8")
+    rows = re.findall(r"\| (\d+) \| ([\d.]+) % \| ([\d.]+) % \|", page)
+    taken = [(int(n), float(five), float(one)) for n, five, one in rows]
+    columns = stored.sort_values("too often")[["too often", "largest at 5 %", "largest at 1 %"]]
+    for (n, five, one), row in zip(taken, columns.to_numpy(), strict=True):
+        assert (n, five, one) == (
+            row[0],
+            *(pytest.approx(100 * each, abs=0.051) for each in row[1:]),
+        )
+    assert stored["too often"].idxmin() == "exchange"
