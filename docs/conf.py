@@ -35,7 +35,7 @@ myst_enable_extensions = ["attrs_inline", "colon_fence"]
 
 # Pages that are folded under another page in the navigation.
 FOLDED = {
-    "findings": ("corrections", "foreign", "earlier"),
+    "findings": ("corrections", "foreign"),
     "paper": ("reconstruction", "claims"),
     "tasks": ("families",),
     "methods": ("beside",),
