@@ -300,7 +300,7 @@ def has_encoding(call):
         return True
     if {keyword.arg for keyword in call.keywords} & {"encoding", "errors"}:
         return True
-    return bool(arguments and re.fullmatch(r"'(utf-8(-sig)?|[arwx]b)'", arguments[-1]))
+    return bool(arguments and re.fullmatch(r"'(utf-8(-sig)?|[arwx][+]?b)'", arguments[-1]))
 
 
 def test_texts_are_read_and_written_in_an_encoding_that_is_named():

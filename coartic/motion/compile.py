@@ -367,7 +367,7 @@ class _MachineCode:
         with contextlib.suppress(ImportError, OSError):
             import fcntl
 
-            file = open(f"{self.cache_path}/{self.name}.lock", "a+b", 0)  # noqa: SIM115
+            file = open(f"{self.cache_path}/{self.name}.lock", "a+b", buffering=0)  # noqa: SIM115
             for tries in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
                 with contextlib.suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
