@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations, islice
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import scipy
@@ -182,7 +182,7 @@ def stratified_test(
     return float(1 + extreme) / (1 + resamples)
 
 
-def _moments(pool: Array, places: NDArray[np.intp], n: int) -> tuple[Array, Array]:
+def _moments(pool: Array, places: NDArray[Any], n: int) -> tuple[Array, Array]:
     """Return the difference of means (first less second sample) and the variance of the difference
     for each row of ``places``, shapes ``(rows,)``. A row has the places in ``pool`` of the first
     sample, of ``n`` values, or, with fewer places, of the second sample."""
@@ -239,12 +239,13 @@ def _kept_places(size: int, resamples: int) -> list[tuple[slice, NDArray[np.int6
     return [*_places(size, resamples)]
 
 
-def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
+def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
     """Draw ``chosen`` of ``runs`` without replacement, ``size`` times, shape ``(size, chosen)``."""
-    return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
+    order = rng.random((size, runs)).argpartition(chosen - 1, axis=1)
+    return order[:, :chosen].astype(np.int32)  # no view, which would keep all of the order
 
 
-def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.intp]]:
+def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.int32]]:
     """Yield parts of ``count`` exchanges, all possible ones if ``exact``: arrays ``(rows, min(n,
     m))``, with a row for each exchange, the places in a pool of ``n + m`` values that become the
     smaller sample (of two equal ones the first). Equal arguments give equal places."""
@@ -252,11 +253,12 @@ def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.i
     every = combinations(range(n + m), few)
     for part in slices(count, max(1, IN_CACHE // (n + m))):
         size = part.stop - part.start
-        yield np.array([*islice(every, size)]) if exact else drawn_rows(n + m, few, size, rng)
+        chosen = [*islice(every, size)] if exact else drawn_rows(n + m, few, size, rng)
+        yield np.asarray(chosen, np.int32)
 
 
 @lru_cache(maxsize=16)
-def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.intp]]:
+def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.int32]]:
     """Return a list of the parts of ``count`` exchanges, arrays of places ``(rows, min(n, m))``
     (:func:`_exchanges`). It is kept for further samples of these sizes: do not change it."""
     return [*_exchanges(n, m, count, exact)]
