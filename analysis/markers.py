@@ -238,6 +238,7 @@ def hits_from_markers(
         q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
     rows, used, unfinished, starts = [], np.zeros(len(frame), dtype=bool), [], []
     away, rests, twice = np.zeros((3, len(frame)), dtype=bool)
+    window = max(3, 2 * round(_LONGEST_GAP / step / 2) + 1)  # single samples are noise
     largest = 0.25 * max(task.robot.reach(hand)[1] for hand in hands)
     origins = np.stack([task.robot.forward_kinematics(task.q0, hand) for hand in hands])
     for part in parts:
@@ -246,9 +247,15 @@ def hits_from_markers(
         tips = np.stack([places[hand][part, -1] for hand in hands])
         found = _hits(tips, task, clock, q[part])
         # A second start: from where the hands are back, all goals are reached again.
-        radii = np.linalg.norm(tips - tips[:, :1], axis=2) / task.radius
+        smooth = np.stack([
+            pd.DataFrame(tip).rolling(window, center=True, min_periods=1).median().to_numpy()
+            for tip in tips
+        ])  # fmt: skip
+        radii = np.linalg.norm(smooth - smooth[:, :1], axis=2) / task.radius
         to_goal = np.linalg.norm(tips[:, 0] - task.goal_array[0], axis=1).min() / task.radius
-        back = (radii < min(3.0, to_goal - 2)).all(axis=0)
+        close = min(3.0, to_goal - 2)
+        left = np.logical_or.accumulate((radii > close + 0.5).any(axis=0))
+        back = left & (radii < close).all(axis=0)
         back[: found[0][0] if found else None] = False
         if back.any():
             second = int(back.argmax())

@@ -269,6 +269,12 @@ CLEAN = {
 }
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_is_no_second_start(seed):
+    """Noise of half a radius brings single samples to goals and back to the start."""
+    assert len(hits_from_markers(noisy(recorded(RIGHT, 12), 0.0075, seed), RIGHT)) == 48
+
+
 @pytest.mark.parametrize("recording", CLEAN)
 def test_a_clean_recording_passes_without_a_warning(recording):
     hits, truth = hits_from_markers(CLEAN[recording](), RIGHT), true_hits(RIGHT)
