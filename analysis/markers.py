@@ -37,8 +37,10 @@ _MANY = 20
 """Fewest samples of a trial that is compared with others."""
 _LONGEST_STEP = 0.0401
 """Longest time between samples, s: else hands pass goals between samples."""
+_SPRING = 6
+"""Ways of a marker from sample to sample, in those that 5 % exceed, that are jumps."""
 _LONGEST_REST = 0.2
-"""Longest rest at the begin of a trial, s."""
+"""Longest rest in a trial, s."""
 _FAR_START = 0.3
 """Distance of the posture in which trials begin from the task's start, with a warning."""
 
@@ -91,9 +93,9 @@ def hits_from_markers(
         the median length of a link in a trial differs from the task's by more than 10 %; trials
         differ in the time between samples by more than 10 %, or in a locked base by more than two
         radii; a trial begins far from the task's start or with a rest, or has a second start; most
-        trials are unfinished; a marker has a longer gap; a link's length jumps by more than 10 %
-        (markers swap); two shoulders contradict each other; or :func:`.read_hits` would refuse the
-        hits.
+        trials are unfinished; a marker has a longer gap or jumps; a link's length jumps by more
+        than 10 % (markers swap); two shoulders contradict each other; or :func:`.read_hits` would
+        refuse the hits.
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")
@@ -292,6 +294,18 @@ def hits_from_markers(
            f"from the task's by more than {100 * _TOLERANCE:.0f} %")  # fmt: skip
     refuse(twice, "the hand is back at the start of the trial and reaches all goals again; needed "
            "is a number for each trial")  # fmt: skip
+    sprung = np.zeros(len(frame), dtype=bool)
+    for hand in hands:
+        ways = np.linalg.norm(np.diff(places[hand], axis=0, prepend=np.nan), axis=2)
+        ways[begins | ~used] = np.nan
+        ways /= np.maximum(steps / step, 1)[:, None]
+        most = np.maximum(_SPRING * pd.DataFrame(ways).quantile(0.95).to_numpy(), task.radius)
+        for marker, name in enumerate(markers[hand]):
+            far = ways[:, marker] > most[marker]
+            culprit[far & (missing_for == 0)] = f"{hand}_{name}: "
+            sprung |= far
+    refuse(sprung, f"{culprit[sprung.argmax()]}a marker goes much farther than in other samples: "
+           "are samples missing, or did a marker jump?")  # fmt: skip
     missed = f"the tip misses {' '.join(unfinished[:1])}{also(unfinished)}"
     missed = (f"{source}: {len(unfinished)} of {counted(len(parts), 'trial')} are unfinished and "
               f"have no hits: {missed}")  # fmt: skip

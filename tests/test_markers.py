@@ -239,6 +239,12 @@ WRONG |= {
     ),
     "time between samples is 0.1 s; needed are 25 to 2000 samples": lambda t: t[::10].reset_index(),
     "row 1: time does not increase; .* not rounded": lambda t: t.assign(time=t.time.round(1)),
+    r"row \d+: right_tip: .* are samples missing": lambda t: t.drop(index=range(40, 60)).pipe(
+        lambda t: t.assign(time=0.01 * t.groupby("trial").cumcount()).reset_index(drop=True)
+    ),
+    "row 90: right_.: .* did a marker jump": lambda t: t.assign(
+        **{name: t[name] + 0.03 * t.index.isin(range(90, 93)) for name in t if name.endswith("x")}
+    ),
     "sort samples by time, and give people of one name a file each": lambda t: pd.concat(
         [t, t.assign(right_tip_x=t.right_tip_x + 0.001)], ignore_index=True
     ),
