@@ -41,8 +41,10 @@ _SPRING = 6
 """Ways of a marker from sample to sample, in those that 5 % exceed, that are jumps."""
 _LONGEST_REST = 0.2
 """Longest rest in a trial, s."""
-_FAR_START = 0.3
-"""Distance of the posture in which trials begin from the task's start, with a warning."""
+_FAR_START = 0.05
+"""Angle of a joint in the first posture from the task's start, rad, with a warning if its sign is
+the same in nearly all trials."""
+_NEARLY_ALL = 0.9
 
 
 @checked_arguments
@@ -239,6 +241,8 @@ def hits_from_markers(
         way = np.diff(places[hand], axis=1)
         q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
     rows, used, unfinished, starts = [], np.zeros(len(frame), dtype=bool), [], []
+    pauses: list[int] = []
+    returns: list[int] = []
     away, rests, twice = np.zeros((3, len(frame)), dtype=bool)
     window = max(3, 2 * round(_LONGEST_GAP / step / 2) + 1)  # single samples are noise
     largest = 0.25 * max(task.robot.reach(hand)[1] for hand in hands)
@@ -278,7 +282,13 @@ def hits_from_markers(
         # A smooth movement has gone 8 times as far after twice the time: the rest is before it.
         leaves, is_far = (clock[np.argmax(moved > far)] for far in (0.5, 4))
         rests[first] = 2 * leaves - is_far - clock[0] > _LONGEST_REST
-        starts.append(np.linalg.norm(q[first] - task.q0))
+        starts.append(q[first] - task.q0)
+        to_last = slice(first, first + found[-1][0] + 1)
+        ways = np.hstack([places[hand][to_last] for hand in hands])
+        pauses += [int(first) + sample for sample in _rests(ways, time[to_last], task.radius)]
+        left = np.logical_or.accumulate((radii > 1.5).any(axis=0))
+        again = np.flatnonzero((left & (radii < 0.5).all(axis=0))[: found[0][0]])
+        returns += (first + again[:1]).tolist()
         before = clock[0]
         for goal, (_, arm, when, posture) in enumerate(found, 1):
             ticks = max((when - before) * ticks_per_unit, 1.0)
@@ -333,9 +343,20 @@ def hits_from_markers(
         warn(missed)
     if absent := [hand for hand in task.hands if hand not in hands]:
         warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
-    if (start := float(np.median(starts))) > _FAR_START:
-        warn(f"{source}: the median trial begins {start:.2g} (length unit, rad) from the start of "
-             f"task {task.name!r}")  # fmt: skip
+    for places_of, words in (
+        (pauses, f"the hand rests for more than {1000 * _LONGEST_REST:.0f} ms on the way"),
+        (returns, "the hand is back at the start before it hits a goal"),
+    ):
+        if places_of:
+            warn(f"{source}, {names[places_of[0]]}: {words}, {counted(len(places_of), 'time')}, "
+                 f"which counts as movement{also([names[row] for row in places_of])}")  # fmt: skip
+    start = np.median(starts, axis=0)
+    same = np.mean(np.sign(starts) == np.sign(start), axis=0) >= _NEARLY_ALL
+    far_joints = [f"{task.robot.joint_names[k]} {start[k]:+.2f}" for k in range(2, len(start))
+                  if same[k] and abs(start[k]) > _FAR_START]  # fmt: skip
+    if far_joints:
+        warn(f"{source}: the median trial begins at {', '.join(far_joints)} rad from the start of "
+             f"task {task.name!r}: are trials cut late, or is its start another?")  # fmt: skip
     table = pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks",
                                         *task.robot.joint_names])  # fmt: skip
     for hand in {*HANDS}.difference(task.hands):
@@ -354,6 +375,33 @@ def _listed(lengths: Array) -> str:
 def _points(places: Iterable[Array]) -> str:
     """Return places as text, such as ``(0.088, 0.486)``."""
     return " and ".join(f"({_listed(np.round(place, 6) + 0.0)})" for place in places)
+
+
+def _rests(places: Array, time: Array, radius: float) -> list[int]:
+    """Return samples at which rests on the way begin; ``places``: ``(n, markers, 2)``.
+
+    A smooth movement that ends and another that begins are within a radius of the place between
+    them for 1.26 (the cube root of 2) times as long as within half a radius, without the rest.
+    """
+    ahead = np.minimum(np.searchsorted(time, time + _LONGEST_REST), len(time) - 1)
+    quiet = np.linalg.norm(places[ahead] - places, axis=2).max(axis=1) < radius / 2
+    middles = np.flatnonzero(quiet & (ahead < len(time) - 1))
+    begins: list[int] = []
+    after = 0
+    for group in np.split(middles, np.flatnonzero(np.diff(middles) > 1) + 1):
+        if not len(group) or group[0] < after:
+            continue
+        middle = int(group[len(group) // 2] + ahead[group[len(group) // 2]]) // 2
+        moved = np.linalg.norm(places - places[middle], axis=2).max(axis=1)
+        lasts = []
+        for far in (1, 0.5):
+            gone = np.flatnonzero(moved > far * radius)
+            begin = int(gone[gone < middle].max(initial=-1)) + 1
+            after = int(gone[gone > middle].min(initial=len(time))) - 1
+            lasts.append(time[after] - time[begin])
+        if begin and (1.26 * lasts[1] - lasts[0]) / 0.26 > _LONGEST_REST:
+            begins.append(begin)
+    return begins
 
 
 def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:

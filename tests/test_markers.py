@@ -289,6 +289,39 @@ def test_a_clean_recording_passes_without_a_warning(recording):
     assert np.abs(hits.ticks - ticks).median() < 3  # noise moves the way into a goal
 
 
+def each_trial(change):
+    """A change of the samples of each trial, whose clock runs on."""
+    return lambda t: pd.concat(
+        [change(part).assign(time=lambda u: 0.01 * np.arange(len(u)))
+         for _, part in t.groupby("trial")], ignore_index=True)  # fmt: skip
+
+
+def out_and_back(t):
+    """A trial begins with most of the way to the first goal, and the way back."""
+    centre, tips = RIGHT.goal_array[0], t[["right_tip_x", "right_tip_y"]].to_numpy()
+    begin = t[: int(0.7 * np.argmax(np.linalg.norm(tips - centre, axis=1) < RIGHT.radius))]
+    return pd.concat([begin, begin[::-1], t])
+
+
+SAID = {
+    r"row 1\d\d: the hand rests for more than 200 ms on the way, 4 times, which": each_trial(
+        lambda t: pd.concat([t[:150], t.iloc[[150] * 60], t[150:]])
+    ),
+    r"row \d+: the hand is back at the start before it hits a goal, 4 times": each_trial(
+        out_and_back
+    ),
+    r"the median trial begins at right_.* [+-]0.\d+ rad from the start": each_trial(
+        lambda t: t[15:]
+    ),
+}
+
+
+@pytest.mark.parametrize("sentence", SAID)
+def test_what_counts_as_movement_or_is_cut_from_it_is_said(sentence):
+    with pytest.warns(UserWarning, match=sentence):
+        assert len(hits_from_markers(SAID[sentence](noisy(recorded(RIGHT))), RIGHT)) == 16
+
+
 def test_a_base_that_moves_a_little_is_said():
     with pytest.warns(UserWarning, match=r"base_y is -0.015 in trial \d, but 0 in trial \d"):
         hits = hits_from_markers(from_trial_3("right_1_y", lambda y: y - 0.015)(recorded(RIGHT)),
