@@ -42,6 +42,7 @@ _MANY = 20
 _COARSE = 10.0
 """Ticks to which times may be rounded in any case."""
 _NAMED = 5  # of a kind
+_AT_GOAL = ", at goal "
 _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
 
@@ -405,6 +406,8 @@ def checked_hits(
                     "row, are hands and goals right, is the base in the length unit of the task, "
                     f"and is the task {task.name!r}?"
                 )
+            if _AT_GOAL in reasons[0]:
+                advice = f"Are goals in their order? {advice}"
             raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {advice}")
         frame = frame[~wrong].reset_index(drop=True)
         called = [name for name, words in zip(called, why, strict=True) if not words]
@@ -473,11 +476,13 @@ def _implausible(
         for row in np.flatnonzero(wrong & (why == "")).tolist():
             why[row] = words.format(*(each[row] for each in values))
 
-    off = np.zeros(len(frame))
+    off, nearest = np.zeros(len(frame)), goal.copy()
     for hand in task.hands:
         rows = (frame.hand == hand).to_numpy()
         places = task.robot.forward_kinematics(q[rows], hand)
-        off[rows] = np.linalg.norm(places - task.goal_array[goal[rows] - 1], axis=1)
+        ways = np.linalg.norm(places[:, None] - task.goal_array, axis=2)
+        off[rows] = ways[np.arange(len(ways)), goal[rows] - 1]
+        nearest[rows] = np.where(ways.min(axis=1) <= 2 * radius, ways.argmin(axis=1) + 1, 0)
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
         mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
@@ -493,7 +498,10 @@ def _implausible(
         left = pd.Series((arm != start).any(axis=1)).groupby(trial).cummax().to_numpy()
         one = (arm == arm[:, :1]).all(axis=1) & left & (len(start) > 1)
         mark(one, f"all angles of the {hand} arm are {{:g}}", arm[:, 0])
-    mark(off > most, "the hand is {:.3g} radii from its goal", off / radius)
+    far, words = off > most, "the hand is {:.3g} radii from its goal"
+    if far.any() and (nearest[far] > 0).mean() > 0.5:
+        mark(far & (nearest > 0), words + f"{_AT_GOAL}{{}}", off / radius, nearest)
+    mark(far, words, off / radius)
     whole = why == ""
     if 2 * whole.sum() < len(whole):
         return why

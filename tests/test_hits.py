@@ -162,6 +162,12 @@ def test_a_person_whose_hits_are_mostly_impossible_is_refused_by_row(people, rea
             solutions_of(TASK, frame, implausible=implausible)
 
 
+def test_goals_in_another_order_are_named(people, read):
+    swapped = people.assign(goal=people.goal.replace({2: 3, 3: 2}))
+    with pytest.raises(CoarticError, match=r"at goal [23].*Are goals in their order\? Mend"):
+        read(swapped)
+
+
 TIMES = {
     r"b: all times are multiples of 100 ticks, the median hit takes \d+: they are rounded": (
         lambda ticks: (ticks / 100).round().clip(lower=1) * 100
