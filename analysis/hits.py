@@ -41,6 +41,10 @@ _MANY = 20
 """Fewest hits of a subject whose times are looked at for rounding."""
 _COARSE = 10.0
 """Ticks to which times may be rounded in any case."""
+_UNRELATED = 0.3
+"""Correlation of times with paths below which times may be those of the next row."""
+_SLOW_GOAL = 1.6
+"""Ratio of a goal's time for a path to that of the slowest other goal, with a warning."""
 _NAMED = 5  # of a kind
 _AT_GOAL = ", at goal "
 _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
@@ -519,6 +523,22 @@ def _implausible(
             raise CoarticError(
                 f"{source}: in every trial times rise from goal to goal, as those of a clock that "
                 "runs on; needed are times from the hit before"
+            )
+    shifted = [np.log(np.roll(ticks, shift)[known]) for shift in (0, 1, -1)]
+    paths = np.log(np.maximum(straight[known], 1.0))
+    if known.sum() >= _MANY and min(map(np.ptp, [paths, *shifted])) > 0:
+        here, *others = (np.corrcoef(each, paths)[0, 1] for each in shifted)
+        rates = pd.Series(np.exp(shifted[0] - paths)).groupby(goal[known]).median()
+        slow = rates.index[rates > _SLOW_GOAL * rates.sort_values().iloc[-2:].min()].tolist()
+        if here < _UNRELATED and max(others) > 2 * _UNRELATED:
+            warn(
+                f"{source}: times fit the hits of the row above or below better (correlation with "
+                f"paths {max(others):.2f}, else {here:.2f}): do they belong to other rows?"
+            )
+        elif slow:
+            warn(
+                f"{source}: goal {slow[0]} takes {rates[slow[0]]:.2g} ticks for each of a straight "
+                f"path, others at most {rates.drop(slow).max():.2g}: is a reaction time in it?"
             )
     usual, path = (float(np.median(each[known])) if known.any() else 1.0
                    for each in (ticks, straight))  # fmt: skip

@@ -1,5 +1,6 @@
 """Reading of recorded trials, and the kernels that get them."""
 
+import re
 import warnings
 
 import numpy as np
@@ -185,6 +186,20 @@ def test_times_of_a_person_that_are_none_are_refused(people, read, sentence):
     seconds.loc[people.subject == "b", "duration"] = change
     with pytest.raises(CoarticError, match=sentence):
         read(seconds, ticks_per_unit=100)
+
+
+ODD_TIMES = {
+    "goal 1 takes .* is a reaction time in it": lambda t: t.ticks + 400 * (t.goal == 1),
+    "times fit the hits of the row .* do they belong to other rows": lambda t: np.roll(t.ticks, 1),
+}
+
+
+@pytest.mark.parametrize("sentence", ODD_TIMES)
+def test_times_that_hold_more_or_belong_to_other_rows_are_said(people, sentence):
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        solutions_of(TASK, people.assign(ticks=ODD_TIMES[sentence](people)), implausible="drop")
+    assert any(re.search(f"a: {sentence}", str(each.message)) for each in said)
 
 
 def test_hands_farther_than_two_radii_are_plausible_with_motor_noise_alone(people, read):
