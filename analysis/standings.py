@@ -146,6 +146,7 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
     rows = pd.concat(parts) if parts else pd.DataFrame(columns=["gap", "share", "runs"])
     rows = rows[rows.gap.notna()].join(methods)
     has_more = rows.index.map(trials_of(study)) > equal_trials(study)
+    has_more &= study.varied[0] != "trials"
     rows = rows.assign(ranked=rows.index.isin(there) & ~has_more)
     return rows.sort_values(["ranked", "gap"], ascending=[False, True])
 
@@ -195,7 +196,7 @@ def shown_name(study: Study, method: str) -> str:
     if method not in compared(study):
         return str(row.title)
     apart = [] if row.built_in else [_on_tasks(study, method)]
-    if trials != equal_trials(study) and "trials=" not in row.setting:
+    if trials != equal_trials(study) and "trials=" not in row.title:
         apart.append(f"{number(trials)} trials")
     words = "; ".join(filter(None, apart))
     return f"{row.title} ({words})" if words else str(row.title)

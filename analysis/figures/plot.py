@@ -23,7 +23,7 @@ from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.methods import COLORS
-from coartic.analysis.standings import shown_name
+from coartic.analysis.standings import reference, shown_name
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
@@ -79,7 +79,8 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
     The figure is in the style of all figures; its id is the function's name without ``draw_``. The
     caption gets an explanation of the dagger if a task is reconstructed; ``{n}`` in it is the range
-    of the column ``runs`` of the drawn numbers.
+    of the column ``runs`` of the drawn numbers, ``{reference}`` the name of the rewards to which
+    gaps are taken.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
@@ -102,8 +103,11 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
                 drawing, data, alt, shown = parts
             dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in shown) else ""
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
+            to = reference(study, study.optima)
             n = " to ".join(dict.fromkeys(map(number, ends)))
-            return Plot(id_of(draw), title, caption.format(n=n) + dagger, alt, drawing, data)
+            return Plot(
+                id_of(draw), title, caption.format(n=n, reference=to) + dagger, alt, drawing, data
+            )
 
         return plot
 

@@ -38,6 +38,7 @@ from coartic.analysis.words import (
     tally,
 )
 from coartic.errors import CoarticError
+from coartic.estimates import LEVEL
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
 
@@ -96,6 +97,7 @@ def finding(study: Study, section: Section) -> list[str]:
         "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
         "uses": GROUPS, "titles": study.methods.title,
         "reference": reference(study, common_tasks(study)),
+        "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
         "rivals": "other" if study.against else "built-in",
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)

@@ -192,7 +192,8 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         links = []
     made_with = study.made_with
     return environment.get_template("page.html.jinja").render(
-        title=f"Coarticulation of a simulated robot: suite {study.suite}",
+        title=study.question[0] or f"Coarticulation of a simulated robot: suite {study.suite}",
+        question=study.question[1],
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
         player=about.attempt(failures, "Film", player, study) or "",
         script=(HERE / "page.js").read_text("utf-8"),

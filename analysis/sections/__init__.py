@@ -49,6 +49,18 @@ SECTIONS = (
         (ranking.list_ranking, ranking.list_differences),
         (ranking.draw_ranking,),
         sentence="""\
+{% if varied %}
+{% for best in leading(rows[rows.missing == 0])[:1] %}
+{{ best.title }} comes nearest to the {{ reference }}: its gap is \
+{{ interval(best, "gap", scale=100, unit=" %") }}.
+{%- for next in others[0].to_dict("records")[:1] %}
+ Next is {{ next.title }}, {{ interval(next, "difference", scale=100) }} percentage points behind\
+{{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
+if next.p_holm >= 0 else ", too few runs to test" }}.
+{%- endfor %}
+
+{% endfor %}
+{% else %}
 {% set complete = rows[rows.missing == 0].dropna(subset=["gap"]) %}
 {% for use in uses %}
 {% for row in leading(complete[complete.information == use]) %}
@@ -59,11 +71,12 @@ Gap to the {{ reference }}, {{ use }}{{ ", not with equal trials" if use in uneq
 {%- endfor %}
 
 {% endfor %}
+{% endif %}
 {% for sentence in not_ranked %}
 {{ sentence }}
 
 {% endfor %}
-{% for against, group in others[0].groupby("against", sort=False) %}
+{% for against, group in others[0].groupby("against", sort=False) if not varied %}
 {{ titles[against] }} against {{ rivals }} methods, percentage points by which its gap is \
 smaller on the tasks that it solved ({{ group.tasks.iloc[0] }}): \
 {% for row in leading(group) %}

@@ -102,8 +102,10 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     also = frozenset(asked) - joined  # which the row of both conditions has
     rows = without_settings(board(study, also)).reset_index(names="method")
     named = [row["method"] for row in leading(rows[rows.ranked])]
-    first = rows.method[rows.ranked][: 12 - len(named)]
+    first = rows.method[rows.ranked][: None if study.varied[0] else 12 - len(named)]
     rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
+    if study.question[0]:
+        say(": ".join(study.question))
     say_table(
         ("method", "gap (%)", "share of the gain (%)", "runs"),
         [
@@ -112,7 +114,8 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
             for row in rows.to_dict("records")
         ],
     )  # fmt: skip
-    pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
+    pairs = [("Answer", line) for line in finding(study, SECTIONS[0]) if study.varied[0]][:1]
+    pairs += [("Not ranked", sentence) for sentence in not_ranked(study, also)]
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
     pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
