@@ -20,12 +20,12 @@ from coartic.runs.plan import trials_in
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
     best known rewards are proven, or without tasks; ``best of this folder`` if all are known from
-    methods of this folder alone; or else ``best known reward``. Raises KeyError for a task without
+    methods of this folder alone; or else ``best known``. Raises KeyError for a task without
     a best known reward."""
     best = [study.optima[task] for task in tasks]
     if all(each.proven for each in best):
         return "optimum"
-    return "best of this folder" if all(each.only_here for each in best) else "best known reward"
+    return "best of this folder" if all(each.only_here for each in best) else "best known"
 
 
 @cached

@@ -265,10 +265,9 @@ def _draw_varied(study: Study) -> Parts | None:
 
 @figure(
     "Gap to the best reward",
-    "Gap from the mean reward to the optimum, as a share of it, with its "
-    f"{style.COVERAGE} bootstrap interval over runs; to the best known reward where no optimum is "
-    "proven, to the best of this folder where none is known. Means over all tasks where there are "
-    "several. The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
+    "Gap from the mean reward to the {reference}, as a share of it, with its "
+    f"{style.COVERAGE} bootstrap interval over runs. Means over all tasks where there are several. "
+    "The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
     "have none. n: runs. Diamonds: the paper's learner. Bold names: the learner and methods from "
     "files, whose marks are larger.",
 )
@@ -333,7 +332,6 @@ def _draw_gaps(study: Study) -> Parts | None:
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)
     where = "" if len(tasks) > 1 else study.tasks[tasks[0]].label + (":\n" if narrow else ": ")
-    short = to.removesuffix(" reward").replace("this ", "").replace("optimum", "the optimum")
-    axes.set_xlabel(f"{where}gap to {short} (%)")
+    axes.set_xlabel(f"{where}gap to the {to} (%)")
     alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
