@@ -106,7 +106,7 @@ smaller on the tasks that it solved ({{ group.tasks.iloc[0] }}): \
         "coarticulation",
         "Coarticulation",
         (coarticulation.list_contexts, coarticulation.list_signatures),
-        (coarticulation.draw_postures,),
+        (coarticulation.draw_postures, coarticulation.draw_saved),
         sentence="""\
 {% for row in rows.head(1).to_dict("records") %}
 {{ row.title }} hits {{ row.place }} {{ {
@@ -193,6 +193,7 @@ if row.trials_to_half < infinite else "never half" }}{{ "." if loop.last else ";
 )
 TABLES = {table.id: table for section in SECTIONS for table in section.tables}
 TABLES["against-learner"] = ranking.list_against_learner
-"""Tables by id; ``against-learner`` is a CSV file without a section."""
+TABLES["saved"] = coarticulation.list_saved
+"""Tables by id; ``against-learner`` and ``saved`` are CSV files without a section."""
 FIGURES = {id_of(draw): draw for section in SECTIONS for draw in section.figures}
 """Figures by id."""
