@@ -20,12 +20,12 @@ from coartic.runs.plan import trials_in
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
     best known rewards are proven, or without tasks; ``best of this folder`` if all are known from
-    methods of this folder alone; or else ``best known reward``. Raises KeyError for a task without
+    methods of this folder alone; or else ``best known``. Raises KeyError for a task without
     a best known reward."""
     best = [study.optima[task] for task in tasks]
     if all(each.proven for each in best):
         return "optimum"
-    return "best of this folder" if all(each.only_here for each in best) else "best known reward"
+    return "best of this folder" if all(each.only_here for each in best) else "best known"
 
 
 @cached
@@ -146,6 +146,7 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
     rows = pd.concat(parts) if parts else pd.DataFrame(columns=["gap", "share", "runs"])
     rows = rows[rows.gap.notna()].join(methods)
     has_more = rows.index.map(trials_of(study)) > equal_trials(study)
+    has_more &= study.varied[0] != "trials"
     rows = rows.assign(ranked=rows.index.isin(there) & ~has_more)
     return rows.sort_values(["ranked", "gap"], ascending=[False, True])
 
@@ -195,7 +196,7 @@ def shown_name(study: Study, method: str) -> str:
     if method not in compared(study):
         return str(row.title)
     apart = [] if row.built_in else [_on_tasks(study, method)]
-    if trials != equal_trials(study) and "trials=" not in row.setting:
+    if trials != equal_trials(study) and "trials=" not in row.title:
         apart.append(f"{number(trials)} trials")
     words = "; ".join(filter(None, apart))
     return f"{row.title} ({words})" if words else str(row.title)

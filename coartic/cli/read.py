@@ -93,8 +93,8 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
     from coartic.analysis.sections import SECTIONS
-    from coartic.analysis.standings import board, not_ranked, shown_name
-    from coartic.analysis.words import interval, number
+    from coartic.analysis.standings import board, common_tasks, not_ranked, reference, shown_name
+    from coartic.analysis.words import interval, listed, number
     from coartic.learner.learning import TRIALS
 
     in_order = board(study).query("ranked")
@@ -102,17 +102,21 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     also = frozenset(asked) - joined  # which the row of both conditions has
     rows = without_settings(board(study, also)).reset_index(names="method")
     named = [row["method"] for row in leading(rows[rows.ranked])]
-    first = rows.method[rows.ranked][: 12 - len(named)]
+    first = rows.method[rows.ranked][: None if study.varied[0] else 12 - len(named)]
     rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
+    to = reference(study, common_tasks(study))
+    if study.question[0]:
+        say(": ".join(study.question))
     say_table(
-        ("method", "gap (%)", "share of the gain (%)", "runs"),
+        ("method", f"gap to the {to} (%)", "share of the gain (%)", "runs"),
         [
             (shown_name(study, row["method"]), interval(row, "gap", scale=100),
              interval(row, "share", 0, 100), number(row["runs"]))
             for row in rows.to_dict("records")
         ],
     )  # fmt: skip
-    pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
+    pairs = [("Answer", line) for line in finding(study, SECTIONS[0]) if study.varied[0]][:1]
+    pairs += [("Not ranked", sentence) for sentence in not_ranked(study, also)]
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
     pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
@@ -120,6 +124,10 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
     if unlike:
         pairs.append(("Unlike the paper", "; ".join(unlike)))
+    if what["own"]:
+        again = "repeat the command with optimum/search among its --methods"
+        text = f"Of {listed(what['own'])} the {to} is no proven optimum: to search for it, {again}"
+        pairs.append(("Reference", text))
     if what["earlier"]:
         pairs.append(("Of 4.0.0", f"runs of {', '.join(what['earlier'])}"))
     pairs += [("‡", sentence) for sentence in what["late"]]
