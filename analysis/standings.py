@@ -153,7 +153,8 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
 
 def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
     """Return a sentence for each row of :func:`board` that is not ranked, settings left out: its
-    gap, why it is not ranked, and the gap of the first method on the same tasks."""
+    gap, why it is not ranked, and the gap of the first method on the same tasks; and for each
+    method from a file, or of the labels ``also``, that has no row, as it solved no task."""
     rows, sentences = without_settings(board(study, also)), []
     for method in rows.index[~rows.ranked]:
         on, name = solved_tasks(study, method), study.methods.title[method]
@@ -169,6 +170,12 @@ def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
             text += f"; on {'it' if len(on) == 1 else 'these'} {rows.title.iloc[0]} has "
             text += f"{number(100 * gap, 1)} %"
         sentences.append(f"{text}.")
+    for method in compared(study):
+        shown = not study.methods.built_in[method] or method in also
+        if shown and not solved_tasks(study, method):
+            sentences.append(
+                f"{study.methods.title[method]} is not ranked: {_on_tasks(study, method)}."
+            )
     return sentences
 
 
@@ -190,16 +197,25 @@ def shown_name(study: Study, method: str) -> str:
     """Return the title of a method and, for a method of :func:`compared`, what sets its numbers
     apart from those of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
-    :func:`common_tasks`; ``mine (400 trials)`` for another number of trials than
+    :func:`common_tasks`; ``mine (at most 77 of 10,000 trials)`` for one whose runs all stopped
+    before their trials were made; ``mine (400 trials)`` for another number of trials than
     :func:`equal_trials`, where its setting does not say it."""
     row, trials = study.methods.loc[method], trials_of(study)[method]
     if method not in compared(study):
         return str(row.title)
-    apart = [] if row.built_in else [_on_tasks(study, method)]
+    apart = [] if row.built_in else [_on_tasks(study, method), _trials_made(study, method)]
     if trials != equal_trials(study) and "trials=" not in row.title:
         apart.append(f"{number(trials)} trials")
     words = "; ".join(filter(None, apart))
     return f"{row.title} ({words})" if words else str(row.title)
+
+
+def _trials_made(study: Study, method: str) -> str:
+    """Return how many of its trials a method made at most, ``at most 77 of 10,000 trials``; empty
+    if a run made all of them, and for a method that does not use the reward of trials."""
+    made, asked = int(compared(study)[method].trials.max()), trials_of(study)[method]
+    is_short = study.methods.information[method] == BY_TRIAL and made < asked
+    return f"at most {number(made)} of {number(asked)} trials" if is_short else ""
 
 
 def _on_tasks(study: Study, method: str) -> str:

@@ -85,10 +85,11 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     """Print a table, then pairs of a word and a text.
 
     The table has at most ten methods of the ranking, without settings and ablations: those with the
-    smallest gaps and, wherever they rank, the learner and random search; and all methods from files
-    and of the labels ``asked`` that are in no joined row, also below the ranking. The pairs are the
-    reasons why these are not ranked, the findings on coarticulation and on cost, numbers of runs
-    and trials that are not those of the paper, the failed runs, and ``more``.
+    smallest gaps and, wherever they rank, the learner and random search; and all methods from
+    files, with their settings, and of the labels ``asked`` that are in no joined row, also below
+    the ranking. The pairs are the reasons why these are not ranked, the findings on coarticulation
+    and on cost, numbers of runs and trials that are not those of the paper, the failed runs, and
+    ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
@@ -100,7 +101,9 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     in_order = board(study).query("ranked")
     joined = {part for parts in in_order.parts if len(parts) > 1 for part in parts}
     also = frozenset(asked) - joined  # which the row of both conditions has
-    rows = without_settings(board(study, also)).reset_index(names="method")
+    every = board(study, also)
+    is_shown = every.index.isin(without_settings(every).index) | ~every.built_in.astype(bool)
+    rows = every[is_shown].reset_index(names="method")
     named = [row["method"] for row in leading(rows[rows.ranked])]
     first = rows.method[rows.ranked][: None if study.varied[0] else 12 - len(named)]
     rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
