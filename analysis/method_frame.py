@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Collection, Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from coartic.analysis.methods import (
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, METHOD_PREFIX
 from coartic.method import Information
+from coartic.runs.plan import in_words
 
 if TYPE_CHECKING:
     from coartic.runs.method_info import MethodInfo
@@ -62,19 +64,21 @@ def methods_of(
         By the label of the method, with the columns of :attr:`.Study.methods`.
     """
     rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
+    varied, values = parameter_varied(runs)
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
+        named = in_words({varied: values[label]}) if label in values else setting
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""
-        under = default if default in by_label else ""
+        under = default if default in by_label and label not in values else ""
         rows[label] = {
             "base": base,
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
             "parts": (label,),
-            "title": title_of(base, setting) + MARK * (base in marked),
-            "short": title_of(base, setting, short=True) + MARK * (base in marked),
+            "title": title_of(base, named) + MARK * (base in marked),
+            "short": title_of(base, named, short=True) + MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,
@@ -96,6 +100,25 @@ def methods_of(
     place = {name: number for number, name in enumerate(KNOWN_METHODS)}
     ordered = sorted(rows, key=lambda label: place.get(rows[label]["base"], len(place)))
     return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
+
+
+def parameter_varied(runs: pd.DataFrame) -> tuple[str, dict[str, Any]]:
+    """Return the name of a parameter and its values by label, numbers from low to high, if all runs
+    but searches for the optimum are of one method, on all tasks, with two or more values of this
+    parameter and equal others; or else an empty name and no value. ``runs`` are as in
+    :func:`methods_of`."""
+    runs = runs[~runs.method.isin(SEARCHES)]
+    tasks = runs.groupby("label", sort=False).task.nunique()
+    texts = runs.drop_duplicates("label").set_index("label").parameters
+    by_label = {str(label): json.loads(text) for label, text in texts.items()}
+    names = {name for each in by_label.values() for name in each}
+    differ = [n for n in names if len({repr(each.get(n)) for each in by_label.values()}) > 1]
+    if len({*runs.method}) != 1 or len(differ) != 1 or (tasks < runs.task.nunique()).any():
+        return "", {}
+    values = {label: each.get(differ[0]) for label, each in by_label.items()}
+    if all(type(value) in (int, float) for value in values.values()):
+        values = dict(sorted(values.items(), key=lambda each: each[1]))
+    return differ[0], values
 
 
 def _group_of(runs: pd.DataFrame) -> str:

@@ -20,12 +20,12 @@ from coartic.runs.plan import trials_in
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
     best known rewards are proven, or without tasks; ``best of this folder`` if all are known from
-    methods of this folder alone; or else ``best known reward``. Raises KeyError for a task without
+    methods of this folder alone; or else ``best known``. Raises KeyError for a task without
     a best known reward."""
     best = [study.optima[task] for task in tasks]
     if all(each.proven for each in best):
         return "optimum"
-    return "best of this folder" if all(each.only_here for each in best) else "best known reward"
+    return "best of this folder" if all(each.only_here for each in best) else "best known"
 
 
 @cached
@@ -146,13 +146,15 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
     rows = pd.concat(parts) if parts else pd.DataFrame(columns=["gap", "share", "runs"])
     rows = rows[rows.gap.notna()].join(methods)
     has_more = rows.index.map(trials_of(study)) > equal_trials(study)
+    has_more &= study.varied[0] != "trials"
     rows = rows.assign(ranked=rows.index.isin(there) & ~has_more)
     return rows.sort_values(["ranked", "gap"], ascending=[False, True])
 
 
 def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
     """Return a sentence for each row of :func:`board` that is not ranked, settings left out: its
-    gap, why it is not ranked, and the gap of the first method on the same tasks."""
+    gap, why it is not ranked, and the gap of the first method on the same tasks; and for each
+    method from a file, or of the labels ``also``, that has no row, as it solved no task."""
     rows, sentences = without_settings(board(study, also)), []
     for method in rows.index[~rows.ranked]:
         on, name = solved_tasks(study, method), study.methods.title[method]
@@ -168,6 +170,12 @@ def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
             text += f"; on {'it' if len(on) == 1 else 'these'} {rows.title.iloc[0]} has "
             text += f"{number(100 * gap, 1)} %"
         sentences.append(f"{text}.")
+    for method in compared(study):
+        shown = not study.methods.built_in[method] or method in also
+        if shown and not solved_tasks(study, method):
+            sentences.append(
+                f"{study.methods.title[method]} is not ranked: {_on_tasks(study, method)}."
+            )
     return sentences
 
 
@@ -189,16 +197,25 @@ def shown_name(study: Study, method: str) -> str:
     """Return the title of a method and, for a method of :func:`compared`, what sets its numbers
     apart from those of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
-    :func:`common_tasks`; ``mine (400 trials)`` for another number of trials than
+    :func:`common_tasks`; ``mine (at most 77 of 10,000 trials)`` for one whose runs all stopped
+    before their trials were made; ``mine (400 trials)`` for another number of trials than
     :func:`equal_trials`, where its setting does not say it."""
     row, trials = study.methods.loc[method], trials_of(study)[method]
     if method not in compared(study):
         return str(row.title)
-    apart = [] if row.built_in else [_on_tasks(study, method)]
-    if trials != equal_trials(study) and "trials=" not in row.setting:
+    apart = [] if row.built_in else [_on_tasks(study, method), _trials_made(study, method)]
+    if trials != equal_trials(study) and "trials=" not in row.title:
         apart.append(f"{number(trials)} trials")
     words = "; ".join(filter(None, apart))
     return f"{row.title} ({words})" if words else str(row.title)
+
+
+def _trials_made(study: Study, method: str) -> str:
+    """Return how many of its trials a method made at most, ``at most 77 of 10,000 trials``; empty
+    if a run made all of them, and for a method that does not use the reward of trials."""
+    made, asked = int(compared(study)[method].trials.max()), trials_of(study)[method]
+    is_short = study.methods.information[method] == BY_TRIAL and made < asked
+    return f"at most {number(made)} of {number(asked)} trials" if is_short else ""
 
 
 def _on_tasks(study: Study, method: str) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
-from coartic.analysis.method_frame import methods_of
+from coartic.analysis.method_frame import methods_of, parameter_varied
 from coartic.analysis.optima import (
     BestKnown,
     best_known,
@@ -230,6 +230,18 @@ class Study:
     def suite(self) -> str:
         """Name of the suite that was run."""
         return self.plan[0].suite
+
+    @property
+    def question(self) -> tuple[str, str]:
+        """Title and description of a suite of the user's own; empty for a shipped suite."""
+        title, description = self.made_with.get("question", ("", ""))
+        return title, description
+
+    @cached_property
+    def varied(self) -> tuple[str, dict[str, Any]]:
+        """Name of the only parameter in which the compared methods differ, and its values by label
+        (:func:`.parameter_varied`); empty if they differ in more."""
+        return parameter_varied(self.runs)
 
     @cached_property
     def tasks(self) -> dict[str, Task]:

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.standings import common_tasks, shown_name
+from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL, WITHOUT_REWARD
+from coartic.analysis.standings import common_tasks, reference, shown_name
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
@@ -117,11 +118,14 @@ class TableFrame(pd.DataFrame):
         return self.drop(columns="run_ids", errors="ignore").to_html(max_rows=20)
 
 
+_USES = {BY_TRIAL: "trial", BY_FORMULA: "formula", WITHOUT_REWARD: "none"}
+
+
 @cached
 def _rows_of(study: Study, table: Table) -> pd.DataFrame:
     """Return a table as a DataFrame: a row for each name, and only the columns of the table, with
     ``_low``, ``_high`` and ``_sd`` written out; NaN where a row has no entry. Its ``attrs`` have
-    ``titles``, ``under``, ``own`` and ``best_known`` (:func:`_shown_names`)."""
+    ``titles``, ``under``, ``own`` and ``reference`` (:func:`_shown_names`)."""
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
@@ -140,26 +144,27 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table.
 
     ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
-    and ablation, by label; ``own``: labels of methods from files; ``best_known``: True if a best
-    known reward does not come from this folder alone; ``compared``: number of compared tasks, in
-    words.
+    and ablation, by label; ``own``: labels of methods from files; ``reference``: name of the
+    rewards to which gaps are taken; ``compared``: number of compared tasks, in words.
     """
     methods, tasks = study.methods, study.tasks
     names = {label: shown_name(study, label) for label in methods.index}
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
     marks = {name: marked(task) for name, task in tasks.items()}
     return {
-        "titles": {**families, **marks, **names},
+        "titles": {**families, **marks, **names, **_USES},
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
         "compared": counted(len(common_tasks(study)), "task"),
-        "best_known": any(not best.only_here for best in study.optima.values()),
+        "reference": reference(study, study.optima),
     }
 
 
 def caption_of(table: Table, frame: pd.DataFrame) -> str:
-    """Return the caption of a table's frame; ``{tasks}`` in it is the number of compared tasks."""
-    return table.caption.replace("{tasks}", frame.attrs["compared"])
+    """Return the caption of a table's frame; ``{tasks}`` in it is the number of compared tasks,
+    ``{reference}`` the name of the rewards to which gaps are taken."""
+    caption = table.caption.replace("{tasks}", frame.attrs["compared"])
+    return caption.replace("{reference}", frame.attrs["reference"])
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,6 +21,7 @@ from coartic.benchmarks.suites import (
     TrialCount,
     check_kind,
     load_suite,
+    suites,
     tasks_of,
 )
 from coartic.internal.arguments import plain_scalar
@@ -177,7 +179,10 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
             idle_methods = [registered[name] for name in wanted]
             raise CoarticError(_why_nothing_runs(suite, [], idle_methods, jobs))
     _check_effects(request, chosen)
-    return _distinct_jobs([each for each in chosen if each.numbers])
+    jobs = _distinct_jobs([each for each in chosen if each.numbers])
+    if own or suite in suites().values():
+        return jobs
+    return [replace(each, question=(suite.title, suite.description)) for each in jobs]
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:

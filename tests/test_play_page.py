@@ -459,9 +459,12 @@ def test_it_practises_plays_and_saves_pictures(opened):
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
     press(page, "Pause")
+    expect(page.get_by_role("button", name="Pause")).to_have_count(0)
     slide(page, "Tick", 100)
-    page.get_by_role("slider", name="Tick").press("ArrowRight")
-    page.get_by_text("102 of").wait_for()
+    tick = page.get_by_role("slider", name="Tick")
+    expect(tick).to_have_value("100")
+    tick.press("ArrowRight")
+    expect(page.get_by_text("102 of")).to_be_visible()
     size = page.locator("[data-is=stage]").evaluate(
         "stage => [stage.clientWidth, stage.clientHeight]"
     )

@@ -95,7 +95,7 @@ def test_a_method_that_failed_on_an_instance_has_no_gap_in_its_family():
 
 @pytest.mark.parametrize(
     ("name", "to"),
-    [("many-goals/v1/i000", "best known reward"), ("two-armed/v1/2030-000", "best of this folder")],
+    [("many-goals/v1/i000", "best known"), ("two-armed/v1/2030-000", "best of this folder")],
 )
 def test_what_only_a_folder_says_is_not_called_known(name, to):
     runs = (learner(name, label, 9 * ALONE, commit="") for label in (EC4, RANDOM_SEARCH))

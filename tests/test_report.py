@@ -15,9 +15,10 @@ from coartic.analysis.report import about, render
 from coartic.analysis.report.about import attempt, limits
 from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.player import methods_played, player
-from coartic.analysis.sections import TABLES, coarticulation
-from coartic.analysis.study import Study
+from coartic.analysis.sections import FIGURES, TABLES, coarticulation
+from coartic.analysis.study import Study, load
 from tests.support.made_up import runs_of, study_of
+from tests.support.processes import ROOT
 from tests.support.suites import cells_of, run_and_write
 
 
@@ -148,6 +149,9 @@ def test_every_number_of_a_sentence_is_in_the_table_under_it(report):
     seen = 0
     for section in re.findall(r"<section.*?</section>", page, re.DOTALL):
         lines = re.findall(r'<p class="finding">(.*?)</p>', section)
+        (name,) = re.findall(r'<h2 id="(.*?)"', section)
+        lines += re.findall(rf'<li><a href="#{name}">.*?</a> (.+?)</li>', page)
+        assert [line for line in lines if page.count(line) > 1] == []
         table = section.partition("<table")[2].partition("</table>")[0]
         cells = {*numbers_in(re.sub("<[^>]+>", " ", html.unescape(table)))}
         words = html.unescape(" ".join(lines)).replace("95 %", "")
@@ -170,6 +174,40 @@ def test_a_report_of_one_run_without_a_learner_stays_with_its_results(traced, tm
     with pytest.raises(CoarticError, match="report holds the report of other results"):
         write_report(traced, tmp_path / "report")
     write_report(one, tmp_path / "report", for_paper=False)
+
+
+def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
+    """The suite of the page on own suites: heading, question, answer, all rows, and the figure."""
+    page = (ROOT / "docs" / "howto" / "task.md").read_text("utf-8")
+    (text,) = re.findall(r"```toml\n# noise.toml\n(.*?)```", page, re.DOTALL)
+    suite, out = tmp_path / "noise.toml", tmp_path / "noise"
+    suite.write_text(text.replace("runs = 10", "runs = 4").replace("5000", "200"))
+    assert coartic("run", suite, "--out", out, "--jobs", 2)[0] == 0
+    _, printed, _ = coartic("run", suite, "--out", out)  # the runs are there
+    seen = load(out)
+    means = seen.runs.groupby(["noise_sd", "task"]).gap.mean().groupby("noise_sd").mean()
+    best, other, *_ = means.sort_values().index
+    lines = printed.splitlines()
+    heading = lines.index("Noise: How much exploration noise?")
+    rows = [re.match(r"learner EC1 \(σ (\S+)\) ", line) for line in lines[heading + 2 :]]
+    assert [float(row[1]) for row in rows[:3]] == means.sort_values().index.tolist()
+    answer = " ".join(" ".join(lines).partition("Answer ")[2].split())
+    begin = (
+        f"learner EC1 (σ {best}) comes nearest to the optimum: its gap is {100 * means[best]:.1f} %"
+    )
+    assert answer.startswith(begin)
+    behind = f"Next is learner EC1 (σ {other}), {100 * (means[other] - means[best]):.1f} ["
+    assert behind in answer
+    plot = FIGURES["ranking"](seen)
+    assert plot.data.set_index("value").gap.to_dict() == pytest.approx(means.to_dict())
+    write_report(seen, tmp_path / "report", for_paper=False)
+    written = (tmp_path / "report" / "report.html").read_text("utf-8")
+    assert "<h1>Noise</h1>\n<p>How much exploration noise?</p>" in written
+    assert 'class="setting"' not in written
+    assert load(out).question == ("Noise", "How much exploration noise?")
+    suite.write_text(text.replace("0.1]", "0.1], epsilon = [0.0, 0.5]").replace("5000", "2"))
+    assert coartic("run", suite, "--out", tmp_path / "two", "--runs", "1")[0] == 0
+    assert load(tmp_path / "two").varied == ("", {})
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")

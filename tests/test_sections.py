@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError, corrective_trial, load_task
 from coartic.analysis import runtimes
 from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.sections.learning import learning_curves
+from coartic.analysis.study import solved
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of, study_of_trials
 
 ONE, TWO = "ascending", "two-armed-1"
@@ -195,3 +196,17 @@ def test_tasks(study):
     columns = ["initial", "best_hands", "optimum", "source", "bound"]
     assert table.loc[ONE, columns].tolist() == [-319, -319, -292, "shipped", -292]
     assert table.loc[TWO, columns].tolist() == [-675, -532, -465, "shipped", -465]
+
+
+def test_ticks_saved_are_those_of_the_movements_less_those_of_the_corrective_process(traced):
+    table = TABLES["saved"](traced)
+    assert len(table) > 5
+    row = table.loc["ascending dual-process/EC1"]
+    runs = solved(traced.cells["ascending", "dual-process/EC1"])
+    solutions = traced.solutions.astype({"ticks": float})
+    by_goal = solutions.pivot_table("ticks", "run_id", "goal", aggfunc="sum")
+    reference = corrective_trial(traced.tasks["ascending"], runs.hands.iloc[0]).ticks_by_goal()
+    expected = by_goal.loc[runs.run_id, [1, 2, 3]].mean() - np.array(reference)
+    assert [row[f"by_goal_{goal}"] for goal in (1, 2, 3)] == pytest.approx([*expected])
+    drawn = FIGURES["saved"](traced).data.set_index(["task", "method"])
+    assert drawn.by_goal_1["ascending", "dual-process/EC1"] == row.by_goal_1

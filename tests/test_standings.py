@@ -215,7 +215,8 @@ def with_trials(seen, by_method, suite_trials=None):
         plan.append(replace(job, cell=cell, suite_trials=suite_trials))
     optima = made_up_optima("ascending", "two-armed-1")
     parts = {"optima": optima, "rewards": lambda: iter(())}
-    return MadeUp(Study(seen.folder, plan, seen.made_with, seen.runs), **parts)
+    runs = seen.runs.assign(trials=seen.runs.method.map(by_method).fillna(10).astype(int))
+    return MadeUp(Study(seen.folder, plan, seen.made_with, runs), **parts)
 
 
 SIXTEEN = [
@@ -253,7 +254,7 @@ def test_a_method_with_more_trials_stands_below(trials, by_suite, equal, is_rank
     assert named == unlike
     first, *others = said(seen, "ranking")
     assert ("not with equal trials" in first) == bool(unlike)
-    assert ("mine 0.0 %" in first.replace("\xa0", " ").replace(" (4 trials)", "")) == is_ranked
+    assert ("mine leaves" in first.replace(" (4 trials)", "")) == is_ranked
     below = "mine 0.0 % is not ranked: 40 trials, not 10; on these CMA-ES has"
     assert any(each.replace("\xa0", " ").startswith(below) for each in others) != is_ranked
 
@@ -325,6 +326,30 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert (better.difference_low > 0).all()
     same = TABLES["differences"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))
     assert same.difference_low.iloc[0] < 0  # runs with the same seeds are not matched
+
+
+def test_a_method_that_stops_early_or_solves_nothing_says_so():
+    rows = [
+        *(run for cell, of in TEN.items() for run in runs_of(*cell, of)),
+        *runs_of("ascending", "early", [-305] * 3, trials=[3, 2, 3]),
+        *runs_of("ascending", "never", [None] * 3),
+    ]
+    seen = study_of(rows, optima=made_up_optima("ascending", "two-armed-1"))
+    assert "at most 3 of 10 trials" in standings.shown_name(seen, "early")
+    sentences = standings.not_ranked(seen)
+    assert "never is not ranked: 0 of 2 tasks, 3 failed runs." in sentences
+
+
+def test_a_run_that_failed_after_some_trials_has_no_early_gap():
+    rows = [
+        *runs_of("ascending", "hill-climbing", [-300, -301, -302]),
+        *runs_of("ascending", "mine", [-300, -301, None]),
+    ]
+    rewards = {row["run_id"]: np.array([-310.0, -305.0]) for row in rows}
+    seen = study_of(rows, optima=made_up_optima("ascending"), rewards=lambda: iter(rewards.items()))
+    early = TABLES["ranking"](seen).gap_early
+    assert early["hill-climbing"] == pytest.approx((305 - 292) / 292)
+    assert math.isnan(early["mine"])
 
 
 def test_all_methods_are_compared_with_a_method_of_choice():

@@ -23,7 +23,7 @@ from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.methods import COLORS
-from coartic.analysis.standings import shown_name
+from coartic.analysis.standings import reference, shown_name
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
@@ -80,7 +80,8 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
     The figure is in the style of all figures; its id is the function's name without ``draw_``, with
     dashes for underscores. The caption gets an explanation of the dagger if one of the tasks that
     the function returns is reconstructed; ``{n}`` in it is the range of column ``runs`` of the
-    drawn numbers, empty without this column.
+    drawn numbers, empty without this column, ``{reference}`` the name of the rewards to which gaps
+    are taken.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
@@ -103,8 +104,11 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
                 drawing, data, alt, shown = parts
             dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in shown) else ""
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
+            to = reference(study, study.optima)
             n = " to ".join(dict.fromkeys(map(number, ends)))
-            return Plot(id_of(draw), title, caption.format(n=n) + dagger, alt, drawing, data)
+            return Plot(
+                id_of(draw), title, caption.format(n=n, reference=to) + dagger, alt, drawing, data
+            )
 
         return plot
 

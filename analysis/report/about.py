@@ -38,6 +38,7 @@ from coartic.analysis.words import (
     tally,
 )
 from coartic.errors import CoarticError
+from coartic.estimates import LEVEL
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
 
@@ -93,9 +94,11 @@ def finding(study: Study, section: Section) -> list[str]:
     rows = rows[~rows.method.isin(below)]
     environment.globals |= {
         "not_ranked": not_ranked(study), "unequal": {*unequal.information},
-        "interval": interval, "p_value": p_value, "leading": leading, "infinite": math.inf,
+        "interval": interval, "number": number, "p_value": p_value, "leading": leading,
+        "infinite": math.inf,
         "uses": GROUPS, "titles": study.methods.title,
         "reference": reference(study, common_tasks(study)),
+        "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
         "rivals": "other" if study.against else "built-in",
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
@@ -158,10 +161,10 @@ def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
     notes = []
     if unproven and columns & {"gap", "optimum"}:
         notes.append(
-            f"The optimum of {listed(unproven)} is not proven: it is the best known reward."
+            f"The best known rewards of {listed(unproven)} are not proven to be the optimum."
         )
     if own and "gap" in columns:
         notes.append(
-            f"No optimum of {listed(own)} is known: gaps there are to the best of this folder."
+            f"Of {listed(own)} the best of this folder is all that is known: gaps are to it."
         )
     return notes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import os
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from shlex import quote
@@ -15,6 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
 from coartic.analysis.figures.plot import Plot, for_page, picture
+from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import (
@@ -24,7 +26,8 @@ from coartic.analysis.report.render import (
     latex_table,
     table_csv,
 )
-from coartic.analysis.sections import SECTIONS, TABLES, Section
+from coartic.analysis.sections import SECTIONS, TABLES, Section, coarticulation, ranking
+from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Table, caption_of, is_setting
 from coartic.analysis.words import listed, number
@@ -173,7 +176,8 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         parts = parts or {"finding": [], "figures": [], "shown": []}
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:
-            sections.append({**vars(section), **parts, "failure": failure})
+            note = section.note.replace("{reference}", reference(study, study.optima))
+            sections.append({**vars(section), **parts, "failure": failure, "note": note})
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
@@ -185,6 +189,8 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
     )
     environment.filters |= {"number": number, "listed": listed}
     there = [section["id"] for section in sections]
+    draw = ranking.draw_ranking if study.varied[0] else coarticulation.draw_postures
+    lead = about.attempt(failures, "Picture", partial(draw, width=ONE), study)
     stage = next((name for name in ("coarticulation", "ranking", "tasks") if name in there), "")
     try:
         links = metadata("coartic").get_all("Project-URL") or []
@@ -192,11 +198,13 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         links = []
     made_with = study.made_with
     return environment.get_template("page.html.jinja").render(
-        title=f"Coarticulation of a simulated robot: suite {study.suite}",
+        title=study.question[0] or f"Coarticulation of a simulated robot: suite {study.suite}",
+        question=study.question[1],
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
         player=about.attempt(failures, "Film", player, study) or "",
         script=(HERE / "page.js").read_text("utf-8"),
         sections=sections,
+        lead=lead and (lead, for_page(lead)),
         stage=stage,
         suite=study.suite,
         home=home,

@@ -68,8 +68,11 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
             continue
         what = name.removeprefix(column.name)
         header = column.header.replace("{}", titles.get(what, what))
-        if header == "gap (%)" and not frame.attrs.get("best_known", True):
-            header = "gap to the best of this folder (%)"
+        to = frame.attrs.get("reference", "optimum")
+        if header == "gap (%)" and to != "optimum":
+            header = f"gap to the {to} (%)"
+        if header == "best known" and to == "best of this folder":
+            header = to
         if _is_end(table, frame, f"{name}_sd"):
             header += " ± SD"
         low = f"{name}_low"

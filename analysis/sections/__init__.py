@@ -49,21 +49,37 @@ SECTIONS = (
         (ranking.list_ranking, ranking.list_differences),
         (ranking.draw_ranking,),
         sentence="""\
+{% if varied %}
+{% for best in leading(rows[rows.missing == 0])[:1] %}
+{{ best.title }} comes nearest to the {{ reference }}: its gap is \
+{{ interval(best, "gap", scale=100, unit=" %") }}.
+{%- for next in others[0].to_dict("records")[:1] %}
+ Next is {{ next.title }}, {{ interval(next, "difference", scale=100) }} percentage points behind\
+{{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
+if next.p_holm >= 0 else ", too few runs to test" }}.
+{%- endfor %}
+
+{% endfor %}
+{% else %}
 {% set complete = rows[rows.missing == 0].dropna(subset=["gap"]) %}
 {% for use in uses %}
 {% for row in leading(complete[complete.information == use]) %}
 {% if loop.first %}
-Gap to the {{ reference }}, {{ use }}{{ ", not with equal trials" if use in unequal }}: \
-{% endif %}
-{{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
+{{ use | capitalize }}{{ ", not with equal trials" if use in unequal }}, {{ row.title }} leaves \
+{{ "a" if loop.last else "the smallest" }} gap to the {{ reference }}\
+{{ " of" if loop.last else "," }} \
+{% else %}
+{{ row.title }} leaves {% endif %}
+{{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
 {%- endfor %}
 
 {% endfor %}
+{% endif %}
 {% for sentence in not_ranked %}
 {{ sentence }}
 
 {% endfor %}
-{% for against, group in others[0].groupby("against", sort=False) %}
+{% for against, group in others[0].groupby("against", sort=False) if not varied %}
 {{ titles[against] }} against {{ rivals }} methods, percentage points by which its gap is \
 smaller on the tasks that it solved ({{ group.tasks.iloc[0] }}): \
 {% for row in leading(group) %}
@@ -73,10 +89,10 @@ smaller on the tasks that it solved ({{ group.tasks.iloc[0] }}): \
 
 {% endfor %}""",
         note="Methods are grouped by their use of the reward: its value after each trial, its "
-        "formula, or nothing. The gap is from the mean reward to the optimum, or the best known "
-        "reward, as a share of it. Share of the gain: 0 % is the corrective process alone with its "
+        "formula, or nothing. The gap is from the mean reward to the {reference}, as a "
+        "share of it. Share of the gain: 0 % is the corrective process alone with its "
         "best hands (with the task's initial hands where there are over 4096 hand sequences), "
-        "100 % the best known reward; tasks on which both are equal have none. Intervals describe "
+        "100 % the {reference}; tasks on which both are equal have none. Intervals describe "
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed tests, corrected for the tasks of the method (table "
@@ -90,13 +106,19 @@ smaller on the tasks that it solved ({{ group.tasks.iloc[0] }}): \
         "coarticulation",
         "Coarticulation",
         (coarticulation.list_contexts, coarticulation.list_signatures),
-        (coarticulation.draw_postures,),
+        (coarticulation.draw_postures, coarticulation.draw_saved),
         sentence="""\
 {% for row in rows.head(1).to_dict("records") %}
-{{ row.title }}, {{ row.place }}: {{ row.verdict }}. Posture difference \
-{{ row.distance | number(2) }} (length units and rad; {{ row.runs }} runs); \
-random search: {{ row.control | number(2) }}{{ " (%s)" % p_value(row.p_random_search) \
-if row.p_random_search >= 0 }}.
+{{ row.title }} hits {{ row.place }} {{ {
+"different postures": "in postures that depend on the next goal",
+"no more than random search": "in postures that differ no more than those of random search",
+"no significant difference": "in postures without significant difference",
+"different, negligible": "in postures with a negligible difference",
+"the same posture": "in the same posture", "too few runs": "in too few runs to tell",
+}.get(row.verdict, "in postures that differ, without random search to compare them with") }}: \
+posture difference {{ row.distance | number(2) }} (length units and rad; {{ row.runs }} runs)\
+{{ "; random search: %s" % number(row.control, 2) if row.control >= 0 }}\
+{{ " (%s)" % p_value(row.p_random_search) if row.p_random_search >= 0 }}.
 {% endfor %}
 Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
         note="Postures are compared in length units and rad. Ticks are compared with those of the "
@@ -117,13 +139,12 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
         (costs.list_runtimes, learning.list_learning),
         (costs.draw_runtimes, learning.draw_learning_curves),
         sentence="""\
-Targets reached (rewards from the corrective process alone to the optimum, evenly spaced), and \
-trials to half of the targets: \
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
-{{ row.title }} {{ (100 * row.reached) | number(0) }} % \
-({{ interval(row, "trials_to_half", 0) if row.trials_to_half < infinite else "not half" }})\
-{{ "." if loop.last else "; " }}
+{{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
+{{ " of the targets (rewards from the corrective process alone to the %s, evenly spaced)" \
+% reference if loop.first }}, {{ "half after %s trials" % interval(row, "trials_to_half", 0) \
+if row.trials_to_half < infinite else "never half" }}{{ "." if loop.last else "; " }}
 {%- endfor %}""",
         note="The empirical distribution (ECDF) of the costs of reaching reward targets. The "
         "figure shows methods that learn, random search and the best planner. The number of "
@@ -138,7 +159,7 @@ ascending=False)) %}
         (random_tasks.draw_gaps_by_family,),
         sentence="""\
 {% for row in leading(rows.dropna(subset="gap")) %}
-{{ "Mean gap over families with two arms: " if loop.first }}\
+{{ ("Mean gap to the %s over families with two arms: " % reference) if loop.first }}\
 {{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
 {%- endfor %}""",
         note="Intervals describe other tasks of the families.",
@@ -172,6 +193,7 @@ ascending=False)) %}
 )
 TABLES = {table.id: table for section in SECTIONS for table in section.tables}
 TABLES["against-learner"] = ranking.list_against_learner
-"""Tables by id; ``against-learner`` is a CSV file without a section."""
+TABLES["saved"] = coarticulation.list_saved
+"""Tables by id; ``against-learner`` and ``saved`` are CSV files without a section."""
 FIGURES = {id_of(draw): draw for section in SECTIONS for draw in section.figures}
 """Figures by id."""

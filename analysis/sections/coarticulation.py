@@ -22,20 +22,21 @@ from coartic.analysis.control import (
     with_control,
 )
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure
-from coartic.analysis.method_frame import headline_methods
-from coartic.analysis.methods import LEARNERS
+from coartic.analysis.figures.plot import Parts, figure, name_in_figure, spoken
+from coartic.analysis.method_frame import WITHOUT_REWARD, headline_methods
+from coartic.analysis.methods import KNOWN_METHODS, LEARNERS, RANDOM_SEARCH
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import SAME, TwoContexts, context_pairs
 from coartic.analysis.statistics.hypotheses import exchange_test, holm
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
-from coartic.analysis.words import number
+from coartic.analysis.words import marked, number
 from coartic.estimates import LEVEL, difference_of_means, mean
 from coartic.pictures.drawing import MARKERS
 from coartic.robot import HANDS
 
+ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
 ROUNDING = 1e-9
 """Largest posture difference that counts as rounding, length unit and rad mixed."""
 
@@ -200,6 +201,82 @@ def _beside_control(study: Study, shared: TwoContexts) -> Row:
         "control_runs": control.n,
         "p_random_search": shared.p_beyond(control),
     }
+
+
+@table(
+    "Ticks of each movement less those of the corrective process alone with the same hands, means "
+    "over runs",
+    "task; method; runs; by_goal_[*]: goal {} .1",
+)
+def list_saved(study: Study) -> Rows:
+    """List by task, method and goal how many ticks more, or less, a movement takes than that of the
+    corrective process alone with the same hands; runs with hands with which this process fails are
+    left out."""
+    for (task, label), runs in study.cells.items():
+        if task not in one_by_one(study) or study.methods.is_search[label] or not len(solved(runs)):
+            continue
+        changes = study.executed(task, label).against_same_hands
+        changes = changes[~np.isnan(changes).any(axis=1)]
+        if len(changes):
+            row: Row = {"task": task, "method": label, "runs": len(changes)}
+            for goal, ticks in enumerate(changes.T, 1):
+                row |= mean(ticks).columns(f"by_goal_{goal}")
+            yield f"{task} {label}", row | run_ids(runs)
+
+
+@figure(
+    "Ticks saved, goal by goal",
+    "Ticks that a movement takes more (up) or less (down) than that of the corrective process "
+    "alone with the same hands: what is paid at one goal is saved at later ones. Means over runs. "
+    "Shown are the paper's learner, random search, the methods nearest to the {reference} by "
+    "trials and by formula, and methods from files. n = {n} runs.",
+)
+def draw_saved(study: Study) -> Parts | None:
+    """Draw for each task a row of bars for each method, a bar for each goal."""
+    rows, methods = list_saved(study), study.methods
+    single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
+    drawn, parts = {*headline_methods(single)}, []
+    for _, part in rows[rows.method.isin(drawn)].groupby("task", sort=False):
+        gaps = [
+            solved(study.cells[cell]).gap.mean()
+            for cell in zip(part.task, part.method, strict=True)
+        ]
+        part = part.assign(gap=gaps, use=[methods.information[each] for each in part.method])
+        part = part.sort_values("gap")
+        best = part.drop_duplicates("use").method[part.use != WITHOUT_REWARD]
+        learners = [each for each in LEARNERS if each in {*part.method}]
+        kept = {*best, RANDOM_SEARCH, *learners[-1:], *single.index[~single.built_in.astype(bool)]}
+        parts.append(part[part.method.isin(kept)])
+    if not parts:
+        return None
+    shape, most = style.grid(len(parts)), max(map(len, parts))
+    line, size = (0.17, 6) if style.is_narrow() else (0.3, 7)  # inches, points
+    height = shape[0] * (0.3 + line * most)
+    drawing, panels = style.panels(shape, (style.TWO, height), len(parts))
+    paper: Any = {"facecolor": style.BACKGROUND, "linewidth": 0, "pad": 0.6}
+    for axes, part in zip(panels, parts, strict=True):
+        task = study.tasks[part.task.iloc[0]]
+        goals = np.arange(1, len(task.goals) + 1)
+        ticks = part[[f"by_goal_{goal}" for goal in goals]].to_numpy(np.float64)
+        scale = 0.42 / max(np.abs(ticks).max(), 1.0)
+        for place, of_goals in enumerate(ticks):
+            axes.axhline(-place, color=style.GREY, linewidth=0.5)
+            colors = np.where(of_goals > 0, style.VERMILLION, style.BLUE)
+            axes.bar(goals, scale * of_goals, 0.5, -place, color=colors, linewidth=0)
+            for goal, value in zip(goals, of_goals.round(), strict=True):
+                text = f"{value:+.0f}".replace("-", "−") if value else "0"
+                axes.text(goal + 0.29, -place, text, va="center", fontsize=size, bbox=paper)
+        style.name_rows(axes, [name_in_figure(study, label) for label in part.method])
+        axes.set_xticks(goals, [f"goal {goal}" for goal in goals])
+        axes.set_xlim(0.6, len(goals) + 0.75)
+        axes.tick_params(axis="x", length=0, pad=1)
+        axes.spines[["left", "bottom"]].set_visible(False)
+        axes.set_title(marked(task))
+    style.letters(panels)
+    data = pd.concat(parts, ignore_index=True).drop(columns=["run_ids", "gap", "use"])
+    words = spoken(study, data, "{task}, {title}: {by_goal_1:+.0f}")
+    alt = f"Ticks more or less than by the corrective process, at goal 1: {words}."
+    return drawing, data, alt, study.tasks.values()
 
 
 @figure(

@@ -231,7 +231,7 @@ def list_runtimes(study: Study) -> Rows:
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget (mean over all "
     "tasks where there are several). Targets are evenly spaced from the corrective process alone, "
-    "with its best hands, to the optimum; a run counts for each target that it has reached. a: "
+    "with its best hands, to the {reference}; a run counts for each target that it has reached. a: "
     "trials, for methods that make trials. b: forward-kinematics evaluations, spread evenly over a "
     "run's trials. Bands: "
     f"{style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",

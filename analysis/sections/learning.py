@@ -52,7 +52,7 @@ def list_learning(study: Study) -> Rows:
 @figure(
     "Learning curves",
     "Best reward so far (mean over runs; band: their quartiles). Grey lines: corrective process "
-    "alone, best hands (dash-dotted); optimum, or best known reward (dotted). n = {n} runs of a "
+    "alone, best hands (dash-dotted); {reference} (dotted). n = {n} runs of a "
     "method on a task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:

@@ -12,7 +12,7 @@ from coartic.analysis.words import commonest, marked, tally
 
 
 @table(
-    "Reward, gap to the best known reward, hands and runs, and costs of a run (medians)",
+    "Reward, gap to the {reference}, hands and runs, and costs of a run (medians)",
     "task; method; runs; solved: -; reward± .1; reward_median: -; gap: gap (%) .1; hands; trials; "
     "forward_kinematics: forward-kinematics evaluations; solve_s: solving time (s); median_run",
 )

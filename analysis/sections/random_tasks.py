@@ -12,7 +12,7 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, name_in_figure, spoken
 from coartic.analysis.method_frame import without_settings
-from coartic.analysis.standings import compared, solved_tasks, together
+from coartic.analysis.standings import compared, reference, solved_tasks, together
 from coartic.analysis.statistics.instances import Scores, other_tasks
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, run_ids, table
@@ -55,7 +55,7 @@ def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
 
 
 @table(
-    "Gap to the best known reward, in per cent of it: mean over instances",
+    "Gap to the {reference}, in per cent of it: mean over instances",
     "method; instances; missing; gap[]: gap (%) .1; in [*]: {} (%) .1",
 )
 def list_family_gaps(study: Study) -> Rows:
@@ -87,7 +87,7 @@ def list_family_gaps(study: Study) -> Rows:
 
 
 @figure(
-    "Gap to the best known reward, by family",
+    "Gap by family",
     "Dots: instances (mean over runs), on an axis that is linear up to 2 % and logarithmic beyond; "
     "gaps above 100 % stand at the right end. Diamonds: mean over instances with its "
     f"{style.COVERAGE} interval about other tasks of the family (bootstrap over instances and "
@@ -140,7 +140,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     style.name_rows(panels[0], [name_in_figure(study, label) for label in order])
     for label, method in zip(panels[0].get_yticklabels(), order, strict=True):
         label.set_fontweight("normal" if methods.built_in[method] else "bold")
-    panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
+    panels[len(panels) // 2].set_xlabel(f"gap to the {reference(study, study.optima)} (%)")
     style.letters(panels)
     first = data.drop_duplicates(["method", "family"]).dropna(subset="mean")
     means = spoken(study, first, "{title}, {family}: {mean:.1%}")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, name_in_figure, spoken
+from coartic.analysis.figures.plot import Parts, Plot, figure, looks_in, name_in_figure, spoken
 from coartic.analysis.frames import ranking
 from coartic.analysis.method_frame import GROUPS, without_settings
 from coartic.analysis.methods import EC1, EC4
@@ -82,15 +83,15 @@ def list_against_learner(study: Study) -> Rows:
 
 
 def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
-    """Return a copy of runs whose ``reward`` is the best of their first ``trials`` trials, NaN if
-    none of these succeeded; runs without trials keep their reward. Column ``gap`` stays as it
-    is."""
+    """Return a copy of runs, without their status, whose ``reward`` is the best of their first
+    ``trials`` trials, NaN if none of these succeeded or the run failed; runs without trials keep
+    their reward. Column ``gap`` stays as it is."""
     learned, best = improvements(study), list[float]()
     rewards = runs.reward.to_numpy(np.float64, na_value=math.nan)
     for run_id, reward in zip(runs.run_id, rewards, strict=True):
-        steps = learned.get(run_id)
+        steps = None if math.isnan(reward) else learned.get(run_id)
         best.append(float(best_after(steps, trials)) if steps and len(steps[0]) else reward)
-    return runs.assign(reward=best)
+    return runs.drop(columns="status").assign(reward=best)
 
 
 @table(
@@ -159,19 +160,20 @@ def _ranked(study: Study) -> list[str]:
 )
 def list_differences(study: Study) -> Rows:
     """List other methods with their gaps less the gap of :attr:`.Study.against`, on the tasks on
-    which this method solved every run; the smallest gap first. Without :attr:`.Study.against` each
-    method from a file is compared with the built-in methods that have the same use of the reward.
-
+    which XX
     Only methods that solved every run there are listed, without settings and ablations. Intervals
     are for other runs on the same tasks; p is two-sided (:func:`.stratified_test`), corrected for
     the number of methods (Holm).
     """
     methods = study.methods
     chosen = [study.against] if study.against in compared(study) else []
-    for against in chosen if study.against else own_methods(study):
+    if study.varied[0] and not study.against:
+        rows = board(study)
+        chosen = [*rows.index[rows.ranked][:1]]
+    for against in chosen if study.against or chosen else own_methods(study):
         tasks, found = solved_tasks(study, against), list[tuple[Estimate, str]]()
         alike = methods.built_in & (methods.information == methods.information[against])
-        if study.against:
+        if chosen:
             alike = methods.index != against
         for name in methods.index[alike & (methods.under == "")].intersection([*compared(study)]):
             runs = runs_on(study, name, tasks)
@@ -212,16 +214,64 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
     return Estimate(*ends, p=stratified_test([(one, other) for one, other in pairs.values()]))
 
 
+def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
+    """Draw the gap against the parameter that is varied alone (:attr:`.Study.varied`), or the gap
+    of every method."""
+    plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
+    return plot and replace(plot, id="ranking")
+
+
+@figure(
+    "Gap by value of a parameter",
+    "Gap from the mean reward to the {reference}, as a share of it, with its "
+    f"{style.COVERAGE} bootstrap interval over runs, by the value of the only parameter that is "
+    "varied; a mean over all tasks where there are several, then also the gap on each (thin). "
+    "n = {n} runs of a value.",
+)
+def _draw_varied(study: Study) -> Parts | None:
+    """Draw gaps against the values of the parameter that is varied."""
+    name, values = study.varied
+    rows = board(study)
+    rows = rows.loc[[label for label in values if label in rows.index]]
+    if len(rows) < 2:
+        return None
+    rows = rows.assign(value=[values[label] for label in rows.index]).reset_index(names="method")
+    is_number = all(type(value) in (int, float) for value in rows.value)
+    places = rows.value.to_numpy(np.float64) if is_number else np.arange(len(rows), dtype=float)
+    drawing, (axes,) = style.panels((1, 1), (style.TWO, 2.6))
+    if is_number and places[0] > 0 and places[-1] >= 5 * places[0]:
+        axes.set_xscale("log")
+    axes.set_xticks(places, [f"{value:g}" if is_number else str(value) for value in rows.value])
+    axes.set_xticks([], minor=True)
+    mean: Any = {"color": style.BLUE, "marker": "o", "markersize": 5, "linewidth": 1.6}
+    shown = rows.assign(place=places)
+    tasks = common_tasks(study)
+    on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
+    for task in tasks if 1 < len(tasks) <= 8 else ():
+        gaps = [100 * each[task] for each in on]
+        axes.plot(places, gaps, color=style.GREY, linewidth=0.8)
+        at: Any = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
+        axes.annotate(marked(study.tasks[task]), (places[-1], gaps[-1]), color=style.GREY, **at)
+        shown[f"on {task}"] = gaps
+    style.means(axes, shown, x="place", y="gap", scale=100, bars=1.6, **mean)
+    axes.set_ylim(bottom=min(0, 100 * shown.gap_low.min()))
+    axes.set_xlabel(name)
+    axes.set_ylabel(f"gap to the {reference(study, tasks)} (%)")
+    words = (f"{row['value']}: {interval(row, 'gap', scale=100, unit=' %')}"
+             for row in rows.to_dict("records"))  # fmt: skip
+    alt = f"Gap to the {reference(study, tasks)} by {name}: {'; '.join(words)}."
+    return drawing, shown, alt, study.tasks.values()
+
+
 @figure(
     "Gap to the best reward",
-    "Gap from the mean reward to the optimum, as a share of it, with its "
-    f"{style.COVERAGE} bootstrap interval over runs; to the best known reward where no optimum is "
-    "proven, to the best of this folder where none is known. Means over all tasks where there are "
-    "several. The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
+    "Gap from the mean reward to the {reference}, as a share of it, with its "
+    f"{style.COVERAGE} bootstrap interval over runs. Means over all tasks where there are several. "
+    "The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
     "have none. n: runs. Diamonds: the paper's learner. Bold names: the learner and methods from "
     "files, whose marks are larger.",
 )
-def draw_ranking(study: Study) -> Parts | None:
+def _draw_gaps(study: Study) -> Parts | None:
     """Draw the gap of each method of :func:`.board`, a mean over tasks, with interval and name,
     without settings whose method is there; None without a method."""
     rows, tasks = board(study), common_tasks(study)
@@ -283,7 +333,6 @@ def draw_ranking(study: Study) -> Parts | None:
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)
     where = "" if len(tasks) > 1 else study.tasks[tasks[0]].label + (":\n" if narrow else ": ")
-    short = to.removesuffix(" reward").replace("this ", "").replace("optimum", "the optimum")
-    axes.set_xlabel(f"{where}gap to {short} (%)")
+    axes.set_xlabel(f"{where}gap to the {to} (%)")
     alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()

@@ -91,7 +91,9 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
     weights = np.repeat([1 / size / len(times) for size in sizes], sizes)
     reached = [np.searchsorted(np.sort(run), budgets, "right") / len(run)
                for of_task in times for run in of_task]  # fmt: skip
-    low, high = np.quantile((_draws(sizes) * weights) @ np.array(reached), TAILS, axis=0)
+    drawn, at_once, within = _draws(sizes), 1 + IN_CACHE // len(weights), np.array(reached)
+    shares = [(drawn[part] * weights) @ within for part in slices(len(drawn), at_once)]
+    low, high = np.quantile(np.concatenate(shares), TAILS, axis=0)
     return low, high
 
 

@@ -85,34 +85,41 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     """Print a table, then pairs of a word and a text.
 
     The table has at most ten methods of the ranking, without settings and ablations: those with the
-    smallest gaps and, wherever they rank, the learner and random search; and all methods from files
-    and of the labels ``asked`` that are in no joined row, also below the ranking. The pairs are the
-    reasons why these are not ranked, the findings on coarticulation and on cost, numbers of runs
-    and trials that are not those of the paper, the failed runs, and ``more``.
+    smallest gaps and, wherever they rank, the learner and random search; and all methods from
+    files, with their settings, and of the labels ``asked`` that are in no joined row, also below
+    the ranking. The pairs are the reasons why these are not ranked, the findings on coarticulation
+    and on cost, numbers of runs and trials that are not those of the paper, the failed runs, and
+    ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
     from coartic.analysis.sections import SECTIONS
-    from coartic.analysis.standings import board, not_ranked, shown_name
-    from coartic.analysis.words import interval, number
+    from coartic.analysis.standings import board, common_tasks, not_ranked, reference, shown_name
+    from coartic.analysis.words import interval, listed, number
     from coartic.learner.learning import TRIALS
 
     in_order = board(study).query("ranked")
     joined = {part for parts in in_order.parts if len(parts) > 1 for part in parts}
     also = frozenset(asked) - joined  # which the row of both conditions has
-    rows = without_settings(board(study, also)).reset_index(names="method")
+    every = board(study, also)
+    is_shown = every.index.isin(without_settings(every).index) | ~every.built_in.astype(bool)
+    rows = every[is_shown].reset_index(names="method")
     named = [row["method"] for row in leading(rows[rows.ranked])]
-    first = rows.method[rows.ranked][: 12 - len(named)]
+    first = rows.method[rows.ranked][: None if study.varied[0] else 12 - len(named)]
     rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
+    to = reference(study, common_tasks(study))
+    if study.question[0]:
+        say(": ".join(study.question))
     say_table(
-        ("method", "gap (%)", "share of the gain (%)", "runs"),
+        ("method", f"gap to the {to} (%)", "share of the gain (%)", "runs"),
         [
             (shown_name(study, row["method"]), interval(row, "gap", scale=100),
              interval(row, "share", 0, 100), number(row["runs"]))
             for row in rows.to_dict("records")
         ],
     )  # fmt: skip
-    pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
+    pairs = [("Answer", line) for line in finding(study, SECTIONS[0]) if study.varied[0]][:1]
+    pairs += [("Not ranked", sentence) for sentence in not_ranked(study, also)]
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
     pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
@@ -120,6 +127,10 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
     if unlike:
         pairs.append(("Unlike the paper", "; ".join(unlike)))
+    if what["own"]:
+        again = "repeat the command with optimum/search among its --methods"
+        text = f"Of {listed(what['own'])} the {to} is no proven optimum: to search for it, {again}"
+        pairs.append(("Reference", text))
     if what["earlier"]:
         pairs.append(("Of 4.0.0", f"runs of {', '.join(what['earlier'])}"))
     pairs += [("‡", sentence) for sentence in what["late"]]

@@ -6,6 +6,7 @@ const SEEDS = 5; // of which runs two robots are seen
 const TRIALS = 10000; // of a run
 const PACE = 90; // ticks a second
 const PRACTICE = 1.05; // by which the trials shown grow in two pictures, at first
+const FIRST_SEEN = 0.05; // where these begin: the first trial is seen for a second, until they reach 2
 const HOLD_S = 0.9; // at a hit
 const DRIFTS = [0, 0.03, 0.1, 0.3, 1]; // κ, how far exploration leans towards the next goal
 const MOST_GOALS = 6;
@@ -245,7 +246,7 @@ class Play {
   }
 
   get shown() {
-    return this.state.trials || Math.floor(this.paced);
+    return this.state.trials || Math.max(1, Math.floor(this.paced));
   }
 
   /* The solution of a task, as movements; null while there is none. */
@@ -489,20 +490,21 @@ class Play {
     const named = []; // heights of names
     this.problems.forEach((_, k) => {
       const colour = colours[ROLES[k]];
-      const level = (name, reward, dash) => {
+      const level = (name, reward, dash, ink) => {
         if (!Number.isFinite(reward)) return;
+        context.strokeStyle = ink;
         const at = y(-reward);
         curve.path([[left, at], [right, at]], 1.2, dash);
         const free = [at - 8, at + 9].find((place) => references.every((ticks) => Math.abs(y(ticks) - place) > 6)
           && named.every((other) => Math.abs(other - place) > 12));
         if (free === undefined) return;
         named.push(free);
-        curve.text(name, [left + 4, free], colour, "left", 12);
+        curve.text(name, [left + 4, free], ink, "left", 12);
       };
+      level(NAMES.alone, this.alone[k].reward, [2, 4], colour);
+      level("planner", this.plan[k] && this.plan[k].reward, [8, 4], this.problems.length > 1 ? colour : colours.second);
+      level("proven optimum", this.optimum || NaN, [], colour);
       context.strokeStyle = colour;
-      level(NAMES.alone, this.alone[k].reward, [2, 4]);
-      level("planner", this.plan[k] && this.plan[k].reward, [8, 4]);
-      level("proven optimum", this.optimum || NaN, []);
       runs_of(k).forEach(({ snapshots }) => curve.path(snapshots.flatMap(({ trials, reward }, i) => (
         [snapshots[Math.max(0, i - 1)].reward, reward].map((each) => [x(trials), y(-each)]))), 1.5));
     });
@@ -546,6 +548,7 @@ class Play {
       const tried = hands.length ** goals.length <= MOST_SEQUENCES ? "best hands" : "hands";
       const used = hands.length > 1 ? ` (${tried} ${letters_of(this.alone[0].hands)})` : "";
       const runs = this.practised(0).length;
+      if (state.who === "learner" && this.shown === 1) return ["The first trial is the corrective process alone. Practice follows."];
       return [
         `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
         runs > 1 && state.who === "learner" ? `Shown is the median of the learner's ${runs} runs.` : "",
@@ -575,7 +578,7 @@ class Play {
     const scores = main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
     if (main.length > 1 && !you) return scores;
     if (main.length < 2 && state.who !== "alone") scores.push(["ghost", "Corrective process alone", this.alone[0].reward]);
-    if (this.plan[0] && state.who !== "plan") scores.push(["bare", `Planner (local search)${main.length > 1 ? ", blue goals" : ""}`, this.plan[0].reward]);
+    if (this.plan[0] && state.who !== "plan") scores.push([main.length > 1 ? "bare" : "second", `Planner (local search)${main.length > 1 ? ", blue goals" : ""}`, this.plan[0].reward]);
     if (this.optimum) scores.push(["bare", "Optimum (proven)", this.optimum]);
     return scores;
   }
@@ -894,7 +897,7 @@ class Play {
     this.view = null;
     this.playing = false;
     this.waits = state.tick < 0 && state.who !== "you";
-    this.paced = this.waits && !state.trials && !this.calm.matches && state.who === "learner" ? 1 : Infinity;
+    this.paced = this.waits && !state.trials && !this.calm.matches && state.who === "learner" ? FIRST_SEEN : Infinity;
     this.ask();
   }
 

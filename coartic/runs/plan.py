@@ -87,6 +87,8 @@ class Job:
     suite_trials: int | None = None
     """Trials of a run by the suite's file, where the command asks for a number of its own; or
     None."""
+    question: tuple[str, str] | None = None
+    """Title and description of a suite of the user's own, run on its own tasks; or None."""
 
     def run_id(self, number: int, code: str | None = None) -> str:
         """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and

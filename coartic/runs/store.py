@@ -22,10 +22,10 @@ from contextlib import closing, contextmanager
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import numpy as np
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
@@ -166,6 +166,7 @@ class _Surroundings(BaseModel):
     cores: int
     command: list[str]
     date: str
+    question: Annotated[list[str], Field(min_length=2, max_length=2)] = ["", ""]
 
 
 class Store:
@@ -195,6 +196,8 @@ class Store:
         environment = dict(made_with)
         if first.suite_trials is not None:
             environment["suite_trials"] = first.suite_trials
+        if first.question is not None:
+            environment["question"] = first.question
         suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
         suite |= {name: environment.pop(name) for name in ("command", "date")}
         with self.transaction():
