@@ -158,8 +158,8 @@ class Study:
     stored: pd.DataFrame
     """Runs as stored, a row for each; :attr:`runs` has further columns."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """What was found against methods, sentences by the method's id: code that was loaded too late,
-    and results that depend on earlier runs."""
+    """Sentences on what was found against methods, by the method's id: code that was loaded too
+    late, and results that depend on earlier runs."""
     against: str = ""
     """Label of the method with which table ``differences`` compares the others; empty: each method
     from a file."""

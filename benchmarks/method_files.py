@@ -37,7 +37,7 @@ _KINDS: dict[str, TypeAdapter[Any]] = {
     "why_not": TypeAdapter(str | None),
     "rules": TypeAdapter(dict[str, dict[str, Any]]),
 }
-"""What the answer to a question must be."""
+"""Kind of the answer to a question."""
 
 
 def begin_reader(path: Path, shown: str) -> Callable[..., Any]:

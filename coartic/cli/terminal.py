@@ -86,7 +86,7 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 class Display:
-    """What a command is doing, on standard error, such as runs done, failures and time left. On a
+    """Progress of a command on standard error, such as runs done, failures and time left. On a
     terminal one line changes; elsewhere a line appears every ten seconds. What takes longer is
     shown again, with its time so far."""
 
