@@ -153,8 +153,9 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
 
 def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
     """Return a sentence for each row of :func:`board` that is not ranked, settings left out: its
-    gap, why it is not ranked, and the gap of the first method on the same tasks; and for each
-    method from a file, or of the labels ``also``, that has no row, as it solved no task."""
+    gap, why it is not ranked, and the gap of the first method with the same use of the reward on
+    the same tasks; and for each method from a file, or of the labels ``also``, that has no row, as
+    it solved no task."""
     rows, sentences = without_settings(board(study, also)), []
     for method in rows.index[~rows.ranked]:
         on, name = solved_tasks(study, method), study.methods.title[method]
@@ -164,11 +165,12 @@ def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
             others = number(equal_trials(study))
             reasons.append(f"{number(trials_of(study)[method])} trials, not {others}")
         text += f": {'; '.join(filter(None, reasons))}"
-        first = rows.index[0]
-        if rows.ranked.iloc[0] and len(same := runs_on(study, first, on)):
-            gap = ranking(together(study, {first: same})).gap.iloc[0]
-            text += f"; on {'it' if len(on) == 1 else 'these'} {rows.title.iloc[0]} has "
-            text += f"{number(100 * gap, 1)} %"
+        alike = rows[rows.ranked & (rows.information == rows.information[method])]
+        for first in alike.index[:1]:
+            if len(same := runs_on(study, first, on)):
+                gap = ranking(together(study, {first: same})).gap.iloc[0]
+                text += f"; on {'it' if len(on) == 1 else 'these'} {alike.title[first]} has "
+                text += f"{number(100 * gap, 1)} %"
         sentences.append(f"{text}.")
     for method in compared(study):
         shown = not study.methods.built_in[method] or method in also

@@ -137,12 +137,15 @@ def load(folder: str | Path, *, against: str = "") -> Study:
 
 def _label_in(study: Study, name: str) -> str:
     """Return the label of the method that has this label, id, short id such as ``EC4`` or title in
-    a study. Raises CoarticError if no method has it."""
+    a study. Raises CoarticError if no method has it, or several settings of a method do."""
     methods = study.methods
     for names in (methods.index, methods.base, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
-            if (there := methods.index[names == wanted]).size:
-                return str(there[0])
+            there = [str(label) for label in methods.index[names == wanted]]
+            if len(there) > 1:
+                raise CoarticError(f"{name} is several here; name one: {', '.join(there)}")
+            if there:
+                return there[0]
     raise CoarticError(unknown("method", name, [*methods.index]))
 
 

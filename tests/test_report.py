@@ -256,3 +256,10 @@ def test_methods_that_follow_paths_are_left_out():
     both, paths = (study_of(runs, movements=lambda _: stored) for runs in (rows, rows[1:]))
     assert [run["id"] for run in methods_played(both, ["ascending"])] == ["corrective"]
     assert player(paths) == ""
+
+
+def test_a_method_to_compare_with_is_meant_by_label_id_or_title(traced):
+    for name in ("dual-process/EC1", "EC1", traced.methods.title["dual-process/EC1"]):
+        assert load(traced.folder, against=name).against == "dual-process/EC1"
+    with pytest.raises(CoarticError, match="unknown method 'EC7'"):
+        load(traced.folder, against="EC7")
