@@ -128,9 +128,14 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     if unlike:
         pairs.append(("Unlike the paper", "; ".join(unlike)))
     if what["own"]:
+        text = (
+            f"Of {listed(what['own'])} only the best of this folder is known: gaps there are to it"
+        )
         again = "repeat the command with optimum/search among its --methods"
-        text = f"Of {listed(what['own'])} the {to} is no proven optimum: to search for it, {again}"
-        pairs.append(("Reference", text))
+        pairs.append(("Reference", f"{text}. To search for the optimum, {again}"))
+    if what["unknown"]:
+        where = f"on {listed(what['unknown'])}, where fewer than two methods have a solution"
+        pairs.append(("No gaps", where))
     if what["earlier"]:
         pairs.append(("Of 4.0.0", f"runs of {', '.join(what['earlier'])}"))
     pairs += [("‡", sentence) for sentence in what["late"]]
