@@ -105,6 +105,15 @@ class Slow(Optimiser):
 
 
 @pytest.mark.usefixtures("in_this_process")
+def test_the_terminal_says_where_there_are_no_gaps(coartic, tmp_path):
+    (tmp_path / "near.toml").write_text(NEAR, encoding="utf-8")
+    asked = ("--tasks", tmp_path / "near.toml", "--methods", "EC1", "--runs", 1, "--trials", 5)
+    code, text, _ = coartic("run", "paper", *asked, "--out", tmp_path / "out")
+    assert code == 0
+    assert re.search(r"No gaps +on .*, where fewer than two methods", " ".join(text.split()))
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_no_command_is_silent_for_long(coartic, tmp_path, monkeypatch):
     monkeypatch.setattr(Display, "EVERY_S", 0.05)
     own = tmp_path / "slow.py", tmp_path / "out"

@@ -472,10 +472,3 @@ def said(seen, section):
 @pytest.mark.parametrize(("section", "name"), [(s, n) for s in SENTENCES for n in SENTENCES[s]])
 def test_sentences_are_those_of_the_golden_page(section, name):
     assert "\n".join(said(SENTENCES[section][name](), section)) == golden(f"{section}: {name}")
-
-
-def test_the_terminal_says_where_there_are_no_gaps(capsys):
-    rows = [run for cell, of in TEN.items() for run in runs_of(*cell, of)]
-    say_ranking(study_of(rows, optima=made_up_optima("ascending")), ())
-    text = " ".join(capsys.readouterr().out.split())
-    assert "No gaps on Two-armed 1 †, where fewer than two methods have a solution" in text
