@@ -528,7 +528,8 @@ def _implausible(
     paths = np.log(np.maximum(straight[known], 1.0))
     if known.sum() >= _MANY and min(map(np.ptp, [paths, *shifted])) > 0:
         here, *others = (np.corrcoef(each, paths)[0, 1] for each in shifted)
-        rates = pd.Series(np.exp(shifted[0] - paths)).groupby(goal[known]).median()
+        each = ticks[known] / np.maximum(straight[known], 1.0)
+        rates = pd.Series(each).groupby(goal[known]).median()
         slow = rates.index[rates > _SLOW_GOAL * rates.sort_values().iloc[-2:].min()].tolist()
         if here < _UNRELATED and max(others) > 2 * _UNRELATED:
             warn(
