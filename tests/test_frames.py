@@ -12,13 +12,15 @@ from coartic.analysis import frames, judging, pages
 from coartic.analysis.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.measures import SIGNATURES
-from coartic.analysis.statistics import instances
+from coartic.analysis.statistics import hypotheses, instances
 from coartic.analysis.words import p_value
 from coartic.learner import learning
 from tests.support.made_up import row, study_of
 
 
-@pytest.mark.parametrize("module", [context_tests, frames, instances, judging, learning, pages])
+@pytest.mark.parametrize(
+    "module", [context_tests, frames, hypotheses, instances, judging, learning, pages]
+)
 def test_examples(module):
     options = doctest.NORMALIZE_WHITESPACE
     assert doctest.testmod(module, optionflags=options) == (0, doctest.testmod(module).attempted)

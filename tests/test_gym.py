@@ -1,5 +1,6 @@
 """The environments against executions and Gymnasium's own vectors; scores; the adapter."""
 
+import doctest
 import re
 import shutil
 import sys
@@ -36,7 +37,7 @@ from gymnasium import wrappers  # noqa: E402
 from gymnasium.envs.registration import EnvSpec  # noqa: E402
 
 import coartic.gym  # noqa: E402
-from coartic.gym import TaskEnv, TaskVectorEnv, compare, sb3, score  # noqa: E402
+from coartic.gym import TaskEnv, TaskVectorEnv, compare, sb3, score, scoring  # noqa: E402
 
 TWO = "coartic/TwoArmed1-v2"
 MIXED = "mixed/v1"
@@ -302,6 +303,10 @@ def test_the_agent_of_the_page_trains():
     pytest.importorskip("stable_baselines3")
     table = score(TWO, names_of_program("Train PPO")["agent"])
     assert -531 < table.reward["policy"] < -480
+
+
+def test_the_example_of_score():
+    assert doctest.testmod(scoring) == (0, 2)
 
 
 def test_a_family_is_scored_on_its_test_instances():

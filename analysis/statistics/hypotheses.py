@@ -145,8 +145,8 @@ def stratified_test(
     Examples
     --------
     >>> apart = np.array([1.0, 2.0, 3.0, 4.0]), np.array([5.0, 6.0, 7.0, 8.0])
-    >>> round(stratified_test([apart, apart]), 3)
-    0.001
+    >>> stratified_test([apart, apart])
+    0.0003
     """
     rng = np.random.default_rng(SEED)
     samples = [each for pair in strata for each in pair if not isinstance(each, float)]

@@ -98,7 +98,7 @@ def score(
     --------
     >>> table = score("coartic/Ascending-v2", lambda seen: np.zeros((len(seen), 6)))
     >>> table.reward.to_dict()  # doctest: +ELLIPSIS
-    {'policy': -462.0, 'random actions': ..., 'corrective process': -462.0, 'best known': -292.0}
+    {'policy': -319.0, 'random actions': ..., 'corrective process': -319.0, 'best known': -292.0}
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
@@ -113,12 +113,12 @@ def score(
     model, shape = setting.model, setting.single_action_space.shape
     tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
     policies = policy if isinstance(policy, Mapping) else {"policy": policy}
-    rewards = {}
+    rewards, normal = {}, _normaliser(vec_normalize)
     for name, each in policies.items():
         if isinstance(each, Method):
             rewards[name] = column(_reward_of(each, task, seed, model) for task in tasks)
         elif each is not None:
-            act = _acting(each, env if wrapped else setting, _normaliser(vec_normalize))
+            act = _acting(each, env if wrapped else setting, normal)
             if wrapped:
                 rewards[name] = _rollout_as_it_is(act, env, len(tasks), seed)
             else:
