@@ -19,13 +19,15 @@ from coartic.runs.plan import trials_in
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
-    best known rewards are proven, or without tasks; ``best of this folder`` if all are known from
-    methods of this folder alone; or else ``best known``. Raises KeyError for a task without
-    a best known reward."""
+    best known rewards are proven, or without tasks; ``best known`` if some are not; with ``or best
+    of this folder`` where some, or this alone where all are known from methods of this folder
+    alone. Raises KeyError for a task without a best known reward."""
     best = [study.optima[task] for task in tasks]
-    if all(each.proven for each in best):
-        return "optimum"
-    return "best of this folder" if all(each.only_here for each in best) else "best known"
+    others = [each.proven for each in best if each.proven or not each.only_here]
+    names = ["optimum" if all(others) else "best known"] if others or not best else []
+    if len(others) < len(best):
+        names.append("best of this folder")
+    return " or ".join(names)
 
 
 @cached

@@ -335,7 +335,9 @@ def test_a_method_that_stops_early_or_solves_nothing_says_so():
         *runs_of("ascending", "never", [None] * 3),
     ]
     seen = study_of(rows, optima=made_up_optima("ascending", "two-armed-1"))
-    assert "at most 3 of 10 trials" in standings.shown_name(seen, "early")
+    early = standings.shown_name(seen, "early")
+    assert "at most 3 of 10 trials" in early
+    assert f"{early} against built-in methods" in " ".join(said(seen, "ranking"))
     sentences = standings.not_ranked(seen)
     assert "never is not ranked: 0 of 2 tasks, 3 failed runs." in sentences
 
@@ -416,6 +418,12 @@ def test_settings_stand_behind_their_method_in_the_ranking():
     more += runs_of("ascending", ablation, [-510] * 3, setting="noise_sd=0.1")
     both = TABLES["ranking"](with_settings("", more=more)).index.tolist()
     assert both == [EC1, ablation, f"{ablation} noise_sd=0.1"]
+    own = [run for at in ("", "width=0.2") for run in runs_of("ascending", "mine", [-510] * 3,
+                                                               setting=at)]  # fmt: skip
+    with_own = TABLES["ranking"](with_settings("", "noise_sd=0.1", more=own))
+    folded = dict(zip(with_own.index, render.classes_of(TABLES["ranking"], with_own), strict=True))
+    assert folded == {EC1: "", f"{EC1} noise_sd=0.1": "setting", "mine": "own",
+                      "mine width=0.2": "own"}  # fmt: skip
     without = with_settings("noise_sd=0.1", "noise_sd=0.2", more=between)
     assert TABLES["ranking"](without).index.tolist() == [settings[0], "hill-climbing", settings[1]]
 

@@ -96,7 +96,7 @@ def finding(study: Study, section: Section) -> list[str]:
         "not_ranked": not_ranked(study), "unequal": {*unequal.information},
         "interval": interval, "number": number, "p_value": p_value, "leading": leading,
         "infinite": math.inf,
-        "uses": GROUPS, "titles": study.methods.title,
+        "uses": GROUPS, "titles": frame.attrs["titles"],
         "reference": reference(study, common_tasks(study)),
         "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
         "rivals": "other" if study.against else "built-in",

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatch
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from coartic.analysis.table import Table, is_setting
@@ -167,9 +168,9 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
 
 def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
     """Return the HTML classes of each row, separated by a space: ``own`` for methods from files in
-    a table with other methods, ``setting`` for settings and ablations in the ranking."""
+    a table with other methods, ``setting`` for settings and ablations of others in the ranking."""
     is_own = [label in frame.attrs.get("own", ()) for label in frame.get("method", frame.index)]
-    is_folded = is_setting(frame) & (table.id == "ranking")
+    is_folded = is_setting(frame) & (table.id == "ranking") & ~np.array(is_own, dtype=bool)
     return [
         " ".join(["own"] * (own and not all(is_own)) + ["setting"] * folded)
         for own, folded in zip(is_own, is_folded, strict=True)

@@ -81,7 +81,7 @@ if next.p_holm >= 0 else ", too few runs to test" }}.
 {% endfor %}
 {% for against, group in others[0].groupby("against", sort=False) if not varied %}
 {{ titles[against] }} against {{ rivals }} methods, percentage points by which its gap is \
-smaller on the tasks that it solved ({{ group.tasks.iloc[0] }}): \
+smaller on the tasks that it solved: \
 {% for row in leading(group) %}
 {{ row.title }} {{ interval(row, "difference", scale=100) }}\
 {{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 }}{{ "." if loop.last else "; " }}
