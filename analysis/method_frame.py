@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any
 
@@ -65,19 +66,21 @@ def methods_of(
     """
     rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
     varied, values = parameter_varied(runs)
+    titles = Counter(info.title for info in declared.values())
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
         named = in_words({varied: values[label]}) if label in values else setting
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""
+        called = info if titles[info.title] == 1 else base  # two of one title go by their ids
         under = default if default in by_label and label not in values else ""
         rows[label] = {
             "base": base,
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
             "parts": (label,),
-            "title": title_of(base, named) + MARK * (base in marked),
+            "title": title_of(called, named) + MARK * (base in marked),
             "short": title_of(base, named, short=True) + MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
             "is_learner": base in LEARNERS,

@@ -8,10 +8,13 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
+
+if TYPE_CHECKING:
+    from coartic.runs.method_info import MethodInfo
 
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
 """Exploration conditions and ablations of the learner by the id of the method."""
@@ -82,13 +85,16 @@ _WORDS = {
 """Words for parameters, before their values."""
 
 
-def title_of(method: str, setting: str = "", *, short: bool = False) -> str:
-    """Return the name of a method, given by id, with its setting in words: ``learner EC4``, ``hill
-    climbing``, ``CMA-ES (other arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty
-    for none. The name of a method from a file is its id. ``short``: the short name of a built-in
-    method that has one."""
-    known = KNOWN_METHODS.get(method)
-    name = (short and known.short) or known.name if known else one_line(method)
+def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False) -> str:
+    """Return the name of a method with its setting in words: ``learner EC4``, ``hill climbing``,
+    ``CMA-ES (other arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty for none.
+    The name of a method from a file is the title in its declaration, or its id if ``method`` is
+    the id. ``short``: the short name of a built-in method that has one, the id of another."""
+    name, title = (method, method) if isinstance(method, str) else (method.name, method.title)
+    if known := KNOWN_METHODS.get(name):
+        name = (short and known.short) or known.name
+    else:
+        name = one_line(name if short else title)
     if not setting:
         return name
     pairs = (part.partition("=") for part in one_line(setting).split(", "))

@@ -133,7 +133,7 @@ def test_a_file_that_is_loaded_late_is_named(place, coartic, tmp_path, library):
     code, text, error = coartic(*command)
     assert (code, "2 reused" in text) == (0, True)
     assert error.count(f"{module}.py was first loaded during a run") == 1
-    assert load(tmp_path / "out").methods.title["mine"] == "mine ‡"
+    assert load(tmp_path / "out").methods.title["mine"] == "Mine ‡"
 
 
 def test_packages_that_a_file_imports_are_named_without_those_of_this_project(tmp_path):

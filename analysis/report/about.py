@@ -151,7 +151,9 @@ def limits(study: Study) -> dict[str, Any]:
         ),
         "late": [*chain.from_iterable(study.marks.values())],
         "cores": made_with["cores"],
-        "imports": {title_of(name): listed(used) for name, used in study.imports.items()},
+        "imports": {
+            title_of(study.declared[name]): listed(used) for name, used in study.imports.items()
+        },
     }
 
 

@@ -97,7 +97,7 @@ def _film(
     for run_id in run_ids:
         stored = find_run(run_id, folder)
         movement = trajectory_of(stored)
-        title = f"{movement.task.label}\n{title_of(stored.cell.method.name)}, run {stored.number}"
+        title = f"{movement.task.label}\n{title_of(stored.cell.method)}, run {stored.number}"
         movements.append((title, movement))
     if initial:
         on = movements[0][1].task

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -81,15 +81,22 @@ def report(
         sys.exit(1)
 
 
+def _with_id(name: str, row: Mapping[Any, Any]) -> str:
+    """Return the name of a method, for one from a file behind its id, by which commands know it:
+    ``my-search: Random steps``. ``row`` is of :attr:`.Study.methods`."""
+    has_id = row["built_in"] or name.startswith(row["base"])
+    return name if has_id else f"{row['base']}: {name}"
+
+
 def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
     """Print a table, then pairs of a word and a text.
 
     The table has at most ten methods of the ranking, without settings and ablations: those with the
     smallest gaps and, wherever they rank, the learner and random search; and all methods from
-    files, with their settings, and of the labels ``asked`` that are in no joined row, also below
-    the ranking. The pairs are the reasons why these are not ranked, the findings on coarticulation
-    and on cost, numbers of runs and trials that are not those of the paper, the failed runs, and
-    ``more``.
+    files, with their ids and settings, and of the labels ``asked`` that are in no joined row, also
+    below the ranking. The pairs are the reasons why these are not ranked, the findings on
+    coarticulation and on cost, numbers of runs and trials that are not those of the paper, the
+    failed runs, and ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
@@ -113,7 +120,7 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     say_table(
         ("method", f"gap to the {to} (%)", "share of the gain (%)", "runs"),
         [
-            (shown_name(study, row["method"]), interval(row, "gap", scale=100),
+            (_with_id(shown_name(study, row["method"]), row), interval(row, "gap", scale=100),
              interval(row, "share", 0, 100), number(row["runs"]))
             for row in rows.to_dict("records")
         ],
@@ -229,7 +236,7 @@ def _describe_run(run: Run, code: str) -> None:
         result = f"reward {number(run.solution.reward)}, hands {run.solution.hands}"
     say_pairs(
         [
-            ("Run", f"{run.id}: {cell.task.label}, {title_of(cell.method.name)}, run {run.number}"),
+            ("Run", f"{run.id}: {cell.task.label}, {title_of(cell.method)}, run {run.number}"),
             ("Seed", str(run.seed)),
             ("Parameters", in_words(cell.parameters)),
             ("Result", result),

@@ -248,7 +248,7 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
 
     applies = (task for task in builtin_tasks() if info.why_not(load_task(task)) is None)
     yield "Method", f"{info.name}: {info.title}"
-    yield "Called", title_of(info.name)
+    yield "Called", title_of(info)
     yield "Information", ", ".join(info.information)
     yield "Parameters", in_words(info.defaults) or "none"
     yield "Tasks", ", ".join(applies) or "none of the four"

@@ -170,6 +170,6 @@ class Display:
             again = f"{counted(progress.repeats, 'run')} again, to see whether results repeat"
         last = "starting processes"
         if cell is not None:
-            last = f"{cell.task.label}, {title_of(cell.method.name)}"
+            last = f"{cell.task.label}, {title_of(cell.method)}"
         parts = [f"Runs: {there}/{total}", failed, again, left, last * self._is_live]
         self.show("  ".join(filter(None, parts)), at_once=there == total)
