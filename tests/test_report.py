@@ -150,7 +150,7 @@ def test_every_number_of_a_sentence_is_in_the_table_under_it(report):
     for section in re.findall(r"<section.*?</section>", page, re.DOTALL):
         lines = re.findall(r'<p class="finding">(.*?)</p>', section)
         (name,) = re.findall(r'<h2 id="(.*?)"', section)
-        lines += re.findall(rf'<li><a href="#{name}">.*?</a> (.+?)</li>', page)
+        lines += re.findall(rf'<li><a href="#{name}">.*?</a>: (.+?)</li>', page)
         assert [line for line in lines if page.count(line) > 1] == []
         table = section.partition("<table")[2].partition("</table>")[0]
         cells = {*numbers_in(re.sub("<[^>]+>", " ", html.unescape(table)))}

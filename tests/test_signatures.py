@@ -277,6 +277,7 @@ def test_preshaping_is_what_the_idle_arm_moved_since_its_own_hit_or_the_start():
 ONE_ARMED = ("ascending", "descending")
 MANY, ONE = (12, 12), (1, 1)
 FEW_CONTROLS = "undecided: too few runs of random search"
+NO_CONTROL = "undecided: no random search of as many trials"
 
 
 @pytest.mark.parametrize(
@@ -288,7 +289,7 @@ FEW_CONTROLS = "undecided: too few runs of random search"
         (EC1, 0.0, MANY, "no significant difference", {}),
         (EC1, 2.0, (2, 2), "too few runs", {}),
         (EC1, 2.0, MANY, FEW_CONTROLS, {"runs": ONE}),
-        (EC1, 2.0, MANY, FEW_CONTROLS, {"trials": 9}),  # fewer than the learner's
+        (EC1, 2.0, MANY, NO_CONTROL, {"trials": 9}),  # fewer than the learner's
         # Methods without trials select nothing; of one that draws nothing there is no test.
         ("plan", 0.0, ONE, "the same posture", {}),
         ("plan", 0.5, ONE, "different postures", {}),

@@ -96,7 +96,7 @@ def finding(study: Study, section: Section) -> list[str]:
         "not_ranked": not_ranked(study), "unequal": {*unequal.information},
         "interval": interval, "number": number, "p_value": p_value, "leading": leading,
         "infinite": math.inf,
-        "uses": GROUPS, "titles": frame.attrs["titles"],
+        "uses": GROUPS, "first": next(iter(standings.index), ""), "titles": frame.attrs["titles"],
         "reference": reference(study, common_tasks(study)),
         "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
         "rivals": "other" if study.against else "built-in",
@@ -125,6 +125,10 @@ def limits(study: Study) -> dict[str, Any]:
     tasks = list(one_by_one(study).values())
     optima = [(task, study.optima.get(task.name)) for task in tasks]
     reasons = failed.reason.fillna("")
+    tuned: dict[str, list[str]] = {}
+    for info in study.declared.values():
+        if info.tuned_on and not info.tuned_on.startswith("nothing"):
+            tuned.setdefault(info.tuned_on, []).append(title_of(info))
     others = len(failed) - sum(reasons.value_counts()[:3])
     return {
         "runs": len(runs),
@@ -149,6 +153,7 @@ def limits(study: Study) -> dict[str, Any]:
                 if m.code != m.version
             }
         ),
+        "tuned": tuned,
         "late": [*chain.from_iterable(study.marks.values())],
         "cores": made_with["cores"],
         "imports": {

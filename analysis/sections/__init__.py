@@ -108,7 +108,8 @@ smaller on the tasks that it solved: \
         (coarticulation.list_contexts, coarticulation.list_signatures),
         (coarticulation.draw_postures, coarticulation.draw_saved),
         sentence="""\
-{% for row in rows.head(1).to_dict("records") %}
+{% set of_best = rows[rows.method == first] if varied else rows[:0] %}
+{% for row in (of_best if of_best | length else rows).head(1).to_dict("records") %}
 {{ row.title }} hits {{ row.place }} {{ {
 "different postures": "in postures that depend on the next goal",
 "no more than random search": "in postures that differ no more than those of random search",
@@ -143,8 +144,10 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
 ascending=False)) %}
 {{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
 {{ " of the targets (rewards from the corrective process alone to the %s, evenly spaced)" \
-% reference if loop.first }}, {{ "half after %s trials" % interval(row, "trials_to_half", 0) \
-if row.trials_to_half < infinite else "never half" }}{{ "." if loop.last else "; " }}
+% reference if loop.first }}, {{ "never half" if \
+row.trials_to_half == infinite else "half of them after %s trials" % \
+interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them without a trial" }}\
+{{ "." if loop.last else "; " }}
 {%- endfor %}""",
         note="The empirical distribution (ECDF) of the costs of reaching reward targets. The "
         "figure shows methods that learn, random search and the best planner. The number of "

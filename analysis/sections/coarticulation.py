@@ -185,7 +185,8 @@ def verdict_of(
     control = _beside_control(study, shared) if control is None else control
     beyond = control.get("p_random_search", math.nan)
     if math.isnan(beyond):
-        return "undecided: too few runs of random search"
+        few = "too few runs of random search" if control else "no random search of as many trials"
+        return f"undecided: {few}"
     return "different postures" if beyond < LEVEL else "no more than random search"
 
 
