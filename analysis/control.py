@@ -152,11 +152,13 @@ def selects(study: Study, label: str) -> bool:
 
 @checked_arguments
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """Return all runs of random search that hit the goal of ``contexts`` with the same hand in the
-    same two contexts; None for a method that selects nothing, and without such runs.
+    """Return the control of ``contexts``: the runs of random search (the first 500 solved on each
+    task) on the same two tasks, for the same goal and hand; runs with the other hand do not count.
 
     Random search makes as many trials as the method, with the commonest hand sequence of the
-    method's runs on each task.
+    method's runs on each task. None for random search itself, for a method that does not select its
+    solution by rewards of trials, and if there is no such random search on both tasks, or none of
+    its runs on one of them hits the goal with the hand.
     """
     if not selects(study, contexts.method):
         return None

@@ -123,11 +123,14 @@ def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str
 
 
 def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
-    """Return a copy of checked columns with the ``gap`` and, of frames with :data:`ZERO`, the
-    ``share`` of each row, NaN where nothing can be gained.
+    """Return a copy of checked columns with ``gap``, (best known - reward) / |best known|, and, of
+    frames with :data:`ZERO`, ``share``, (reward - zero) / (best known - zero): 1 at the best known
+    reward, 0 at :data:`ZERO`, below 0 if worse. Both are NaN for a failed run, ``share`` also where
+    the two are equal.
 
-    Raises CoarticError for rewards above 0, for rewards or :data:`ZERO` above the best known
-    reward, and for a best known reward of 0.
+    Raises CoarticError for a reward or a best known reward above 0, for a best known reward of 0,
+    and for a reward (beyond rounding, :data:`NEGLIGIBLE`) or :data:`ZERO` (at all) above the best
+    known.
     """
     for name in ("reward", "best_known"):
         sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
@@ -335,11 +338,13 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def compared_tasks(on: Iterable[tuple[Hashable, Set[Any]]]) -> Set[Any]:
-    """Return the tasks over which algorithms are ranked, given each algorithm with the tasks on
-    which one of its methods ran.
+    """Return the tasks over which algorithms are ranked. ``on`` has, for each method, its algorithm
+    and the tasks on which it ran.
 
-    The tasks of that method for which the number of its tasks, times the number of algorithms that
-    ran on all of them, is largest; of several the most tasks. Empty without a method.
+    Candidates are the sets of tasks of single methods. The set is returned for which (number of
+    tasks) x (number of algorithms with a method that ran on all of them) is largest: many tasks,
+    and many algorithms that share them. Of equals the set with more tasks, then the first. Empty
+    for no method.
     """
     pairs = [*on]
 

@@ -201,9 +201,10 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     DataFrame
         A row for each claim, by its id: ``statement``, ``verdict`` (``supported``, ``not
         supported`` or ``undecided``), ``evidence``, ``test`` and corrected p-values: ``p_holm`` of
-        the claim, ``p_without`` of the claim without the task that favours it most, and
-        ``opposite_p_holm`` of its opposite. A claim that holds is supported if both ``p_holm``
-        and ``p_without`` are below 5 %, or NaN for want of a test (:meth:`Finding.verdict`).
+        the claim, ``p_without`` of the claim with all tasks and without the task that favours it
+        most (the larger p), and ``opposite_p_holm`` of its opposite; NaN without a test. A claim
+        that holds is supported if ``p_without`` is below 5 %, or NaN as of an exact count; with
+        too few values it is undecided (:meth:`Finding.verdict`).
 
     Examples
     --------

@@ -123,9 +123,11 @@ _USES = {BY_TRIAL: "trial", BY_FORMULA: "formula", WITHOUT_REWARD: "none"}
 
 @cached
 def _rows_of(study: Study, table: Table) -> pd.DataFrame:
-    """Return a table as a DataFrame: a row for each name, and only the columns of the table, with
-    ``_low``, ``_high`` and ``_sd`` written out; NaN where a row has no entry. Its ``attrs`` have
-    ``titles``, ``under``, ``own`` and ``reference`` (:func:`_shown_names`)."""
+    """Return a table of a study as a DataFrame, a row for each name, with the columns of the table
+    alone: intervals and deviations written out as ``_low``, ``_high`` and ``_sd``, NaN where a row
+    has no entry. Its ``attrs`` are the names for showing the table (:func:`_shown_names`). It is
+    cached: do not change it.
+    """
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}

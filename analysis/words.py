@@ -197,9 +197,11 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 def latex(text: object) -> str:
     """Return text as one printable line (:func:`.one_line`) for LaTeX and BibTeX.
 
-    Their special characters are escaped; Greek letters, arrows and signs become commands; accented
-    Latin letters stay. Characters of other alphabets, such as Chinese, become ``\\symbol``, which
-    XeLaTeX and LuaLaTeX print.
+    Special characters of LaTeX and BibTeX are escaped; Greek letters, arrows and common signs
+    become commands. Latin letters stay, with their accents up to U+02FF (``é``, ``ő``); letters
+    beyond lose accents (``ế`` becomes ``e``), and indices and ligatures become plain (``₂``:
+    ``2``). All other characters, such as Chinese, become ``\\symbol``, which XeLaTeX and LuaLaTeX
+    print.
     """
 
     def escaped(c: str) -> str:

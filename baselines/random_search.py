@@ -74,12 +74,14 @@ class RandomSearchParameters(RandomSearchHandsParameters):
 def draw_trials(
     session: Session, hands: str | None, parameters: RandomSearchHandsParameters
 ) -> tuple[Attempts, int]:
-    """Make trials with noise until none is left; return the trials, which keep the best one, and
-    the number of trials with noise.
+    """Make a trial of the corrective process alone with one or more hand sequences, then trials
+    with noise until none is left; return the trials, which keep the best one of all, and the number
+    of trials with noise.
 
-    ``hands``: a hand sequence, or None for the sequence with which the corrective process alone
-    does best. ``parameters.trials``: most trials, with trials of the corrective process alone.
-    Raises MethodError for no trial at all, and if the process completes no hand sequence.
+    ``hands``: a hand sequence, or None for the one with which the process alone does best, among as
+    many as there are trials; where more than 4096 exist, the task's initial sequence.
+    ``parameters.trials``: most trials, both kinds together. Raises MethodError without a single
+    trial, and if the process completes none of the sequences.
     """
     attempts = Attempts(session, parameters.trials)
     trials = attempts.left

@@ -54,16 +54,22 @@ class Attempts:
         """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
 
     def by_correction(self, *hands: str) -> Trials:
-        """Make a trial without targets, in which the corrective process alone goes to each goal,
-        with each of some hand sequences such as ``"RRLR"``; remember the best trial, and return the
-        results of all trials made."""
+        """Make one trial for each of the hand sequences given (at least one), such as ``"RRLR"``:
+        without targets, so that the corrective process alone goes to each goal. Remember the best
+        of these trials if it beats all before, and return the results of the trials made, in order:
+        fewer than sequences if the budget ends. Raises BudgetError if no trial of the session is
+        left."""
         shape = (len(hands), self._session.goals_count, self._session.dof)
         return self.by_targets([*hands], np.full(shape, np.nan))
 
     def around(self, hands: str, values: Array) -> Trials:
-        """Make N trials with one hand sequence; remember the best trial, and return the results of
-        all trials made. ``values``, shape ``(N, n)``, are targets of the n explored joints of all
-        goals, goal by goal; other joints keep still."""
+        """Make N trials with one hand sequence, or as many as the budget of the session still has;
+        remember the best, and return the results of these trials, a row for each trial made.
+
+        ``values``, shape ``(N, n)``, length unit and rad, are target coordinates of the n explored
+        joints of all goals (True in ``explored``), goal by goal; other joints keep still. N is at
+        least 1. Raises BudgetError if no trial of the session is left.
+        """
         targets = np.full((len(values), *self.explored.shape), np.nan)
         targets[:, self.explored] = values
         return self.by_targets(hands, targets)

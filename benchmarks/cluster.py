@@ -50,8 +50,9 @@ class Dask:
         """Yield each job with its outcomes, in the order in which jobs finish. If a worker dies,
         another worker performs its jobs; a job on which worker after worker dies has crashed.
 
-        Raises CoarticError if the scheduler is missing or lost or has no worker for 10 minutes, and
-        if its workers lack this version of coartic, or this machine the extra ``cluster``.
+        When iterated, raises CoarticError if the scheduler is missing or lost or has no worker for
+        10 minutes, if a worker has another version or code of a method or cannot perform jobs, and
+        if this machine lacks the extra ``cluster``. The version of coartic itself is not compared.
         """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed

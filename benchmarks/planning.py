@@ -327,9 +327,13 @@ def _job_of(
     parameters: Mapping[str, Any] | None = None,
     runs: int | None = None,
 ) -> Job:
-    """Return the job of a method with parameters on a task. Runs and trials of the request replace
-    ``runs``, the number of a block, and ``trials`` in ``parameters``; these replace the numbers of
-    the suite. A method that is not stochastic has run 0 alone; no run if a range begins later."""
+    """Return the job of a method with parameters on a task: its cell and the numbers of its runs.
+
+    Runs: ``request.runs``, else ``runs`` (the number of the suite's block), else ``suite.runs``.
+    Trials, if the method has this parameter: ``request.trials``, else ``trials`` in ``parameters``,
+    else ``suite.trials``. A method that is not stochastic has run 0 alone, and no run if
+    ``request.runs`` is a range that does not begin at 0.
+    """
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)

@@ -122,9 +122,15 @@ class Workers:
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield each job with its outcomes, in the order in which jobs finish; with ``in_order``
-        one worker has all jobs of a method. Raises CoarticError if process after process ends
-        before its first job, and if answers cannot be written."""
+        """Yield each job with its outcomes, in the order in which jobs finish. The jobs of a method
+        are divided among all workers; with ``in_order`` one worker has them all, and performs them
+        in their order while none has to be repeated.
+
+        A job whose process ends is repeated once if the process was late, was killed, or could not
+        write an answer; otherwise, and the second time, its outcomes are ``timeout`` or
+        ``crashed``. Raises CoarticError if five processes in a row end before their first job, and
+        if answers cannot be written.
+        """
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
             by_method[job.cell.method.key].append(job)
@@ -276,7 +282,9 @@ class Worker:
         return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield the jobs that have been answered since the last call, with their outcomes."""
+        """Yield the jobs that have been answered since the last call, in order, with their
+        outcomes. Each leaves :attr:`jobs`, and the clock of the next job (:attr:`since_s`) starts;
+        the clock of the first starts in the first call after the process has begun."""
         if self.since_s == math.inf and (self._folder / _BEGUN).exists():
             self.since_s, self._since_cpu_s = time.monotonic(), self.cpu_s
         while self.jobs and (answer := self._folder / str(self._answered)).is_file():

@@ -1,5 +1,6 @@
 """Figures: what they show is what the runs say."""
 
+import html
 import itertools
 import re
 
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 from coartic import CoarticError, load_task
 from coartic.analysis import load
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
+from coartic.analysis.figures.style import tip
 from coartic.analysis.methods import COLORS, KNOWN_METHODS, title_of
 from coartic.analysis.report.about import finding
 from coartic.analysis.sections import FIGURES, SECTIONS
@@ -143,6 +145,16 @@ def test_methods_that_a_sentence_compares_differ_in_lightness_and_mark(seen, shi
                     assert abs(np.subtract(*pair)) >= 10, (words, one, other)
                 compared += 1
     assert compared > 10
+
+
+@pytest.mark.parametrize("text", ["mine: 1 %", 'the "best", it\'s said', "a < b & c"])
+def test_a_page_shows_the_text_of_a_mark(text):
+    drawing = Figure()
+    (dot,) = drawing.subplots().plot([1], [1], marker="o")
+    tip(dot, text)
+    page = for_page(Plot("one", "", "", "", drawing, pd.DataFrame()))
+    shown = re.findall("<title>(.*?)</title>", page)
+    assert [html.unescape(each) for each in shown] == [text]
 
 
 def test_a_picture_leaves_its_figure_as_it_was_and_has_no_date(monkeypatch):

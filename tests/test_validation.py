@@ -123,6 +123,8 @@ FAMILIES = [
     (family("[4, 4]", "[5, 4]"), "links is [5, 4]; it should have the lower number first"),
     (family("[-5, 5]", "[5, -5]"), "region.x is [5, -5]; it should have the lower number first"),
     (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
+    (family("[-5, 5]", "['a', 5]"), "region.x[0] is 'a'; it should be a finite number"),
+    (family("[-5, 5]", "[-5, 1e306]"), "region.x[1] is 1e+306; it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]

@@ -144,8 +144,9 @@ def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
 def picture(drawing: Figure, ending: str) -> bytes:
     """Return a figure as the bytes of a file with this ending, one of :data:`FORMATS`.
 
-    Equal figures give equal bytes on machines with equal fonts: ids are salted, and no date is
-    written. Raises CoarticError for another ending.
+    Equal figures give equal bytes with equal fonts and an equal version of Matplotlib, which SVG
+    and PDF name: ids of SVG do not depend on chance, and no date is written. Raises CoarticError
+    for another ending.
     """
     if ending not in FORMATS:
         raise CoarticError(f"a picture ends in {', '.join(FORMATS)}; not in {brief_value(ending)}")
@@ -190,7 +191,7 @@ def for_page(plot: Plot) -> str:
     text = _saved(plot.figure, settings, format="svg", transparent=True, metadata=none).decode()
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, text)
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
-    text = re.sub(rf' id="{style.TIP}([^"]*)">', r"><title>\1</title>", text)
+    text = re.sub(rf' id=(["\']){style.TIP}(.*?)\1>', r"><title>\2</title>", text)
     text = re.sub(r' id="[\w.]+_\d+"', "", text)  # of elements that nothing refers to
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
     # The backend leaves black fills out: they inherit the root's.

@@ -212,7 +212,8 @@ def means(
 
 
 def tip(artist: Artist, text: str) -> None:
-    """Set the text that a page of HTML shows when the pointer rests on a mark."""
+    """Set the text that a page of HTML shows when the pointer rests on a mark, in place of the id
+    (gid) of the mark."""
     artist.set_gid(f"{TIP}{text}")
 
 

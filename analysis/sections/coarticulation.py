@@ -233,7 +233,10 @@ def list_saved(study: Study) -> Rows:
     "trials and by formula, and methods from files. n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw for each task a row of bars for each method, a bar for each goal."""
+    """Draw for each task a row for each of some methods (the learner, random search, the best by
+    kind of information, methods from files), the smallest mean gap first. A row has a bar for each
+    goal: mean ticks of the movement less the ticks of the corrective process alone with the same
+    hands, up where it takes more. None if there is nothing to draw."""
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
     drawn, parts = {*headline_methods(single)}, []

@@ -84,7 +84,10 @@ def draw(
 def _film(
     folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
 ) -> None:
-    """Write a film of one or two runs of a folder, or of a run next to the initial solution."""
+    """Write a film (.gif, .mp4) of one or two runs of a results folder, side by side, or, with
+    ``initial``, of one run next to the corrective process alone. ``width`` is in pixels. Raises
+    CoarticError for more, and if ``out`` is there and not to ``replace``.
+    """
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of

@@ -40,8 +40,9 @@ def error_line(error: BaseException) -> str:
 def one_line(text: str) -> str:
     """Return text as one printable line; a printable line is returned unchanged.
 
-    Lines are joined by `` | ``; other characters that do not print (control characters, escape
-    sequences, marks that turn the direction of writing) become escapes, such as ``\\x1b``.
+    Otherwise lines are joined by `` | ``, without empty lines and without blanks (tabs, too) at the
+    ends of lines. Other characters that do not print (control characters, escape sequences, marks
+    that turn the direction of writing) become escapes, such as ``\\x1b``.
     """
     if text.isprintable() or all(map(prints, text)):
         return text

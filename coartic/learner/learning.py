@@ -232,10 +232,12 @@ def _learn_together(
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
-    """Run the learner side by side, once for each seed; return the runs in the order of seeds.
+    """Run the learner side by side, once for each seed, and after its ``trials`` trials make its
+    replay, a trial without noise; return the runs in the order of seeds.
 
     Nothing is checked. ``first`` has the movement of trial 0 for each goal; a movement without a
-    target stands for the corrective process. At most 72 seeds; 0 trials only compile the kernels.
+    target stands for the corrective process. At most 72 seeds. With 0 trials only the replay is
+    made, which compiles the kernels.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)

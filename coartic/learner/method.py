@@ -189,7 +189,10 @@ class CustomDualProcess(DualProcess):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return the paper's condition ``base`` with the fields that the parameters set."""
+        """Return a copy of the paper's condition that parameter ``base`` names, with the values of
+        all other parameters that are not None; its id says that it is changed, such as ``EC4,
+        changed,``.
+        """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)
 

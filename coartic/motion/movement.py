@@ -397,13 +397,14 @@ def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int,
 
 @inlined
 def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
-    """Iterate the corrective process **A** in the first ``count`` slots until each has converged or
-    failed. In the record of each run ``target`` becomes the last iterate, ``converged`` and
-    ``iterations`` are set, and ``evaluations`` grows.
+    """Iterate the corrective process **A** in the first ``count`` slots of ``batch.at[0]`` until
+    each has converged or failed: is not finite, no longer moves, or has made ``max_iterations``.
+    The record of each run in ``batch.runs`` gets the last iterate as ``target``, ``converged`` and
+    ``iterations``, and its ``evaluations`` grow. Afterwards the slots are free.
 
-    ``pull`` can be a kernel, else None. Called with the rows of slots, ``count``, robot and runs,
-    the kernel fills in the rows ``pull``: what an iteration adds to the base and to the joints of
-    the arm, 0 for locked coordinates of the base.
+    ``pull``: None, or a kernel ``pull(at, count, robot, runs)``, called before each iteration, that
+    fills in ``at.pull``: what the iteration adds to the base and to the joints of the arm besides α
+    Jᵀ e. It has to be 0 for locked coordinates of the base.
     """
     at, iteration = batch.at[0], 0
     square = largest_square(robot.model.correction_tolerance)

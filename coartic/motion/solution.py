@@ -223,11 +223,12 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 def execute_many(
     compiled: CompiledTask, solutions: Iterable[Iterable[Movement]], *, outside: bool = True
 ) -> list[Execution | Refused]:
-    """Execute and score solutions of one task side by side, in a fraction of the time.
+    """Execute and score solutions of one task: solutions without paths side by side, in a fraction
+    of the time, solutions with a path one by one.
 
-    Returns for each solution, in order, its execution, or the error that :func:`execute` would
-    raise, as an object; no such error is raised. Trials are counted as made outside the session of
-    a run if ``outside``.
+    Returns a list with, for each solution in order, its execution, or, in its place, the error that
+    :func:`execute` would raise for the solution, which is not raised. Trials are counted as made
+    outside the session of a run if ``outside``.
     """
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:

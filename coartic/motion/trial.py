@@ -100,8 +100,9 @@ def account_type(width: int) -> np.dtype[np.void]:
 
 @inlined
 def set_off(run: Any, q: Any) -> None:
-    """Put a run (record of a robot in its trial), in place, at configuration ``q``, where the trial
-    starts: the trial goes on, and no evaluations are counted yet."""
+    """Start the trial of a run (record of a robot in its trial), in place: the robot stands at
+    configuration ``q``, shape ``(dof,)``, the trial has not ended (``going``), and the count of
+    evaluations is 0. Other fields stay: :func:`begin` sets them."""
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
 
@@ -157,8 +158,10 @@ def correct(count: int, robot: Any, batch: Any) -> None:
 
 @inlined
 def make_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Move each of the first ``count`` runs for which **A** converged, in place, to the
-    configuration that **A** found, its ``target``."""
+    """Move each of the first ``count`` runs for which **A** converged, in place, towards its
+    ``target``, the configuration that **A** found. The movement ends as soon as the hand is in the
+    goal, mostly before the target.
+    """
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -617,7 +620,8 @@ class Trials(NamedTuple):
 
     @property
     def rewards(self) -> Array:
-        """Total reward of each trial, minus its ticks, shape ``(N,)``; -inf where it failed."""
+        """Total reward of each trial, which is minus the number of its ticks, shape ``(N,)``; -inf
+        where the trial failed."""
         return np.where(self.completed, -self.ticks, -np.inf)
 
 
@@ -748,11 +752,14 @@ def search_initial_hands(
     """Return the hand sequence of trial 0, such as ``"RRRR"``, and the counts of the search for it,
     by counters of :class:`~coartic.method.Meter`.
 
-    A sequence that the task names is returned, with no counts, whatever ``hands``. If the task
-    names a policy, it is the sequence of ``hands`` (by default the task's) with which the
-    corrective process alone gets the highest reward, among all sequences or sequences of one hand.
-    Raises NotApplicableError if no sequence completes the task, or there are more than 4096, and
-    ValueError for ``hands`` that the robot does not have.
+    If the task names a sequence, this is returned, and no counts. If it names a policy, the
+    corrective process alone tries sequences of ``hands`` (None: the task's): under
+    ``"best-single-hand"`` sequences of one hand, else all. The sequence with the highest reward is
+    returned; of equals the one with the fewest changes of hand. The trials are counted as made
+    outside the session of a run if ``outside``.
+
+    Raises NotApplicableError if no sequence tried completes the task, or more than 4096 would have
+    to be tried, and ValueError for no hand or a hand that is not among the task's hands.
     """
     allowed = hands_among(task, hands)
     if not task.initial_is_policy:

@@ -138,11 +138,14 @@ process imports no method file."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
-    """Return, as plain data, the result of the function of :class:`MethodInfo` that ``question``
-    names: ``"complete"`` (all parameters), ``"why_not"`` (a reason or None) or ``"rules"``.
+    """Return the result of the function of :class:`MethodInfo` that ``question`` names:
+    ``"complete"`` (parameters with defaults, as plain data, without parameters in
+    :attr:`.Method.later` that have their default), ``"why_not"`` (what the method returns: a reason
+    or None) or ``"rules"``.
 
     ``arguments`` are parameters (none for ``"rules"``), then for ``"why_not"`` the entries of an
-    outline. Raises CoarticError for wrong parameters, and if the method fails to answer.
+    outline. Raises CoarticError for parameters that do not fit, and if ``why_not`` of the method
+    fails; other errors that a method's own check of parameters raises pass through.
     """
     if question == "rules":
         config = method.Parameters.model_config

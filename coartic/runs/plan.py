@@ -153,7 +153,8 @@ def in_words(parameters: Mapping[str, Any]) -> str:
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:
-    """Return the number of trials that a method's parameters name; 0 if they name none."""
+    """Return the value of a method's parameter ``trials``, trials of a run; 0 if there is no such
+    parameter or its value is not an int above 0 (a float, a bool, a NumPy integer)."""
     trials = parameters.get("trials")
     return trials if type(trials) is int and trials > 0 else 0
 

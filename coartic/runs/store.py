@@ -764,8 +764,11 @@ _UNREADABLE = (
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Turn an error of the block of this context (of the system, of SQLite or of the content of
-    ``runs.sqlite`` in ``folder``) into a CoarticError that names the file."""
+    """Turn an error of the block of this context into a CoarticError that names the file: of the
+    system (the file that it names, else ``runs.sqlite`` in ``folder``), of SQLite, a CoarticError
+    (unchanged if it names the folder), and any ValueError, LookupError, TypeError, OverflowError or
+    RecursionError, which are taken for content that coartic does not write. Other errors pass.
+    """
     try:
         yield
     except (CoarticError, *_UNREADABLE) as error:

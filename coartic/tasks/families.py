@@ -69,9 +69,10 @@ _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
 def _in_thousandths(value: float) -> int:
-    """Return a number in thousandths, 300 for 0.3. Raises a validation error unless it is finite,
-    with at most three decimals."""
-    if not math.isfinite(value):
+    """Return a number in thousandths, 300 for 0.3. Raises a validation error for anything but a
+    finite number with at most three decimals."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value * _PARTS):
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
         raise sentence_error(f"{value} should have at most three decimals")
