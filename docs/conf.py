@@ -130,6 +130,11 @@ def setup(app):
         """Escape |x|, a size, which would be a substitution in reStructuredText."""
         lines[:] = [_BAR.sub(r"\|", line) for line in lines]
 
+    def once(app, what, name, thing, skip, options):
+        """Leave out the class Parameters where it is an attribute of Method."""
+        return True if (what, name) == ("class", "Parameters") else None
+
+    app.connect("autodoc-skip-member", once)
     app.connect("source-read", links)
     app.connect("source-read", fold)
     app.connect("source-read", code)
