@@ -88,7 +88,7 @@ def equal_trials(study: Study) -> int:
     if by_suite in algorithms:
         return by_suite
     if not algorithms:
-        return int(study.runs.trials.max())
+        return int(study.runs.trials.fillna(0).max())
     return max(sorted(algorithms), key=lambda n: len(algorithms[n]))
 
 
@@ -98,7 +98,7 @@ def trials_of(study: Study) -> dict[str, int]:
     :func:`equal_trials` for a method that has no such parameter and made no more, and for a method
     that does not use the reward of trials."""
     asked, equal = _trials_asked(study), equal_trials(study)
-    made = study.runs.groupby("label").trials.max()
+    made = study.runs.fillna({"trials": 0}).groupby("label").trials.max()
     return {
         str(label): max(asked[part] or max(int(made[part]), equal) for part in row.parts)
         if row.information == BY_TRIAL
@@ -217,7 +217,8 @@ def shown_name(study: Study, method: str) -> str:
 def _trials_made(study: Study, method: str) -> str:
     """Return how many of its trials a method made at most, ``at most 77 of 10,000 trials``; empty
     if a run made all of them, and for a method that does not use the reward of trials."""
-    made, asked = int(compared(study)[method].trials.max()), trials_of(study)[method]
+    made = int(compared(study)[method].trials.fillna(0).max())
+    asked = trials_of(study)[method]
     is_short = study.methods.information[method] == BY_TRIAL and made < asked
     return f"at most {number(made)} of {number(asked)} trials" if is_short else ""
 

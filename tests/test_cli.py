@@ -66,6 +66,18 @@ def test_a_crashed_run_makes_the_exit_code(coartic, tmp_path, monkeypatch):
     assert coartic("verify", tmp_path)[0] == 0
 
 
+def test_a_folder_without_any_count_of_trials_is_printed_and_reported(
+    coartic, tmp_path, monkeypatch
+):
+    """All workers died, of a method that makes no trials."""
+    monkeypatch.setattr(pool, "Local", lambda _: Failing(0))
+    alone = ("run", "paper", "--tasks", "ascending", "--methods", "corrective-alone/given")
+    code, text, error = coartic(*alone, "--out", tmp_path)
+    assert (code, "1 × exit code 9" in text, "Traceback" in error) == (1, True, False)
+    code, text, error = coartic("report", tmp_path)
+    assert (code, "fault" in text + error) == (0, False)
+
+
 @pytest.mark.parametrize("is_terminal", [True, False])
 def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal):
     monkeypatch.setenv("COLUMNS", "80")
