@@ -147,11 +147,11 @@ def _methods_of_module(
         _check_declaration(method, origin)
         try:
             code = code_of(method, file)
+        except CoarticError as error:
+            raise CoarticError(f"{origin}: {error}") from None
         except OSError as error:
-            raise CoarticError(
-                f"{origin}: method {method.name!r} declares a file that cannot be read: "
-                f"{error.filename}"
-            ) from None
+            wrong = f"{error.filename}: cannot be read: {error.strerror}"
+            raise CoarticError(f"{origin}: {wrong}") from None
         yield method_info(method, origin, str(file), code)
     if not methods:
         unfinished = [

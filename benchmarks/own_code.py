@@ -22,12 +22,14 @@ from importlib import metadata
 from pathlib import Path
 
 import coartic
+from coartic.internal.toml_files import check_file
 from coartic.method import MODULES, Method
 from coartic.model import MODEL_VERSION
 from coartic.motion.compile import PACKAGE
 
 OURS = {"coartic", "analysis", "baselines", "benchmarks"}
 """The packages of this project, which are next to each other."""
+_LARGEST_DATA = 2**30  # bytes of a declared file
 
 
 def code_of(method: type[Method], file: Path) -> str:
@@ -36,13 +38,15 @@ def code_of(method: type[Method], file: Path) -> str:
     It covers the versions of the method, of the model and of the built-in methods that the file
     imports; the file, its declared data, and every file of the user's that its import loaded; names
     and versions of the installed packages that these files import. Comments, blank lines, widths
-    and places of files do not count. Raises OSError for a file that cannot be read.
+    and places of files do not count. Raises OSError or CoarticError for a file that cannot be read.
     """
     files = {*own_files(), str(file)}
     texts = [content_of(path) for path in files]
     imported = _imported_by(frozenset(files))
     parts = [f"{MODEL_VERSION}.{method.version}".encode(), *texts]
-    parts += [(file.parent / name).read_bytes() for name in method.files]
+    for declared in (file.parent / name for name in method.files):
+        check_file(declared, most=_LARGEST_DATA)
+        parts.append(declared.read_bytes())
     parts += [line.encode() for line in (*_built_in_versions(imported), *_packages(imported))]
     hashes = sorted(hashlib.sha256(part).digest() for part in parts)
     return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]

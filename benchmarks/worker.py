@@ -20,9 +20,12 @@ from pydantic import TypeAdapter
 
 from coartic.benchmarks.own_code import imported_packages, libraries, own_files
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.text import counted, error_line
+from coartic.internal.limits import brief_value
+from coartic.internal.text import Line, counted, error_line
 from coartic.method import (
+    MOST_COUNT,
     Information,
+    Meter,
     MethodError,
     Result,
     Session,
@@ -38,6 +41,7 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
+_ENVIRONMENT = TypeAdapter(dict[Literal["libraries", "imports"], dict[Line, Line] | list[Line]])
 _LONGEST_DETAILS = 10_000_000
 
 
@@ -86,12 +90,27 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
             parts = each["parts"].items()
             each["parts"] = {part: [*map(movement_from, made)] for part, made in parts}
         outcomes = _OUTCOMES.validate_python(content)
+        for outcome in outcomes:
+            _check_stated(job, outcome)
         if len(outcomes) == len(job.numbers):
             return outcomes
         why = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
     except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
+
+
+def _check_stated(job: Job, outcome: Outcome) -> None:
+    """Raise ValueError for an outcome that states what no run can have, and no folder can keep."""
+    meter = outcome.meter or Meter()
+    for name, number in {**vars(outcome.times), **vars(meter)}.items():
+        if number is not None and not 0 <= number <= MOST_COUNT:
+            raise ValueError(f"{name} is {brief_value(number)}")
+    if len(outcome.rewards) > meter.trials:
+        raise ValueError(f"{len(outcome.rewards)} rewards of {counted(meter.trials, 'trial')}")
+    if others := {*outcome.used} - {*job.cell.method.information}:
+        raise ValueError(f"it used {brief_value(sorted(others))}, which it does not declare")
+    _ENVIRONMENT.validate_python(outcome.environment or {})
 
 
 def perform_job(job: Job) -> list[Outcome]:

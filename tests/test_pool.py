@@ -25,7 +25,7 @@ pytestmark = pytest.mark.process
 METHODS = """
 import itertools, os, shutil, signal, sys, tempfile, threading, time
 import numpy as np
-import coartic.benchmarks.scoring, coartic.benchmarks.worker, coartic.motion.solution
+import coartic.benchmarks.pool, coartic.benchmarks.scoring, coartic.motion.solution
 from coartic.method import Information, Method, MethodError, Parameters, Result
 from coartic.motion.solution import Movement
 
@@ -91,6 +91,26 @@ HANDLED = {
     "breaks": ("raise SystemExit(0)", "crashed", "SystemExit: 0"),
     "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
     "writes": ("open('large', 'wb').truncate(2**40)", "crashed", "File too large"),
+    "turns_its_clock_back": ("clock = time.process_time\n"
+        "        def once():\n"
+        "            time.process_time = clock\n"
+        "            return -1.0\n"
+        "        time.process_time = once", "crashed", "ValueError: cpu_s is -"),
+    "counts_back": ("session._meter.trials = -5; return Result(corrected(session))",
+                    "crashed", "ValueError: trials is -5"),
+    "hides_a_trial": ("session.trial(corrected(session)); session._meter.trials = 0",
+                      "crashed", "ValueError: 1 rewards of 0 trials"),
+    "forges_a_commit": ("answer = coartic.benchmarks.pool.answer_of\n"
+        "        def once(outcomes):\n"
+        "            coartic.benchmarks.pool.answer_of = answer\n"
+        "            return answer(outcomes).replace(b'libraries', b'commit')\n"
+        "        coartic.benchmarks.pool.answer_of = once\n"
+        "        return Result(corrected(session))", "crashed", "outcomes cannot be read"),
+    "has_no_words": ("def fails(self): raise ValueError('x')\n"
+        "        raise type('Mute', (Exception,), {'__str__': fails})",
+        "crashed", "Mute: its message cannot be shown"),
+    "keeps_corrections": ("details = {'corrections': ['two', -1, 0.5] + [1] * 8}\n"
+        "        return Result(corrected(session), details)", "ok", ""),
     "generates": ("return Result(m for m in corrected(session))", "ok", ""),
     "nothing": ("return None", "solver-failed", "returned NoneType, not a Result"),
     "no_solution": ("return Result(None)", "solver-failed", "cannot be kept: TypeError"),
@@ -166,7 +186,7 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.status == status, run.reason
     assert words in run.reason
     assert run.reason.isprintable()
-    died = name in ("exits", "is_killed", "removes_its_folder")
+    died = name in ("exits", "is_killed", "removes_its_folder") or "cannot be read" in run.reason
     assert run.isna().wall_s == (died or "CPU" in words)
     assert run.isna().cpu_s == died
     assert run.isna().reward if status != "ok" else run.reward == HONEST

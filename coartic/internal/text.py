@@ -34,7 +34,11 @@ def plain(text: str, most: int = LONGEST_REASON) -> str:
 
 def error_line(error: BaseException) -> str:
     """Return an exception as one printable line, ``ValueError: message``."""
-    return plain(f"{type(error).__name__}: {error}".removesuffix(": "))
+    try:
+        text = str(error)
+    except Exception:
+        text = "its message cannot be shown"
+    return plain(f"{type(error).__name__}: {text}".removesuffix(": "))
 
 
 def one_line(text: str) -> str:

@@ -18,7 +18,7 @@ from pydantic import Field, InstanceOf
 from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
 from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
-from coartic.method import Meter
+from coartic.method import MOST_COUNT, Meter
 from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.motion.trial import compiled_task
@@ -192,9 +192,13 @@ class Run:
 
     def _corrections(self, place: int) -> int | None:
         """Return the corrective movements of a learner in trial 0 (place 0) or in a tenth of the
-        other trials (places 1 to 10; -1 is the last); None if they were not counted."""
+        other trials (places 1 to 10; -1 is the last); None if they were not counted. A method of a
+        file can keep something else by this name."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
-        return counts[place] if isinstance(counts, list) and len(counts) == 11 else None
+        if not isinstance(counts, list) or len(counts) != 11:
+            return None
+        are_counts = all(type(count) is int and 0 <= count <= MOST_COUNT for count in counts)
+        return counts[place] if are_counts else None
 
     @property
     def is_downsampled(self) -> bool:
