@@ -298,19 +298,21 @@ class Study:
         number of trials made, ``hands`` the hands of the solution.
         """
         runs, tasks = self.stored, self.tasks
-        parameters = {text: json.loads(text) for text in runs.parameters.unique()}
-        rows = [
-            {
+        cells = [*zip(runs.task, runs.method, runs.parameters, strict=True)]
+        rows = {
+            (name, method, text): {
                 **self.declared[method].defaults,
-                **parameters[text],
+                **json.loads(text),
                 "family": tasks[name].family,
                 "split": tasks[name].split,
                 "goals": len(tasks[name].goals),
                 "arms": len(tasks[name].hands),
             }
-            for name, method, text in zip(runs.task, runs.method, runs.parameters, strict=True)
-        ]
-        more = pd.DataFrame(rows, runs.index)
+            for name, method, text in dict.fromkeys(cells)
+        }
+        place = {cell: number for number, cell in enumerate(rows)}
+        more = pd.DataFrame([*rows.values()]).iloc[[place[cell] for cell in cells]]
+        more.index = runs.index
         runs = runs.join(more[[name for name in more if name not in runs]])
         runs["label"] = [*map(label_of, runs.method, runs.setting)]
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task

@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import pickle
 import sqlite3
 import time
 import warnings
@@ -147,7 +148,7 @@ LONGEST_VALUE = 50_000_000  # bytes of a value in the file
 LONGEST_TASK = 100_000  # characters of the definition of a task
 _LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
 _ROWS_AT_ONCE = 5_000  # of a frame, as objects
-_UNIQUE = "run_id", "result", "date", "path"  # columns whose texts differ: others are kept once
+_UNIQUE = "run_id", "result", "path"  # columns whose texts differ: others are kept once
 WAIT_S = 1.0  # wait for another program
 _LONGEST_PATH = 500  # letters of the path of a file; SQLite adds those of its journal
 
@@ -551,7 +552,13 @@ class Store:
                 for name in names:
                     if _DTYPES[name] == "string" and name not in _UNIQUE:
                         frame[name] = [once.setdefault(text, text) for text in frame[name]]
-                parts.append(frame.astype({name: _DTYPES[name] for name in names}))
+                # Texts that stay among objects that go would keep the memory of all of them.
+                unique = {n: pickle.dumps(frame.pop(n).tolist()) for n in names if n in _UNIQUE}
+                frame = frame.astype({name: _DTYPES[name] for name in frame})
+                del some
+                for name, texts in unique.items():
+                    frame[name] = pd.array(pickle.loads(texts), dtype=_DTYPES[name])
+                parts.append(frame[names])
             return pd.concat(parts, ignore_index=True)
 
     def _wait_for(self, statement: str) -> None:
