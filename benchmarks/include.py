@@ -28,6 +28,8 @@ from coartic.runs.record import Run
 from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, explain_errors, open_store, writing
 
+_WRITTEN_AT_ONCE = 500  # runs that are in memory
+
 
 def include_folders(
     plan: Sequence[Job],
@@ -198,13 +200,11 @@ def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, 
 
     Raises CoarticError if the target has another result of a run.
     """
-    stored = target.runs()
-    pairs = zip(stored.run_id, stored.result, strict=True)
-    there = {same_run(run_id): (run_id, result) for run_id, result in pairs}
-    for _, cell in source.runs().groupby(["task", "method", "setting"], sort=False):
-        results = dict(zip(cell.run_id, cell.result, strict=True))
+    there = {same_run(run_id): (run_id, result) for run_id, result in target.results()}
+    results = source.results()
+    for first in range(0, len(results), _WRITTEN_AT_ONCE):
         runs = list[Run]()
-        for run_id, result in results.items():
+        for run_id, result in results[first : first + _WRITTEN_AT_ONCE]:
             held, held_result = there.get(same_run(run_id), ("", ""))
             if held and held_result == result:
                 continue

@@ -176,6 +176,7 @@ class Store:
     def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
         self.folder = folder
         self._db = connection
+        self._cells = dict[sqlite3.Row, Cell]()  # that were read
 
     # The plan.
 
@@ -326,6 +327,11 @@ class Store:
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
+    def results(self) -> list[tuple[str, str]]:
+        """Return the id of each run of the plan that the folder has, in their order, with the hash
+        of its outcome."""
+        return self._rows("SELECT run_id, result FROM asked ORDER BY position, run")
+
     # Writing and reading runs.
 
     def write(self, runs: Iterable[Run]) -> None:
@@ -349,7 +355,10 @@ class Store:
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
                 raise CoarticError(f"it has no run {run_id}")
-            cell = self._read_cell(self._one("SELECT * FROM cells WHERE id = ?", row["cell"]))
+            stored_cell = self._one("SELECT * FROM cells WHERE id = ?", row["cell"])
+            if stored_cell not in self._cells:
+                self._cells[stored_cell] = self._read_cell(stored_cell)
+            cell = self._cells[stored_cell]
             environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
             blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
             rewards = _unpack(blob[0], row["trials"]) if blob else np.empty(0)
@@ -554,7 +563,7 @@ class Store:
                         frame[name] = [once.setdefault(text, text) for text in frame[name]]
                 # Texts that stay among objects that go would keep the memory of all of them.
                 unique = {n: pickle.dumps(frame.pop(n).tolist()) for n in names if n in _UNIQUE}
-                frame = frame.astype({name: _DTYPES[name] for name in frame})
+                frame = frame.astype({name: _DTYPES[name] for name in names if name not in unique})
                 del some
                 for name, texts in unique.items():
                     frame[name] = pd.array(pickle.loads(texts), dtype=_DTYPES[name])
