@@ -223,9 +223,13 @@ def _set_up_numba() -> Any:
 def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
     """Return what Numba makes of a function, with the options of the decorator called ``kind``.
 
-    Raises CoarticError where Numba is set to compile nothing.
+    Raises CoarticError where Numba is set to compile nothing, or by numbers that it refuses.
     """
-    numba = import_numba()
+    try:
+        numba = import_numba()
+    except ValueError as error:
+        words = f"Numba cannot begin ({error}): unset its variables, such as NUMBA_NUM_THREADS"
+        raise CoarticError(words) from None
     if numba.config.DISABLE_JIT:
         raise CoarticError("NUMBA_DISABLE_JIT is set: unset it, as coartic's kernels are compiled")
     # Kernels allocate nothing and work on arrays that their caller holds, so that they need not
