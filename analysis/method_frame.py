@@ -173,11 +173,15 @@ def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.Dat
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield the label of each row with the names of its colour and mark: those in its ``look``; or
     for the first methods from files the colour of own methods and a mark; or the next pair that no
-    other method has."""
+    other method has, colours that no other method has first."""
     fixed = {row["look"] for row in rows.values()}
+    taken = {look[0] for look in fixed if look}
     colors = [color for color in COLORS if color not in (OWN_COLOR, "ink")]
+    colors.sort(key=taken.__contains__)
     marks = [mark for mark in MARKS if mark != OWN_MARK]
-    free = itertools.cycle((c, m) for m in marks for c in colors if (c, m) not in fixed)
+    pairs = ((c, marks[(k + shift) % len(marks)]) for shift in range(len(marks))
+             for k, c in enumerate(colors))  # fmt: skip
+    free = itertools.cycle(pair for pair in pairs if pair not in fixed)
     theirs = itertools.chain(((OWN_COLOR, mark) for mark in MARKS), free)
     for label in sorted(rows, key=lambda label: bool(rows[label]["built_in"])):
         row = rows[label]
