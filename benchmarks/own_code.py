@@ -27,7 +27,7 @@ from coartic.method import MODULES, Method
 from coartic.model import MODEL_VERSION
 from coartic.motion.compile import PACKAGE
 
-OURS = {"coartic", "analysis", "baselines", "benchmarks"}
+OUR_PACKAGES = {"coartic", "analysis", "baselines", "benchmarks"}
 """The packages of this project, which are next to each other."""
 _LARGEST_DATA = 2**30  # bytes of a declared file
 
@@ -127,7 +127,7 @@ def _loaded() -> dict[str, str]:
 def _ours() -> tuple[str, ...]:
     """Return the absolute paths of the folders of this project's packages, as they are imported and
     with links followed."""
-    folders = [str(PACKAGE), *(str(PACKAGE / name) for name in OURS - {"coartic"})]
+    folders = [str(PACKAGE), *(str(PACKAGE / name) for name in OUR_PACKAGES - {"coartic"})]
     return tuple({*map(os.path.abspath, folders), *map(os.path.realpath, folders)})
 
 
@@ -183,7 +183,7 @@ def _built_in_versions(imported: Iterable[str]) -> list[str]:
 def _packages(imported: Iterable[str]) -> list[str]:
     """Return a line with name and version for each installed package that the ``imported`` modules
     belong to, without the packages that this project itself needs."""
-    tops = {name.partition(".")[0] for name in imported} - OURS - sys.stdlib_module_names
+    tops = {name.partition(".")[0] for name in imported} - OUR_PACKAGES - sys.stdlib_module_names
     needs = [each for each in metadata.requires("coartic") or () if "extra ==" not in each]
     ours = {_plain_name(re.split(r"[^\w.-]", each)[0]) for each in needs}
     names = {name for top in tops for name in _distributions().get(top, ())}

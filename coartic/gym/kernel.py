@@ -16,23 +16,23 @@ from coartic.motion.trial import (
     MOVE,
     account,
     begin,
-    correct,
+    correct_runs,
     empty_accounts,
     find_corrections,
-    move,
+    move_runs,
     set_off,
 )
 from coartic.robot import Array, Configs, Hands, Points, Robot
 
-Numbers = NDArray[np.int64]
+Integers = NDArray[np.int64]
 
 
 class VectorState(NamedTuple):
     """State of N environments, each on one of T tasks with G goals at most, and work space."""
 
-    task: Numbers
+    task: Integers
     """Number of the task, from 0, shape ``(N,)``."""
-    goal: Numbers
+    goal: Integers
     """Index of the next goal, from 0, shape ``(N,)``."""
     q: Configs
     """Configurations, shape ``(N, dof)``, length unit and rad."""
@@ -46,16 +46,16 @@ class VectorState(NamedTuple):
     """Observations, shape ``(N, O)`` (:func:`observe`)."""
     parameters: NDArray[np.void]
     """Robot parameters of each kind of robot (links, locks and radius), shape ``(K,)``."""
-    kinds: Numbers
+    kinds: Integers
     """Index in ``parameters`` of each task's robot, shape ``(T,)``; -1 for a task that is not
     loaded."""
     goals: Points
     """Centres of goals, shape ``(T, G, 2)``; a task has the first ``counts``."""
-    counts: Numbers
+    counts: Integers
     """Number of goals of each task, shape ``(T,)``."""
     movable: NDArray[np.bool_]
     """True where the robot of a task can move a joint, shape ``(T, E)``."""
-    joints: Numbers
+    joints: Integers
     """Indices in a configuration of the joints that are seen and moved, shape ``(E,)``."""
     sides: Hands
     """The hands that all robots have, 0 left or 1 right, shape ``(H,)``."""
@@ -73,7 +73,7 @@ class VectorState(NamedTuple):
     """The rows in ``at`` that a movement needs, shape ``(rows, SLOTS)``."""
     accounts: NDArray[np.void]
     """Accounts of the goals of the robots of a lot, shape ``(SLOTS,)``."""
-    indices: Numbers
+    indices: Integers
     """Numbers, from 0, of the robots of a lot, shape ``(SLOTS,)``."""
 
     @classmethod
@@ -81,7 +81,7 @@ class VectorState(NamedTuple):
         cls,
         robot: Robot,
         shape: tuple[int, int, int],
-        joints: Numbers,
+        joints: Integers,
         sides: Hands,
         entries: int,
         ahead: int,
@@ -172,10 +172,10 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
         _aim_by_action(
             batch.runs[i], others[i], state.movable[state.task[n]], state.actions[n], state
         )
-    move(count, robot, batch)
+    move_runs(count, robot, batch)
     for i in range(count):
         state.accounts[i].moved = batch.runs[i].ticks
-    correct(count, robot, batch)
+    correct_runs(count, robot, batch)
     for i in range(count):
         n, goal = state.indices[i], state.accounts[i]
         account(batch.runs[i], goal.moved, goal)

@@ -46,11 +46,11 @@ from coartic.motion.trial import (
     CompiledTask,
     account,
     begin,
-    correct,
+    correct_runs,
     count_goal,
     find_pulled_corrections,
     make_corrections,
-    move,
+    move_runs,
     set_off,
 )
 from coartic.motion.trial import aim as aim_at
@@ -413,13 +413,13 @@ def make_trial(
                 before = trial[n, number - 1].hand if number > 0 else NO_HAND
                 rng = generator_at(rngs, n)
                 aim(n, number, before, tables[n], explore, robot, learner, rng, workspace)
-        move(runs, robot, batch)
+        move_runs(runs, robot, batch)
         for n in range(runs):
             trial[n, number].moved = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
                 fill_row(trial[n, number].target, batch.runs[n].target)
         if first or learner.pull == 0.0:
-            correct(runs, robot, batch)
+            correct_runs(runs, robot, batch)
         else:
             find_pulled_corrections(runs, robot, batch)
             make_corrections(runs, robot, batch)

@@ -134,7 +134,7 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 
 @inner
-def set_off(at: Any, count: int, step: float) -> bool:
+def divide_steps(at: Any, count: int, step: float) -> bool:
     """Set rates, bounds and number of steps, in place, of the movements loaded into the first
     ``count`` slots, with steps of length ``step`` in joint space; ``distance``, a square before,
     becomes its root, and the present step is set to 0.
@@ -236,7 +236,7 @@ def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> Non
     at, evaluations, step = batch.at[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
     squares = largest_square(rims[0]), largest_square(rims[1])
-    near = set_off(at, count, step)
+    near = divide_steps(at, count, step)
     if stop_on_arrival:
         for j in range(len(at.q)):
             fill_row(at.q[j], at.target[j])

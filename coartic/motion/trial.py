@@ -129,7 +129,7 @@ def aim(run: Any, target: Any) -> None:
 
 
 @inlined
-def move(count: int, robot: Any, batch: Any) -> None:
+def move_runs(count: int, robot: Any, batch: Any) -> None:
     """Move each of the first ``count`` runs of a batch (records of robots) to its target, or check
     whether its hand is in the goal, as its ``action`` says (``IDLE``, ``CHECK``, ``MOVE`` or
     ``REPEAT``): phase 3, *move*. A movement ends on a hit, too. ``q``, ``hit``, ``ticks`` and
@@ -147,7 +147,7 @@ def move(count: int, robot: Any, batch: Any) -> None:
 
 
 @inlined
-def correct(count: int, robot: Any, batch: Any) -> None:
+def correct_runs(count: int, robot: Any, batch: Any) -> None:
     """Correct missed goals of the first ``count`` runs, in place: phase 4, *correct*. The
     corrective process **A** finds configurations that hit, and the runs move there; ``target`` and
     ``ticks`` of a run become the target and the ticks of its corrective movement, 0 ticks if none
@@ -333,10 +333,10 @@ def _reach_lot(
                         run.action = REPEAT
                 else:
                     fill_row(noted, target)
-            move(count, robot, batch)
+            move_runs(count, robot, batch)
             for i in range(count):
                 goals[first + i, g, m].moved = batch.runs[i].ticks
-        correct(count, robot, batch)
+        correct_runs(count, robot, batch)
         for i in range(count):
             n, moved = first + i, 0
             for m in range(goals.shape[2]):
