@@ -69,7 +69,9 @@ def methods_of(
     titles = Counter(info.title for info in declared.values())
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
-        named = in_words({varied: values[label]}) if label in values else setting
+        named = setting
+        if label in values:
+            named = in_words({varied: values[label]}) + ", default" * (not setting)
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""

@@ -189,14 +189,18 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     best, other, *_ = means.sort_values().index
     lines = printed.splitlines()
     heading = lines.index("Noise: How much exploration noise?")
-    rows = [re.match(r"learner EC1 \(σ (\S+)\) ", line) for line in lines[heading + 2 :]]
+    name = r"learner EC1 \(σ ([\d.]+)[^)]*\) "
+    rows = [re.match(name, line) for line in lines[heading + 2 :]]
     assert [float(row[1]) for row in rows[:3]] == means.sort_values().index.tolist()
     answer = " ".join(" ".join(lines).partition("Answer ")[2].split())
+    default = {0.05: ", default"}
     begin = (
-        f"learner EC1 (σ {best}) comes nearest to the optimum: its gap is {100 * means[best]:.1f} %"
+        f"learner EC1 (σ {best}{default.get(best, '')}) comes nearest to the optimum: its gap is "
+        f"{100 * means[best]:.1f} %"
     )
     assert answer.startswith(begin)
-    behind = f"Next is learner EC1 (σ {other}), {100 * (means[other] - means[best]):.1f} ["
+    difference = 100 * (means[other] - means[best])
+    behind = f"Next is learner EC1 (σ {other}{default.get(other, '')}), {difference:.1f} ["
     assert behind in answer
     plot = FIGURES["ranking"](seen)
     assert plot.data.set_index("value").gap.to_dict() == pytest.approx(means.to_dict())
