@@ -125,10 +125,6 @@ def limits(study: Study) -> dict[str, Any]:
     tasks = list(one_by_one(study).values())
     optima = [(task, study.optima.get(task.name)) for task in tasks]
     reasons = failed.reason.fillna("")
-    tuned: dict[str, list[str]] = {}
-    for info in study.declared.values():
-        if info.tuned_on and not info.tuned_on.startswith("nothing"):
-            tuned.setdefault(info.tuned_on, []).append(title_of(info))
     others = len(failed) - sum(reasons.value_counts()[:3])
     return {
         "runs": len(runs),
@@ -153,7 +149,6 @@ def limits(study: Study) -> dict[str, Any]:
                 if m.code != m.version
             }
         ),
-        "tuned": tuned,
         "late": [*chain.from_iterable(study.marks.values())],
         "cores": made_with["cores"],
         "imports": {
