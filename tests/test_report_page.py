@@ -156,6 +156,18 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
         assert accessibility.violations_count == 0, accessibility.generate_report()
 
 
+@pytest.mark.parametrize(("width", "is_narrow"), [(390, True), (1280, False)])
+def test_a_phone_shows_the_ranking_in_one_column(opened, width, is_narrow):
+    page = opened()
+    page.set_viewport_size({"width": width, "height": 900})
+    drawn = page.locator("#figure-ranking .drawn")
+    expect(drawn).to_have_count(2)
+    expect(drawn.nth(0)).to_be_visible(visible=not is_narrow)
+    expect(drawn.nth(1)).to_be_visible(visible=is_narrow)
+    shown = drawn.nth(int(is_narrow)).locator("svg").bounding_box()
+    assert shown["x"] + shown["width"] <= width
+
+
 def test_in_print_every_picture_is_there_once_and_nothing_leaves_its_box(opened):
     page = opened(688, color_scheme="dark")  # A4 within its margins
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
@@ -165,7 +177,7 @@ def test_in_print_every_picture_is_there_once_and_nothing_leaves_its_box(opened)
     figures = page.locator("figure").all()
     assert figures
     for figure in figures:
-        assert figure.locator(".drawn svg").is_visible()
+        expect(figure.locator(".drawn svg").filter(visible=True)).to_have_count(1)
     marks = page.locator("#figure-ranking use")
     assert "none" not in marks.evaluate_all("all => all.map(each => getComputedStyle(each).fill)")
     ink = page.evaluate("getComputedStyle(document.body).color")

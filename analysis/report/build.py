@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
@@ -134,7 +135,8 @@ def _plots_of(study: Study, section: Section, width: float | None = None) -> lis
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
-    pairs of a plot and its SVG; ``shown``, a dictionary for each table with rows.
+    a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, a dictionary
+    for each table with rows.
 
     Settings and ablations have rows in the ranking, in the table of contexts, whose verdicts are
     counted in a sentence, in the table of all methods, and in CSV files.
@@ -150,9 +152,13 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
                 "id": table.id, "caption": caption_of(table, frame), "rows": len(frame),
                 "settings": settings, "html": html_table(table, frame, caption_of(table, frame)),
             })  # fmt: skip
+    on_phones = _plots_of(study, section, ONE) if section.id == "ranking" else []
+    narrow = {plot.id: for_page(replace(plot, id=f"{plot.id}-narrow")) for plot in on_phones}
     return {
         "finding": about.finding(study, section),
-        "figures": [(plot, for_page(plot)) for plot in _plots_of(study, section)],
+        "figures": [
+            (plot, for_page(plot), narrow.get(plot.id, "")) for plot in _plots_of(study, section)
+        ],
         "shown": tables,
     }
 
