@@ -8,6 +8,7 @@ import re
 import unicodedata
 import warnings
 from collections.abc import Callable, Sequence
+from itertools import permutations, product
 from pathlib import Path
 from typing import Literal
 
@@ -41,12 +42,20 @@ _MANY = 20
 """Fewest hits of a subject whose times are looked at for rounding."""
 _COARSE = 10.0
 """Ticks to which times may be rounded in any case."""
+_COARSE_ANGLE = 0.02
+"""Least difference of angles, rad, from which they are said to be rounded."""
+_CENTRAL = 0.6
+"""Radii from a centre within which three of four hits are too few at the edge of a goal."""
+_OUTSIDE = 1.25
+"""Radii from the centre of a goal from which hits are not at its edge."""
 _UNRELATED = 0.3
 """Correlation of times with paths below which times may be those of the next row."""
 _SLOW_GOAL = 1.6
 """Ratio of a goal's time for a path to that of the slowest other goal, with a warning."""
 _NAMED = 5  # of a kind
 _AT_GOAL = ", at goal "
+_MONTH = "(jan|feb|m[aä]r|apr|ma[iy]|jun|jul|aug|sep|o[ck]t|nov|de[cz])[a-z]*"
+_DATE = re.compile(rf"\d+\W+{_MONTH}\W*\d*|{_MONTH}\W+\d+|\d+([-./])\d+\3\d{{2,4}}", re.IGNORECASE)
 _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
 
@@ -280,11 +289,14 @@ def why_no_number(value: object) -> str:
     """Return what is needed in place of a value that is no number: the character that spoils it,
     or advice on a missing value."""
     text = _written(str(value))
+    if _DATE.fullmatch(text):
+        return "it looks like a date that a spreadsheet made of a number: import numbers as text"
     begin = re.match(r"[+-]?\d*\.?\d*(e[+-]?\d+)?", text, re.IGNORECASE | re.ASCII)
     spoils = text[begin.end() :][:1] if begin else ""
     if not (spoils and re.search(r"\d", text)):
         return "needed is a number; leave out the row of a hit that is missing"
-    point = ": write a decimal point, and nothing between thousands" * (spoils == ",")
+    point = {",": ": write a decimal point, and nothing between thousands",
+             ":": ": write seconds, not the time of day"}.get(spoils, "")  # fmt: skip
     kind = unicodedata.name(spoils, "without a name").lower()
     return f"{spoils!r} ({kind}) makes it no number{point}"
 
@@ -296,12 +308,14 @@ def checked_hits(
     names: Sequence[str] | None = None,
     implausible: Implausible = "refuse",
     ticks_per_unit: float | None = None,
+    hint: str = "",
 ) -> pd.DataFrame:
     """Return a new frame of recorded hits, checked, unwrapped and sorted, a row for each hit:
     ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints (:func:`read_hits`).
 
     ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
-    ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole. Raises CoarticError
+    ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole; ``hint``: a sentence
+    on implausible hits. Raises CoarticError
     for a missing or wrong value, an implausible hit, and a wrapped joint that turns by more than
     2.5 rad between hits.
     """
@@ -383,6 +397,12 @@ def checked_hits(
     for name in joints[:2]:
         far = "needed is a place in the length unit of the task"
         refuse(frame[name].abs() > LARGEST_ENTRY, name, far)
+    trials = [frame.subject, frame.trial]
+    steps = np.sign(frame.groupby(trials).goal.diff()).groupby(trials)
+    turned = (steps.transform("min") * steps.transform("max") < 0) & ~frame.duplicated(
+        ["subject", "trial"]
+    )
+    mixed = [called[row] for row in np.flatnonzero(turned).tolist()]
     keys = frame.trial * (last + 1) + frame.goal
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
     frame, called = frame.iloc[order].reset_index(drop=True), [called[n] for n in order]
@@ -412,13 +432,24 @@ def checked_hits(
                 )
             if _AT_GOAL in reasons[0]:
                 advice = f"Are goals in their order? {advice}"
-            raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {advice}")
+            if fits := _remedy(frame, np.char.find(why.astype(str), " radii from ") > 0, task):
+                advice = (
+                    f"Most of these hands would be at their goals in a recording {fits}. {advice}"
+                )
+            raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {hint}{advice}")
         frame = frame[~wrong].reset_index(drop=True)
         called = [name for name, words in zip(called, why, strict=True) if not words]
     if reasons:
         warn(f"{source}: {len(reasons)} of {counted(counts.sum(), 'hit')} are left out as "
              f"implausible, {reasons[0]}{also(reasons)}")  # fmt: skip
     _warn_of_copies(frame, source)
+    _warn_of_places(frame, task, source)
+    if mixed:
+        warn(f"{source}, {mixed[0]}: rows of the trial are in no order of goals, up or down; times "
+             f"are taken as from the goal with the number before{also(mixed)}")  # fmt: skip
+    for subject, hand in product(people, task.hands):
+        hits = frame[(frame.subject == subject) & (frame.hand == hand)]
+        _warn_of_values(hits, joints[task.robot.joints(hand)], f"{source}, {subject}")
     _unwrap(frame, task, source, called)
     return frame
 
@@ -480,13 +511,10 @@ def _implausible(
         for row in np.flatnonzero(wrong & (why == "")).tolist():
             why[row] = words.format(*(each[row] for each in values))
 
-    off, nearest = np.zeros(len(frame)), goal.copy()
-    for hand in task.hands:
-        rows = (frame.hand == hand).to_numpy()
-        places = task.robot.forward_kinematics(q[rows], hand)
-        ways = np.linalg.norm(places[:, None] - task.goal_array, axis=2)
-        off[rows] = ways[np.arange(len(ways)), goal[rows] - 1]
-        nearest[rows] = np.where(ways.min(axis=1) <= 2 * radius, ways.argmin(axis=1) + 1, 0)
+    places = _places(q, frame.hand, task)
+    ways = np.linalg.norm(places[:, None] - task.goal_array, axis=2)
+    off = ways[np.arange(len(ways)), goal - 1]
+    nearest = np.where(ways.min(axis=1) <= 2 * radius, ways.argmin(axis=1) + 1, 0)
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
         mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
@@ -515,21 +543,13 @@ def _implausible(
     way[:, 2:] -= 2 * np.pi * np.rint(way[:, 2:] / (2 * np.pi))
     straight = np.linalg.norm(way, axis=1) / PAPER.step
     known = (begins | follows) & whole
-    later = follows & whole
-    rises, paths = np.diff(ticks, prepend=0.0)[later], np.maximum(straight[later], 1.0)
-    if later.sum() >= _MANY and (rises > 0).all():
-        spread, of_rises = (np.std(np.log(each / paths)) for each in (ticks[later], rises))
-        if of_rises < spread:
-            raise CoarticError(
-                f"{source}: in every trial times rise from goal to goal, as those of a clock that "
-                "runs on; needed are times from the hit before"
-            )
+    paces = ticks / np.maximum(straight, 1.0)
+    _refuse_clocks(frame, paces, begins & whole, follows & whole, source)
     shifted = [np.log(np.roll(ticks, shift)[known]) for shift in (0, 1, -1)]
     paths = np.log(np.maximum(straight[known], 1.0))
     if known.sum() >= _MANY and min(map(np.ptp, [paths, *shifted])) > 0:
         here, *others = (np.corrcoef(each, paths)[0, 1] for each in shifted)
-        each = ticks[known] / np.maximum(straight[known], 1.0)
-        rates = pd.Series(each).groupby(goal[known]).median()
+        rates = pd.Series(paces[known]).groupby(goal[known]).median()
         slow = rates.index[rates > _SLOW_GOAL * rates.sort_values().iloc[-2:].min()].tolist()
         if here < _UNRELATED and max(others) > 2 * _UNRELATED:
             warn(
@@ -545,12 +565,14 @@ def _implausible(
                    for each in (ticks, straight))  # fmt: skip
     times = np.unique(ticks)
     least = float(np.diff(times, prepend=0.0).min())
-    is_coarse = least > max(_COARSE, 0.2 * usual) and len(times) < len(np.unique(q, axis=0))
+    is_coarse = least > max(2.0, 0.1 * usual) and len(times) < len(np.unique(q, axis=0))
     if len(ticks) >= _MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
-        raise CoarticError(
-            f"{source}: all times are multiples of {least:g} ticks, the median hit takes {usual:g}:"
-            " they are rounded or constant; needed are times to a tenth of a hit or better"
-        )
+        words = (f"{source}: all times are multiples of {least:g} ticks, the median hit takes "
+                 f"{usual:g}: they are rounded or constant; needed are times to a tenth of a hit "
+                 "or better")  # fmt: skip
+        if least > max(_COARSE, 0.2 * usual):
+            raise CoarticError(words)
+        warn(words)
     ratio = usual / max(path, 1.0)
     if known.any() and (usual > _SLOWEST * slowest or not 0.1 < ratio < 8):
         likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * ratio)))
@@ -573,6 +595,137 @@ def _implausible(
         words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
         mark(ticks > _SLOWEST * slowest, words, ticks)
     return why
+
+
+def _refuse_clocks(
+    hits: pd.DataFrame,
+    paces: Array,
+    first: NDArray[np.bool_],
+    later: NDArray[np.bool_],
+    source: str,
+) -> None:
+    """Raise CoarticError if the times of a subject are those of a clock that runs on from goal to
+    goal, and warn if those of some trials are.
+
+    ``paces``: ticks for each of a straight path, (n,); ``first`` and ``later``: hits of goal 1, and
+    hits whose goal before was hit, too.
+    """
+    if later.sum() < _MANY:
+        return
+    ticks, trial = hits.ticks.to_numpy(np.float64), hits.trial.to_numpy(np.int64)[later]
+    rises = np.diff(ticks, prepend=0.0)[later]
+    of_ticks = np.log(paces[later])
+    of_rises = of_ticks + np.log(np.maximum(rises, 1e-9) / ticks[later])
+    needed = "as those of a clock that runs on; needed are times from the hit before"
+    if (rises > 0).all() and np.std(of_rises) < np.std(of_ticks):
+        raise CoarticError(f"{source}: in every trial times rise from goal to goal, {needed}")
+    usual = np.median(np.log(paces[first])) if first.any() else np.nan
+    errors = [np.bincount(trial, np.abs(each - usual)) for each in (of_ticks, of_rises)]
+    clocks = [f"{number}" for number in np.flatnonzero(errors[1] < errors[0] / 2)]
+    if _NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
+        warn(f"{source}, trial {clocks[0]}: times rise from goal to goal, {needed}{also(clocks)}")
+
+
+def _places(q: Array, hands: pd.Series, task: Task) -> Array:
+    """Return where the hands of hits are, ``(n, 2)``; ``q``: their postures, ``(n, dof)``."""
+    places = np.empty((len(q), 2))
+    for hand in task.hands:
+        rows = (hands == hand).to_numpy()
+        places[rows] = task.robot.forward_kinematics(q[rows], hand)
+    return places
+
+
+def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
+    """Return a change of a recording, in words, that puts four of five hits that are far from their
+    goals there; empty if none of those that are tried does."""
+    joints, hands = [*task.robot.joint_names], frame.hand
+    q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
+    arms = [task.robot.joints(hand) for hand in task.hands]
+    is_base, between, mirrored = column < 2, q.copy(), -q
+    for arm in arms:
+        between[:, arm] = np.diff(q[:, arm], axis=1, prepend=0.0)
+        mirrored[:, arm.start] += np.pi
+    tried = [
+        ("in which degrees are made rad", np.where(is_base, q, np.deg2rad(q)), hands),
+        ("in which turns are made rad", np.where(is_base, q, 2 * np.pi * q), hands),
+        ("in which angles are anticlockwise", np.where(is_base, q, -q), hands),
+        ("in which angles are from the link before, not from the x axis", between, hands),
+        ("that is mirrored", mirrored, hands),
+        ("with each posture a row lower", np.roll(q, 1, axis=0), hands),
+        ("with each posture a row higher", np.roll(q, -1, axis=0), hands),
+        ("in which hands are swapped", q, hands.map({"left": "right", "right": "left"})),
+    ][: 7 + (len(arms) == 2)]
+    for unit in (10.0, 100.0, 1000.0):
+        tried.append(
+            (f"in which the base is divided by {unit:g}", q / np.where(is_base, unit, 1), hands)
+        )
+    for k, name in enumerate(joints):
+        tried.append((f"with the other sign of {name}", np.where(column == k, -q, q), hands))
+    if len({arm.stop - arm.start for arm in arms}) == 1 and len(arms) == 2:
+        order = np.concatenate([column[:2], column[arms[1]], column[arms[0]]])
+        tried.append(("in which the columns of the arms are swapped", q[:, order], hands))
+    for arm in arms:
+        for each in permutations(column[arm].tolist()):
+            order = column.copy()
+            order[arm] = each
+            names = ", ".join(joints[k] for k in each)
+            tried.append((f"with columns in the order {names}", q[:, order], hands))
+    goals = task.goal_array[frame.goal.to_numpy(np.int64) - 1]
+    if far.sum() < 3:
+        return ""
+    for words, postures, whose in tried:
+        off = np.linalg.norm(_places(postures, whose, task) - goals, axis=1)
+        if (off[far] <= 2 * task.radius).mean() > 0.8:
+            return words
+    return ""
+
+
+def _warn_of_places(frame: pd.DataFrame, task: Task, source: str) -> None:
+    """Warn of hits that are nearly all close to the centres of goals, and of a goal outside of
+    which hits are much more often than at others."""
+    q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
+    places = _places(q, frame.hand, task)
+    ways = places - task.goal_array[goals - 1]
+    off = np.linalg.norm(ways, axis=1) / task.radius
+    if len(off) >= _MANY and (outer := float(np.quantile(off, 0.75))) < _CENTRAL:
+        warn(f"{source}: three of four hits are within {outer:.2g} radii of the centres of goals: "
+             "is the radius a diameter, or are postures those of rests after hits?")  # fmt: skip
+    for goal in np.unique(goals):
+        here = goals == goal
+        if min(here.sum(), (~here).sum()) < _MANY:
+            continue
+        share, others = ((off[rows] > _OUTSIDE).mean() for rows in (here, ~here))
+        if share > max(0.3, 2.5 * others):
+            (x, y), (off_x, off_y) = places[here].mean(axis=0), ways[here].mean(axis=0)
+            warn(f"{source}: {100 * share:.0f} % of the hits of goal {goal} are more than "
+                 f"{_OUTSIDE:g} radii from its centre, of others {100 * others:.0f} %. Their mean "
+                 f"is ({x:.3g}, {y:.3g}), ({off_x:+.2g}, {off_y:+.2g}) from it: is the goal "
+                 "elsewhere?")  # fmt: skip
+
+
+def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
+    """Warn if an angle of an arm is rounded, or if one value or posture is that of many hits of a
+    goal; ``hits``: those of a subject with this arm."""
+    if (postures := len(hits[joints].drop_duplicates())) < _MANY:
+        return
+    for name in joints:
+        angles = np.unique(hits[name])
+        least = float(np.diff(angles).min(initial=np.inf))
+        if 2 < len(angles) < postures / 2 and least > _COARSE_ANGLE:
+            warn(f"{source}: {name} has {len(angles)} values, {least:.2g} rad apart or more: is it "
+                 "rounded?")  # fmt: skip
+            return
+    numbers = pd.Series(hits.groupby([*joints]).ngroup(), name="the posture")
+    for values in (numbers, *(hits[name] for name in joints)):
+        for goal, of_goal in values.groupby(hits.goal):
+            n = len(of_goal)
+            most, second = [*of_goal.value_counts().tolist(), 0][:2]
+            fewest = 3 if values is numbers else max(5, 0.1 * n)
+            is_odd = most >= max(fewest, 3 * second) and n - most >= 4
+            if is_odd and 2 * (of_goal.nunique() - 1) > n - most:
+                warn(f"{source}: {values.name} is the same in {most} of {n} hits of goal {goal:g}: "
+                     "is it filled in, out of range, or stuck?")  # fmt: skip
+                return
 
 
 def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
