@@ -202,7 +202,7 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
                 headings = [*map(_written, fields)]
                 for separator in ";\t|" if len(fields) == 1 else "":
                     if separator in fields[0]:
-                        _refuse_separator(path, separator, f": found are {headings[0]}")
+                        _refuse_separator(path, separator, headings[0])
             elif len(fields) != len(headings):
                 wrong.append((reader.line_num, len(fields)))
             else:
@@ -225,12 +225,13 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
     return pd.DataFrame(rows, columns=headings, dtype=object), lines
 
 
-def _refuse_separator(path: str | Path, separator: str, found: str = "") -> None:
-    """Raise CoarticError for a file whose values are separated by anything else than commas."""
+def _refuse_separator(path: str | Path, separator: str, headings: str = "") -> None:
+    """Raise CoarticError for a file whose values are separated by anything else than commas;
+    ``headings``: its first line, which the message then shows."""
     if separator != ",":
         raise CoarticError(
             f"{path}: the separator is {separator!r}; needed are values separated by commas, and "
-            f"numbers with a decimal point{found}"
+            f"numbers with a decimal point{f': found are {headings}' * bool(headings)}"
         )
 
 
@@ -272,9 +273,11 @@ def as_names(values: pd.Series) -> pd.Series:
 
 def as_numbers(values: pd.Series) -> NDArray[np.float64]:
     """Return numbers, shape ``(n,)``, also of texts with typographic minus signs; NaN for a value
-    that is no number."""
+    that is no number. Infinity is one, True and False are not."""
     if infer_dtype(values, skipna=True) in ("boolean", "mixed", "mixed-integer"):
-        values = values.astype(object).where(~values.map(lambda value: isinstance(value, bool)))
+        values = values.astype(object).where(
+            ~values.map(lambda value: isinstance(value, bool | np.bool_))
+        )
     elif values.dtype.kind not in "iufO":  # durations of pandas would be nanoseconds
         values = values.astype(str)
     numbers = pd.to_numeric(values, errors="coerce")
@@ -308,14 +311,12 @@ def checked_hits(
     names: Sequence[str] | None = None,
     implausible: Implausible = "refuse",
     ticks_per_unit: float | None = None,
-    hint: str = "",
 ) -> pd.DataFrame:
     """Return a new frame of recorded hits, checked, unwrapped and sorted, a row for each hit:
     ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints (:func:`read_hits`).
 
     ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
-    ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole; ``hint``: a sentence
-    on implausible hits. Raises CoarticError
+    ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole. Raises CoarticError
     for a missing or wrong value, an implausible hit, and a wrapped joint that turns by more than
     2.5 rad between hits.
     """
@@ -436,7 +437,7 @@ def checked_hits(
                 advice = (
                     f"Most of these hands would be at their goals in a recording {fits}. {advice}"
                 )
-            raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {hint}{advice}")
+            raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {advice}")
         frame = frame[~wrong].reset_index(drop=True)
         called = [name for name, words in zip(called, why, strict=True) if not words]
     if reasons:
@@ -459,8 +460,9 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
 
     ``frame``, sorted, with rows from 0, has columns ``subject``, ``trial``, ``goal`` and one for
     each joint, rad; in messages ``source`` names the recording and ``names`` each row. Warns if
-    angles change. Raises CoarticError if a joint of a subject jumps by 2π somewhere and turns by
-    more than :data:`_AMBIGUOUS` between hits: then its direction is in doubt.
+    angles change. Raises CoarticError if a joint of a subject turns by more than
+    :data:`_AMBIGUOUS` between hits, or from the start to the first, so that its direction is in
+    doubt, and somewhere jumps by 2π or differs by more than π between hits of one goal.
     """
     joints = [*task.robot.joint_names][2:]
     angles = frame[joints].to_numpy(np.float64)
@@ -621,9 +623,9 @@ def _refuse_clocks(
         raise CoarticError(f"{source}: in every trial times rise from goal to goal, {needed}")
     usual = np.median(np.log(paces[first])) if first.any() else np.nan
     errors = [np.bincount(trial, np.abs(each - usual)) for each in (of_ticks, of_rises)]
-    clocks = [f"{number}" for number in np.flatnonzero(errors[1] < errors[0] / 2)]
+    clocks = [f"trial {number}" for number in np.flatnonzero(errors[1] < errors[0] / 2)]
     if _NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
-        warn(f"{source}, trial {clocks[0]}: times rise from goal to goal, {needed}{also(clocks)}")
+        warn(f"{source}, {clocks[0]}: times rise from goal to goal, {needed}{also(clocks)}")
 
 
 def _places(q: Array, hands: pd.Series, task: Task) -> Array:
@@ -729,8 +731,11 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
 
 
 def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
-    """Warn if trials of a subject, or at least three different trials of several, are there twice
-    or more, equal in all numbers."""
+    """Warn of trials that are equal in all columns but subject and trial, as if copied.
+
+    One such pair within a subject is enough; between subjects, where a chance is larger, it takes
+    at least three different trials that occur twice or more. ``source`` begins the warning.
+    """
     hits = pd.util.hash_pandas_object(frame.drop(columns=["subject", "trial"]), index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
     copies = trials[trials.duplicated(keep=False)]

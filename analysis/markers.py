@@ -45,6 +45,18 @@ _FAR_START = 0.05
 """Angle of a joint in the first posture from the task's start, rad, with a warning if its sign is
 the same in nearly all trials."""
 _NEARLY_ALL = 0.9
+_FAR_POSTURE = 0.3
+"""Distance of the first posture from the task's start, length unit and rad, with a warning."""
+_COARSE = 0.2
+"""Radii to which places are rounded, with a warning."""
+_SKIPPED = 1.6
+"""Way of markers between samples, in those before and after, that may be a frame that is lost."""
+_MANY_SKIPPED = 0.02
+"""Share of such ways in fast movements, with a warning."""
+_STRETCH = 0.005
+"""Share of its length by which (SD) a link follows a joint, with a warning."""
+_FOLLOWS = 0.3
+"""Correlation of a link's length with an angle from which it follows the joint."""
 
 
 @checked_arguments
@@ -179,10 +191,14 @@ def hits_from_markers(
     agree("the time between samples", np.array(paces), 0, _TOLERANCE * step, np.inf,
           "correct the clock, or sample all trials at one rate")  # fmt: skip
     held = np.zeros(len(frame), dtype=bool)
+    coarse, rounded = _COARSE, ""
     places, missing_for = {}, np.zeros(len(frame))  # s, at the first sample of a gap
     for hand in hands:
         values = np.stack([as_numbers(frame[name]) for name in columns[hand]], axis=1)
         for name, column in zip(columns[hand], values.T, strict=True):
+            grid = np.unique(np.round(column[np.isfinite(column)] / task.radius, 6))
+            if len(grid) >= _MANY and (least := np.diff(grid).min()) > coarse:
+                coarse, rounded = least, name
             for row in np.flatnonzero(np.isnan(column) & frame[name].notna()).tolist():
                 if (why := why_no_number(frame[name][row])) and "leave out" not in why:
                     refuse(np.arange(len(frame)) == row, f"{name} is {frame[name][row]!r}; {why}")
@@ -341,6 +357,20 @@ def hits_from_markers(
         warn(f"{source}, {names[row]}: {culprit[row]}{words}{also([names[n] for n in bridged])}")
     if unfinished:
         warn(missed)
+    if rounded:
+        warn(f"{source}: {rounded} is rounded to {coarse * task.radius:.2g}, the radius of goals "
+             f"is {task.radius:g}: are there more digits?")  # fmt: skip
+    every = np.hstack([places[hand].reshape(len(frame), -1) for hand in hands])
+    ways = np.diff(every, axis=0, prepend=np.nan)
+    ways[begins | leap] = np.nan
+    if (words := _odd_steps(ways)) and _odd_steps(ways / np.where(begins, 1, steps)[:, None]):
+        warn(f"{source}: {words}")
+    for hand in hands:
+        joints = task.robot.joints(hand)
+        names_of = task.robot.joint_names[joints]
+        for link, name, words in _stretches(lengths[hand][used], q[used, joints], names_of):
+            warn(f"{source}: the length of {hand} link {link} follows {name}, {words}: does a "
+                 "marker slide over a joint?")  # fmt: skip
     if absent := [hand for hand in task.hands if hand not in hands]:
         warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
     for places_of, words in (
@@ -352,11 +382,15 @@ def hits_from_markers(
                  f"which counts as movement{also([names[row] for row in places_of])}")  # fmt: skip
     start = np.median(starts, axis=0)
     same = np.mean(np.sign(starts) == np.sign(start), axis=0) >= _NEARLY_ALL
+    distance = float(np.median(np.linalg.norm(starts, axis=1)))
     far_joints = [f"{task.robot.joint_names[k]} {start[k]:+.2f}" for k in range(2, len(start))
                   if same[k] and abs(start[k]) > _FAR_START]  # fmt: skip
     if far_joints:
         warn(f"{source}: the median trial begins at {', '.join(far_joints)} rad from the start of "
              f"task {task.name!r}: are trials cut late, or is its start another?")  # fmt: skip
+    elif distance > _FAR_POSTURE:
+        warn(f"{source}: the median trial begins {distance:.2g} (length unit, rad) from the start "
+             f"of task {task.name!r}, in varied directions: is there one start?")  # fmt: skip
     table = pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks",
                                         *task.robot.joint_names])  # fmt: skip
     for hand in {*HANDS}.difference(task.hands):
@@ -365,6 +399,46 @@ def hits_from_markers(
     hits = checked_hits(table, task, source, calls, implausible)
     hits.attrs["unfinished"] = len(unfinished)
     return hits
+
+
+def _odd_steps(ways: Array) -> str:
+    """Return, in words, that most samples repeat the one before, or that in many markers go twice
+    as far as before and after; empty if neither is so.
+
+    ``ways``: of coordinates of markers from sample to sample, ``(n, coordinates)``, NaN where a
+    trial begins and after gaps.
+    """
+    moves = np.flatnonzero((ways != 0).any(axis=1) & np.isfinite(ways).all(axis=1))
+    if len(moves) < _MANY:
+        return ""
+    if np.median(np.diff(moves)) >= 2:
+        return "most samples have the places of the one before: leave out samples that repeat"
+    around = (ways[:-2] + ways[2:]) / 2
+    way = np.linalg.norm(around, axis=1)
+    fast = np.isfinite(way) & np.isfinite(ways[1:-1]).all(axis=1)
+    fast &= way > np.median(way[fast]) if fast.any() else False
+    ratios = (ways[1:-1] * around).sum(axis=1)[fast] / way[fast] ** 2
+    if (skipped := int((ratios > _SKIPPED).sum())) <= _MANY_SKIPPED * len(ratios):
+        return ""
+    return (f"{counted(skipped, 'time')} markers go twice as far between samples as before and "
+            "after: are frames lost, and times numbered anew?")  # fmt: skip
+
+
+def _stretches(lengths: Array, angles: Array, names: Sequence[str]) -> list[tuple[int, str, str]]:
+    """Return links whose lengths change with a joint at one of their ends, other than the first of
+    the arm, each as number, name of the joint, and by how much; ``lengths`` and ``angles``:
+    ``(n, links)`` of an arm."""
+    found = []
+    for link, length in enumerate(lengths.T):
+        for joint in range(max(link, 1), min(link + 2, len(names))):
+            if not (length.std() > 0 < angles[:, joint].std()):
+                continue
+            correlation = abs(float(np.corrcoef(length, angles[:, joint])[0, 1]))
+            share = correlation * length.std() / length.mean()
+            if correlation > _FOLLOWS and share > _STRETCH:
+                found.append((link + 1, names[joint], f"by {100 * share:.1g} % (SD)"))
+                break
+    return found
 
 
 def _listed(lengths: Array) -> str:

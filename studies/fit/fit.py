@@ -213,6 +213,7 @@ def main():
     parser.add_argument("--out", help="CSV file for all numbers")
     given = parser.parse_args()
     warnings.showwarning = lambda text, *_: print(printable(f"warning: {text}"), file=sys.stderr)
+    warnings.filterwarnings("ignore", "the frame")  # checked by fit again
     try:
         check_noise(given.noise, "--noise")
         out = Path(given.out or "")
