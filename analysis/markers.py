@@ -215,6 +215,9 @@ def hits_from_markers(
             durations = _bridge(at[:, marker], time, parts, step)
             culprit[durations > missing_for] = f"{hand}_{name}: "
             missing_for = np.maximum(missing_for, durations)
+    if rounded:
+        warn(f"{source}: {rounded} is rounded to {coarse * task.radius:.2g}, the radius of goals "
+             f"is {task.radius:g}: are there more digits?")  # fmt: skip
     leap = ~begins & (steps > 1.9 * step)  # clocks may be rounded
     missing_for[leap] = np.maximum(missing_for[leap], steps[leap] - step)
     lengths = {hand: np.linalg.norm(np.diff(places[hand], axis=1), axis=2) for hand in hands}
@@ -357,20 +360,19 @@ def hits_from_markers(
         warn(f"{source}, {names[row]}: {culprit[row]}{words}{also([names[n] for n in bridged])}")
     if unfinished:
         warn(missed)
-    if rounded:
-        warn(f"{source}: {rounded} is rounded to {coarse * task.radius:.2g}, the radius of goals "
-             f"is {task.radius:g}: are there more digits?")  # fmt: skip
     every = np.hstack([places[hand].reshape(len(frame), -1) for hand in hands])
     ways = np.diff(every, axis=0, prepend=np.nan)
     ways[begins | leap] = np.nan
     if (words := _odd_steps(ways)) and _odd_steps(ways / np.where(begins, 1, steps)[:, None]):
         warn(f"{source}: {words}")
-    for hand in hands:
-        joints = task.robot.joints(hand)
-        names_of = task.robot.joint_names[joints]
-        for link, name, words in _stretches(lengths[hand][used], q[used, joints], names_of):
-            warn(f"{source}: the length of {hand} link {link} follows {name}, {words}: does a "
-                 "marker slide over a joint?")  # fmt: skip
+    stretched = [
+        f"{hand} {words}"
+        for hand in hands
+        for words in _stretches(lengths[hand][used], q[used, task.robot.joints(hand)])
+    ]
+    if stretched:
+        warn(f"{source}: the length of {stretched[0]}: does a marker slide over a joint?"
+             f"{also(stretched)}")  # fmt: skip
     if absent := [hand for hand in task.hands if hand not in hands]:
         warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
     for places_of, words in (
@@ -424,21 +426,21 @@ def _odd_steps(ways: Array) -> str:
             "after: are frames lost, and times numbered anew?")  # fmt: skip
 
 
-def _stretches(lengths: Array, angles: Array, names: Sequence[str]) -> list[tuple[int, str, str]]:
-    """Return links whose lengths change with a joint at one of their ends, other than the first of
-    the arm, each as number, name of the joint, and by how much; ``lengths`` and ``angles``:
-    ``(n, links)`` of an arm."""
-    found = []
+def _stretches(lengths: Array, angles: Array) -> list[str]:
+    """Return, in words, which links, and how much, change in length with a joint at one of their
+    ends, other than the first of the arm; ``lengths`` and ``angles``: ``(n, links)``."""
+    changes = []
     for link, length in enumerate(lengths.T):
-        for joint in range(max(link, 1), min(link + 2, len(names))):
+        for joint in range(max(link, 1), min(link + 2, angles.shape[1])):
             if not (length.std() > 0 < angles[:, joint].std()):
                 continue
             correlation = abs(float(np.corrcoef(length, angles[:, joint])[0, 1]))
             share = correlation * length.std() / length.mean()
             if correlation > _FOLLOWS and share > _STRETCH:
-                found.append((link + 1, names[joint], f"by {100 * share:.1g} % (SD)"))
+                changes.append(f"link {link + 1} follows joint {joint + 1}, by {100 * share:.1g} %"
+                               " (SD)")  # fmt: skip
                 break
-    return found
+    return changes
 
 
 def _listed(lengths: Array) -> str:

@@ -202,6 +202,98 @@ def test_times_that_hold_more_or_belong_to_other_rows_are_said(people, sentence)
     assert any(re.search(f"a: {sentence}", str(each.message)) for each in said)
 
 
+ONE_ARM = load_task("ascending")
+ARM_AND_BASE = [*ONE_ARM.robot.joint_names]
+
+
+@pytest.fixture(scope="module")
+def practised():
+    """Forty trials of the plain learner with one arm."""
+    return reference.hits_of(ONE_ARM, CONDITIONS["EC1"], trials=40, seed=1, subject="a")
+
+
+def angles(change):
+    """A change of all angles of the right arm."""
+    return lambda t: t.assign(**{name: change(t[name]) for name in RIGHT_ARM})
+
+
+def in_order(*goals):
+    """A change of the order of rows in each trial."""
+    return lambda t: t.iloc[np.lexsort([t.goal.map(goals.index), t.trial])]
+
+
+def filled(t):
+    """Every third posture at goal 2 is that of the first trial."""
+    first = t[ARM_AND_BASE][t.goal == 2].iloc[0]
+    every = (t.goal == 2) & (t.trial % 3 == 1)
+    return t.assign(**{name: t[name].mask(every, first[name]) for name in ARM_AND_BASE})
+
+
+def elsewhere(task):
+    """The second goal is lower by two radii."""
+    one, (x, y), *others = task.goals
+    return task.model_copy(update={"goals": ((one, (x, y - 2 * task.radius), *others))})
+
+
+SHOWN = {
+    r"row 0: rows of the trial are in no order of goals.*also row 3, .*35 more": in_order(1, 3, 2),
+    r"a: right_1 has \d values, 0.1 rad apart or more: is it rounded": angles(
+        lambda x: (10 * x).round() / 10
+    ),
+    "a: all times are multiples of 20 ticks, .* rounded": lambda t: t.assign(
+        ticks=(t.ticks / 20).round().clip(lower=1) * 20
+    ),
+    "a: the posture is the same in 14 of 40 hits of goal 2: is it filled": filled,
+    r"a: right_4 is the same in \d of 40 hits of goal 2: .*out of range": lambda t: t.assign(
+        right_4=t.right_4.clip(upper=t.right_4.quantile(0.9))
+    ),
+    "a, trial 25: times rise from goal to goal.* clock.*also trial 26, .*11 more": lambda t: (
+        t.assign(ticks=t.ticks.where(t.trial < 25, t.groupby("trial").ticks.cumsum()))
+    ),
+    r"% of the hits of goal 2 are more than 1.25 radii .* is the goal elsewhere": elsewhere,
+    "three of four hits are within 0.4. radii .* a diameter": lambda task: task.model_copy(
+        update={"radius": 2 * task.radius}
+    ),
+}
+
+
+@pytest.mark.parametrize("sentence", SHOWN)
+def test_values_that_no_recording_has_by_chance_are_said(practised, sentence):
+    change = SHOWN[sentence]
+    of_task = change is elsewhere or "diameter" in sentence
+    hits, task = (practised, change(ONE_ARM)) if of_task else (change(practised), ONE_ARM)
+    with pytest.warns(UserWarning, match=sentence) as said:
+        assert len(checked_hits(hits, task)) == 120
+    assert len(said) == 1
+
+
+REMEDIES = {
+    "with each posture a row lower": lambda t: t.assign(**t[ARM_AND_BASE].shift(-1).ffill()),
+    "with the other sign of right_2": lambda t: t.assign(right_2=-t.right_2),
+    "with columns in the order right_4, right_3, right_2, right_1": lambda t: t.assign(
+        **dict(zip(RIGHT_ARM, t[RIGHT_ARM[::-1]].to_numpy().T, strict=True))
+    ),
+    "in which turns are made rad": angles(lambda x: x / (2 * np.pi)),
+}
+
+
+@pytest.mark.parametrize("remedy", REMEDIES)
+def test_the_change_that_mends_most_hits_is_named(practised, remedy):
+    with pytest.raises(CoarticError, match=f"would be at their goals in a recording {remedy}"):
+        checked_hits(REMEDIES[remedy](practised), ONE_ARM)
+
+
+@pytest.mark.parametrize("decimals", [6, 3])
+def test_clean_recordings_of_a_learner_and_a_planner_pass_without_a_warning(practised, decimals):
+    last, rng = practised[-3:], np.random.default_rng(0)
+    planner = practised.copy()
+    planner[["ticks", *ARM_AND_BASE]] = np.tile(last[["ticks", *ARM_AND_BASE]], (40, 1))
+    planner["ticks"] = np.rint(planner.ticks * rng.lognormal(0.2, 0.05, 120))
+    planner[RIGHT_ARM] += 0.005 * rng.standard_normal((120, 4))
+    for hits in (practised, planner):
+        assert len(checked_hits(hits.round(decimals), ONE_ARM)) == 120
+
+
 def test_hands_farther_than_two_radii_are_plausible_with_motor_noise_alone(people, read):
     noisy, joints = people.copy(), [*TASK.robot.joint_names]
     noisy[joints] += 0.02 * np.random.default_rng(0).standard_normal(noisy[joints].shape)
@@ -266,6 +358,8 @@ SPOILT = {
     "line 4: left_1 is '0,5'; ',' .comma. makes it no number: write": "0,5",
     "line 4: left_1 is '45°'; '°' .degree sign. makes it no number": "45°",
     "line 4: left_1 is '1.2.3'; '.' .full stop. makes it no number": "1.2.3",
+    "line 4: left_1 is '1-Feb'; it looks like a date that a spreadsheet made": "1-Feb",
+    "line 4: left_1 is '0:05'; ':' .colon. makes it no number: write seconds": "0:05",
     "line 4: left_1 is '1_0'; '_' .low line. makes it no number": "1_0",
     "line 4: left_1 is 'lost'; needed is a number; leave out the row": "lost",
     "line 4: left_1 is empty; needed is a number; leave out the row": "",

@@ -316,10 +316,53 @@ SAID = {
 }
 
 
+def twice(t):
+    """A sampler of 50 Hz, whose samples are each there twice at 100 Hz."""
+    return t.iloc[np.arange(len(t)) // 2 * 2]
+
+
+def dropped(t):
+    """A sixth of the frames is lost, and times are numbered anew."""
+    return t[np.random.default_rng(len(t)).random(len(t)) > 1 / 6]
+
+
+def soft(t):
+    """The marker of the elbow slides by 15 mm along the arm for each rad of flexion."""
+    arm, forearm = (
+        (t[f"right_{k + 1}_x"] - t[f"right_{k}_x"])
+        + 1j * (t[f"right_{k + 1}_y"] - t[f"right_{k}_y"])
+        for k in (1, 2)
+    )
+    slides = 0.015 * (np.angle(forearm / arm) - 1.4) * arm / abs(arm)
+    return t.assign(right_2_x=t.right_2_x + slides.map(np.real),
+                    right_2_y=t.right_2_y + slides.map(np.imag))  # fmt: skip
+
+
+SAID |= {
+    "most samples have the places of the one before": each_trial(twice),
+    "right_._. is rounded to 0.003, the radius of goals is 0.01": lambda t: t.assign(
+        **(t.iloc[:, 3:] / 0.003).round() * 0.003
+    ),
+    r"\d+ times markers go twice as far between samples .* numbered anew": each_trial(dropped),
+    r"the length of right link 1 follows joint 2, by 1 % .* slide over a joint.*link 2": soft,
+}
+
+
 @pytest.mark.parametrize("sentence", SAID)
 def test_what_counts_as_movement_or_is_cut_from_it_is_said(sentence):
     with pytest.warns(UserWarning, match=sentence):
         assert len(hits_from_markers(SAID[sentence](noisy(recorded(RIGHT))), RIGHT)) == 16
+
+
+def test_starts_far_in_varied_directions_are_said():
+    parts = []
+    for trial, sign in enumerate([1, -1, 1, -1, -1, 1], 1):
+        right = tuple(RIGHT.q0[-3:] + sign * np.array([0.2, -0.25, 0.1]))
+        start = RIGHT.start.model_copy(update={"right": right})
+        task = RIGHT.model_copy(update={"start": start})
+        parts.append(recorded(task, 1).assign(trial=trial))
+    with pytest.warns(UserWarning, match="begins 0.34 .length unit, rad. from .* varied"):
+        assert len(hits_from_markers(pd.concat(parts), RIGHT)) == 24
 
 
 def test_a_base_that_moves_a_little_is_said():
