@@ -73,7 +73,9 @@ def read_hits(
     count; columns of an arm or a joint that the task does not use are left out with a warning.
     Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
     start of the task on, with a warning. Warns, too, if an arm of the task would be much faster or
-    slower, if trials are there twice, and if a name is spelt in two ways.
+    slower, if trials are there twice, a name is spelt in two ways, rows are in no order of goals,
+    values are rounded or repeat, times seem to be of other rows, of reactions or of a clock that
+    runs on in some trials, and if hits contradict the place or the radius of goals.
 
     Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
     radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
@@ -513,7 +515,7 @@ def _implausible(
         for row in np.flatnonzero(wrong & (why == "")).tolist():
             why[row] = words.format(*(each[row] for each in values))
 
-    places = _places(q, frame.hand, task)
+    places = _hand_places(q, frame.hand, task)
     ways = np.linalg.norm(places[:, None] - task.goal_array, axis=2)
     off = ways[np.arange(len(ways)), goal - 1]
     nearest = np.where(ways.min(axis=1) <= 2 * radius, ways.argmin(axis=1) + 1, 0)
@@ -628,7 +630,7 @@ def _refuse_clocks(
         warn(f"{source}, {clocks[0]}: times rise from goal to goal, {needed}{also(clocks)}")
 
 
-def _places(q: Array, hands: pd.Series, task: Task) -> Array:
+def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
     """Return where the hands of hits are, ``(n, 2)``; ``q``: their postures, ``(n, dof)``."""
     places = np.empty((len(q), 2))
     for hand in task.hands:
@@ -677,7 +679,7 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
         return ""
     shares = []
     for _, postures, whose in tried:
-        off = np.linalg.norm(_places(postures, whose, task) - goals, axis=1)
+        off = np.linalg.norm(_hand_places(postures, whose, task) - goals, axis=1)
         shares.append(float((off[far] <= 2 * task.radius).mean()))
     best = int(np.argmax(shares))
     return tried[best][0] if shares[best] > 0.8 else ""
@@ -687,7 +689,7 @@ def _warn_of_places(frame: pd.DataFrame, task: Task, source: str) -> None:
     """Warn of hits that are nearly all close to the centres of goals, and of a goal outside of
     which hits are much more often than at others."""
     q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
-    places = _places(q, frame.hand, task)
+    places = _hand_places(q, frame.hand, task)
     ways = places - task.goal_array[goals - 1]
     off = np.linalg.norm(ways, axis=1) / task.radius
     if len(off) >= _MANY and (outer := float(np.quantile(off, 0.75))) < _CENTRAL:

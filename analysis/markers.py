@@ -47,7 +47,7 @@ the same in nearly all trials."""
 _NEARLY_ALL = 0.9
 _FAR_POSTURE = 0.3
 """Distance of the first posture from the task's start, length unit and rad, with a warning."""
-_COARSE = 0.2
+_COARSE_PLACE = 0.2
 """Radii to which places are rounded, with a warning."""
 _SKIPPED = 1.6
 """Way of markers between samples, in those before and after, that may be a frame that is lost."""
@@ -74,7 +74,9 @@ def hits_from_markers(
     radius, or after such a place on the straight line between samples, in the order of the goals;
     its time and posture are interpolated to where the tip enters the goal. Gaps of up to 50 ms
     (empty, NaN, or both coordinates 0) are bridged by a straight line, with a warning. An arm
-    without markers keeps its start, with a warning.
+    without markers keeps its start, with a warning. Warns, too, of samples that repeat, places that
+    are rounded, frames that seem lost, links whose length follows a joint, trials that begin away
+    from the task's start, and rests on the way.
 
     Parameters
     ----------
@@ -191,7 +193,7 @@ def hits_from_markers(
     agree("the time between samples", np.array(paces), 0, _TOLERANCE * step, np.inf,
           "correct the clock, or sample all trials at one rate")  # fmt: skip
     held = np.zeros(len(frame), dtype=bool)
-    coarse, rounded = _COARSE, ""
+    coarse, rounded = _COARSE_PLACE, ""
     places, missing_for = {}, np.zeros(len(frame))  # s, at the first sample of a gap
     for hand in hands:
         values = np.stack([as_numbers(frame[name]) for name in columns[hand]], axis=1)

@@ -176,7 +176,7 @@ def test_a_hit_of_zeros_is_no_posture_of_the_fit(people):
 def test_a_person_in_two_files_is_refused_and_several_files_are_fitted(
     people, tmp_path, monkeypatch, capsys
 ):
-    still = people[people.trial == 1]
+    still = pd.concat([people[people.trial == 1].assign(trial=trial) for trial in (1, 2)])
     paths = [tmp_path / name for name in ("a.csv", "b.csv", "c.csv")]
     for path, name in zip(paths, "xyx", strict=True):
         still.assign(subject=name).to_csv(path, index=False)
@@ -184,7 +184,9 @@ def test_a_person_in_two_files_is_refused_and_several_files_are_fitted(
         monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", *map(str, files)])
         with pytest.raises(SystemExit, match="2"):
             FIT.main()
-        assert re.search(words, capsys.readouterr().err)
+        printed = capsys.readouterr().err
+        assert re.search(words, printed)
+        assert printed.count("trials are equal to others") == len(files)  # once for each
 
 
 @pytest.mark.parametrize(
