@@ -53,6 +53,8 @@ _SKIPPED = 1.6
 """Way of markers between samples, in those before and after, that may be a frame that is lost."""
 _MANY_SKIPPED = 0.02
 """Share of such ways in fast movements, with a warning."""
+_STEPS = 5
+"""Steps to which places are rounded, in ways that are compared."""
 _STRETCH = 0.005
 """Share of its length by which (SD) a link follows a joint, with a warning."""
 _FOLLOWS = 0.3
@@ -193,7 +195,7 @@ def hits_from_markers(
     agree("the time between samples", np.array(paces), 0, _TOLERANCE * step, np.inf,
           "correct the clock, or sample all trials at one rate")  # fmt: skip
     held = np.zeros(len(frame), dtype=bool)
-    coarse, rounded = _COARSE_PLACE, ""
+    coarse, rounded = 0.0, ""
     places, missing_for = {}, np.zeros(len(frame))  # s, at the first sample of a gap
     for hand in hands:
         values = np.stack([as_numbers(frame[name]) for name in columns[hand]], axis=1)
@@ -217,7 +219,7 @@ def hits_from_markers(
             durations = _bridge(at[:, marker], time, parts, step)
             culprit[durations > missing_for] = f"{hand}_{name}: "
             missing_for = np.maximum(missing_for, durations)
-    if rounded:
+    if coarse > _COARSE_PLACE:
         warn(f"{source}: {rounded} is rounded to {coarse * task.radius:.2g}, the radius of goals "
              f"is {task.radius:g}: are there more digits?")  # fmt: skip
     leap = ~begins & (steps > 1.9 * step)  # clocks may be rounded
@@ -365,7 +367,9 @@ def hits_from_markers(
     every = np.hstack([places[hand].reshape(len(frame), -1) for hand in hands])
     ways = np.diff(every, axis=0, prepend=np.nan)
     ways[begins | leap] = np.nan
-    if (words := _odd_steps(ways)) and _odd_steps(ways / np.where(begins, 1, steps)[:, None]):
+    rates = step / np.where(begins, step, steps)[:, None]
+    least = _STEPS * coarse * task.radius
+    if (words := _odd_steps(ways, least)) and _odd_steps(ways * rates, least):
         warn(f"{source}: {words}")
     stretched = [
         f"{hand} {words}"
@@ -405,12 +409,13 @@ def hits_from_markers(
     return hits
 
 
-def _odd_steps(ways: Array) -> str:
+def _odd_steps(ways: Array, least: float) -> str:
     """Return, in words, that most samples repeat the one before, or that in many markers go twice
     as far as before and after; empty if neither is so.
 
     ``ways``: of coordinates of markers from sample to sample, ``(n, coordinates)``, NaN where a
-    trial begins and after gaps.
+    trial begins and after gaps; ``least``: the shortest of them that are compared, as a rounded
+    place can double shorter ones.
     """
     moves = np.flatnonzero((ways != 0).any(axis=1) & np.isfinite(ways).all(axis=1))
     if len(moves) < _MANY:
@@ -420,9 +425,9 @@ def _odd_steps(ways: Array) -> str:
     around = (ways[:-2] + ways[2:]) / 2
     way = np.linalg.norm(around, axis=1)
     fast = np.isfinite(way) & np.isfinite(ways[1:-1]).all(axis=1)
-    fast &= way > np.median(way[fast]) if fast.any() else False
+    fast &= way > max(least, np.median(way[fast])) if fast.any() else False
     ratios = (ways[1:-1] * around).sum(axis=1)[fast] / way[fast] ** 2
-    if (skipped := int((ratios > _SKIPPED).sum())) <= _MANY_SKIPPED * len(ratios):
+    if (skipped := int((ratios > _SKIPPED).sum())) <= max(2, _MANY_SKIPPED * len(ratios)):
         return ""
     return (f"{counted(skipped, 'time')} markers go twice as far between samples as before and "
             "after: are frames lost, and times numbered anew?")  # fmt: skip
