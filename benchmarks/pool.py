@@ -167,9 +167,11 @@ class Workers:
                     begun = worker.since_s < math.inf or exit_code == _UNKEPT
                     lost = 0 if begun else lost + 1
                     if lost == _STARTS:
-                        raise CoarticError(
-                            f"processes cannot begin {worker.last_output}; finished runs are kept"
-                        )
+                        reason = worker.last_output
+                        _, is_sentence, sentence = reason.rpartition("CoarticError: ")
+                        reason = f": {sentence}" if is_sentence else f" {reason}"
+                        words = f"processes cannot begin{reason}; finished runs are kept"
+                        raise CoarticError(words)
                     if lost:
                         time.sleep(_POLL_S)  # a killed server may not have ended yet
                     elif exit_code in _REPEATED and not (spins or id(job) in repeated):

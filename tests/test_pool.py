@@ -17,7 +17,7 @@ from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
 from coartic.runs.store import writing
-from tests.support.processes import comes, folders_of_session, processes
+from tests.support.processes import comes, folders_of_session, processes, python
 from tests.support.suites import KNOWN, cell_on, made_once, planned, run_and_write
 
 pytestmark = pytest.mark.process
@@ -354,6 +354,13 @@ def test_workers_that_cannot_begin_get_a_sentence():
     job = replace(PLAN[0], cell=replace(PLAN[0].cell, task=task), numbers=(0,))
     with pytest.raises(CoarticError, match="processes cannot begin"):
         list(Local(1).perform([job] * 10))
+
+
+def test_what_keeps_workers_from_beginning_is_said_without_a_traceback(tmp_path):
+    words = ["run", "comparison", "--tasks", "two-armed-1", "--methods", "EC2", "--runs", "1"]
+    done = python("-m", "coartic", *words, cwd=tmp_path, fails=True, NUMBA_DISABLE_JIT="1")
+    assert "cannot begin: NUMBA_DISABLE_JIT is set: unset it" in done.stderr
+    assert "File" not in done.stderr
 
 
 SCRIPT = """
