@@ -827,7 +827,7 @@ def _explain(path: Path, error: Exception) -> str:
         said = _SENTENCES.get(name, _SENTENCES.get("_".join(name.split("_")[:2]), said))
         if name.startswith("SQLITE_CANTOPEN"):
             said = _why_not_opened(path) or said
-        if "decode to UTF-8" in said:
+        if "decode to UTF-8" in said or said.startswith("no such table"):  # cut while it is open
             said = _DAMAGED
     else:
         wrong = explain_inline(error, []) if isinstance(error, ValidationError) else said
