@@ -581,3 +581,10 @@ def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, t
         whole.plan(), sick.plan()
     assert str(caught.value).startswith(f"cannot use {tmp_path / 'sick' / RUNS_FILE}: it holds")
     assert "ove it away" not in str(caught.value)
+
+
+def test_a_store_that_is_cut_while_it_is_open_gets_a_sentence(tmp_path):
+    says = pytest.raises(CoarticError, match=r"cannot use .*runs\.sqlite: it is damaged")
+    with says, writing(tmp_path / "cut") as store:
+        (tmp_path / "cut" / "runs.sqlite").write_bytes(b"")
+        store.present()
