@@ -2,7 +2,6 @@
 
 import json
 import lzma
-import re
 import sqlite3
 import subprocess
 from collections import Counter
@@ -17,7 +16,7 @@ from coartic import CoarticError, builtin_tasks, execute, load_task, objective
 from coartic.baselines.optimum import with_locks
 from coartic.motion.solution import corrective_trial, other_arm_travel
 from coartic.tasks import optima
-from coartic.tasks.families import named_by, shipped_families
+from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import best_shipped, essence
 from coartic.tasks.task import hands_of
 from tests.support.processes import ROOT, programs
@@ -259,5 +258,5 @@ def test_open_tasks_are_those_farther_than_five_per_cent_and_all_have_a_bound():
     stored = pd.read_csv(FOLDER / "open.csv", index_col=0)
     far = {e["task"] for e in DRAWN if e["bound"] - e["reward"] > 0.05 * -e["reward"]}
     assert far == set(stored.index)
-    shown = re.findall(r"`([a-z-]+/v1/i[i.0-9]+)`", (FOLDER / "README.md").read_text())
-    assert far == {name for each in shown for name in named_by(each)}
+    page = (FOLDER / "README.md").read_text("utf-8")
+    assert f"For {len(far)} random instances no method comes within 5 % of the bound" in page
