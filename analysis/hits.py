@@ -669,7 +669,11 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
         order = np.concatenate([column[:2], column[arms[1]], column[arms[0]]])
         tried.append(("in which the columns of the arms are swapped", q[:, order], hands))
     for arm in arms:
-        for each in permutations(column[arm].tolist()):
+        columns_of_arm = column[arm].tolist()
+        orders = (
+            permutations(columns_of_arm) if len(columns_of_arm) <= 4 else [columns_of_arm[::-1]]
+        )
+        for each in orders:
             order = column.copy()
             order[arm] = each
             names = ", ".join(joints[k] for k in each)

@@ -66,7 +66,7 @@ def methods_of(
     """
     rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
     varied, values = parameter_varied(runs)
-    titles = Counter(info.title for info in declared.values())
+    shown = Counter(map(title_of, declared.values()))
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
         named = setting
@@ -75,7 +75,7 @@ def methods_of(
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""
-        called = info if titles[info.title] == 1 else base  # two of one title go by their ids
+        called = info if shown[title_of(info)] == 1 else base  # of two names alike: the ids
         under = default if default in by_label and label not in values else ""
         rows[label] = {
             "base": base,

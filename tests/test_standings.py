@@ -9,7 +9,12 @@ import pytest
 
 from coartic import Task, load_task
 from coartic.analysis import standings
-from coartic.analysis.method_frame import BY_TRIAL, WITHOUT_REWARD, headline_methods
+from coartic.analysis.method_frame import (
+    BY_TRIAL,
+    WITHOUT_REWARD,
+    headline_methods,
+    methods_of,
+)
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about, render
 from coartic.analysis.report.render import columns_of
@@ -426,6 +431,16 @@ def test_settings_stand_behind_their_method_in_the_ranking():
                       "mine width=0.2": "own"}  # fmt: skip
     without = with_settings("noise_sd=0.1", "noise_sd=0.2", more=between)
     assert TABLES["ranking"](without).index.tolist() == [settings[0], "hill-climbing", settings[1]]
+
+
+def test_a_title_that_another_method_has_is_not_taken():
+    names = ["cma-es/bandit", "mine", "yours", "his", "hers"]
+    seen = study({("ascending", name): [-300, -301] for name in names})
+    titles = {"mine": "CMA-ES", "yours": "Steps", "his": "Walk", "hers": "Walk"}
+    declared = {name: replace(info, title=titles.get(name, info.title))
+                for name, info in seen.declared.items()}  # fmt: skip
+    shown = methods_of(seen.runs, declared).title
+    assert shown[names].tolist() == ["CMA-ES", "mine", "Steps", "his", "hers"]
 
 
 def test_common_tasks_have_the_order_of_the_study():
