@@ -81,10 +81,10 @@ studies: $(READY)
 	@for study in $(STUDIES); do \
 	  files=""; \
 	  for file in studies/$$study/*.v*.toml; do [ -e $$file ] && files="$$files --family-file $$file"; done; \
-	  if [ -e studies/$$study/suite.toml ]; then \
-	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; \
-	  elif [ -e studies/$$study/protocols.py ]; then \
-	    $(BIN)/python studies/$$study/protocols.py $(OUT)/$$study; fi && \
+	  if [ -e studies/$$study/protocols.py ]; then \
+	    $(BIN)/python studies/$$study/protocols.py $(OUT)/$$study; \
+	  elif [ -e studies/$$study/suite.toml ]; then \
+	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; fi && \
 	  $(BIN)/python studies/$$study/study.py $(OUT)/$$study || exit; \
 	done
 	$(BIN)/python docs/make_findings.py

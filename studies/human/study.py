@@ -33,10 +33,18 @@ FURTHER = {
     "least acceleration, stopping": MODELS["least acceleration"] | {"parameters": {"stop": 1}},
     "least jerk, stopping": MODELS["least jerk"] | {"parameters": {"stop": 1}},
     "any goals ahead": {"method": "receding-horizon"},
+    "random search by hands": {"method": "random-search", "parameters": {"idle_arm": True}},
+    "random search, idle arm still": {"method": "random-search", "parameters": {"idle_arm": False}},
+    "random search, every hand sequence": {"method": "random-search/hands"},
 }
 """Further models that some measures need: the learner after a hundredth of its practice, plans that
-stop at each goal, all points of the planner's curve."""
+stop at each goal, all points of the planner's curve, random search with the hands of other models.
+"""
+SEARCH = "random search"
+OF_TWO_ARMS = {"first movement against isolated reach", "near-tie repeats"}
+"""Measures on tasks for two arms, where random search can have other hands than a model."""
 LEVEL, RESAMPLES = 0.05, 9_999
+VALUE_KEYS = ["measure", "model", "sample", "task"]
 NOT_BEYOND = "it is not shown to exceed random search"
 FEWEST_TASKS = 10
 MARKS = {
@@ -50,13 +58,15 @@ def tidy(study):
 
     ``model``; ``task`` with its ``arms`` and ``goals`` (their numbers) and its ``best`` reward of
     any run; ``moved``, the number of the goal that was moved, to ``place`` (its y, length unit) in
-    the task ``origin``, or 0; the planner's ``horizon``; ``path``, the movement tick by tick.
+    the task ``origin``, or 0; the planner's ``horizon``; ``hands``; ``path``, the movement tick by
+    tick.
     """
     solved = study.runs[study.runs.status == "ok"]
     best = solved.groupby("task").reward.max()
     rows = []
     for cell in solved.drop_duplicates(["task", "method", "setting"]).itertuples():
         task, parameters = study.tasks[cell.task], json.loads(cell.parameters)
+        parameters["hands"] = parameters.get("hands") or ""
         learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
         origin, moved = re.fullmatch(r"(.+?)(?:\.goal(\d+)_.+)?", cell.task).groups()
         place = task.goals[int(moved) - 1][1] if moved else np.nan
@@ -73,12 +83,26 @@ def tidy(study):
                     cell.task, f"{cell.method} {cell.setting}".strip(), replay=replay
                 ).runs:
                     path = trajectory(task, run.movements)
-                    rows.append({"model": name, **facts, "path": path})
+                    rows.append({"model": name, **facts, "hands": run.hands, "path": path})
     return pd.DataFrame(rows)
 
 
+def of_control(runs, model, measure):
+    """Return a measure of two arms by task for the control of a model: random search with the hands
+    of each of its runs, whose idle arm keeps still as under EC3; of the choice of hands, random
+    search with every hand sequence."""
+    if measure == "near-tie repeats":
+        return MEASURES[measure][0](runs, "random search, every hand sequence")
+    still = model == "learner EC3"
+    search = "random search, idle arm still" if still else "random search by hands"
+    hands = runs[(runs.model == model) & (runs.arms == 2)][["task", "hands"]]
+    control = hands.merge(runs[runs.model == search], on=["task", "hands"])
+    return MEASURES[measure][0](control, search)
+
+
 def measure_effects(study):
-    """A row for each finding, model and test, in their order.
+    """Return the effects, a row for each finding, model and test, in their order, and the values
+    that they are statistics of, by measure, model and task (``sample``: ``model`` or ``control``).
 
     ``value`` with its interval, of ``tasks``; ``over_random_search``: by how much it exceeds that
     of random search; ``of_test``, the verdict of the test,
@@ -87,7 +111,18 @@ def measure_effects(study):
     """
     runs, rows = tidy(study), []
     findings = {name: each for name, each in FINDINGS.items() if name != "body-shares"}
-    measured = cache(lambda measure, model: MEASURES[measure][0](runs, model))
+    of_model = cache(lambda measure, model: MEASURES[measure][0](runs, model))
+    used = {}
+
+    def measured(measure, model):
+        """Return the values of a model and of its control, by task."""
+        control = of_model(measure, SEARCH)
+        if model != SEARCH and measure in OF_TWO_ARMS:
+            control = of_control(runs, model, measure)
+        used[measure, model, "model"] = of_model(measure, model)
+        used[measure, model, "control"] = control if model != SEARCH else control[:0]
+        return used[measure, model, "model"], used[measure, model, "control"]
+
     for name, finding in findings.items():
         silent, built_in = (by_model(finding.get(words, {})) for words in ("silent", "built_in"))
         level = LEVEL / len(finding["tests"])
@@ -101,7 +136,8 @@ def measure_effects(study):
     effects["because"] = effects.pop("because")  # the last column
     bounds = effects.bound.where(effects.duplicated(["finding", "model", "measure"]), "")
     names = effects.finding + " " + effects.model + " " + effects.measure + " " + bounds
-    return effects.set_index(names.str.strip().rename("row"))
+    values = pd.concat({key: pd.DataFrame(each) for key, each in used.items()}, names=VALUE_KEYS)
+    return effects.set_index(names.str.strip().rename("row")), values.reset_index()
 
 
 def by_model(words):
@@ -111,17 +147,16 @@ def by_model(words):
 
 def judge_test(measured, model, test, level, silent):
     """Apply one test of a finding to a model; return its columns of :func:`measure_effects`.
-    ``measured``: function of measure and model that returns values; ``level``: of the interval,
-    two-sided; ``silent``: why nothing follows for the model, or empty."""
+    ``measured``: function of measure and model that returns values of the model and its control;
+    ``level``: of the interval, two-sided; ``silent``: why nothing follows for the model, or empty.
+    """
     name, word = test["measure"], "above" if "above" in test else "below"
     bound, statistic = test[word], MEASURES[name][1]
-    values = pd.Series() if silent else measured(name, model)
+    values, control = (pd.Series(), pd.Series()) if silent else measured(name, model)
     seen, over = bootstrap([values], statistic, level), Estimate(np.nan)
     tasks = seen.n[0]
-    if tasks and model != "random search":
-        control = measured(name, "random search")
-        if len(control):
-            over = bootstrap([values, control], statistic, level)
+    if tasks and len(control):
+        over = bootstrap([values, control], statistic, level)
     verdict, because = decide(test, seen, over, tasks, silent)
     return {
         "measure": name, "bound": f"{word} {bound:g}", **seen.columns("value"), "tasks": tasks,
@@ -144,30 +179,6 @@ def decide(test, seen, over, tasks, silent):
     if agrees and min(side * over.low, side * over.high) <= 0:
         return "undecided", NOT_BEYOND
     return "agrees" if agrees else "disagrees", silent
-
-
-def judge_stored(effects):
-    """Judge stored effects of planners by the one rule. Where the difference to random search was
-    not stored, their intervals have to lie apart, which asks for more."""
-    effects = effects.copy()
-    search = effects[effects.model == "random search"].set_index(["finding", "measure", "bound"])
-    open_tests = (effects.of_test == "agrees") & (effects.model != "random search")
-    for name, row in effects[open_tests & effects.over_random_search.isna()].iterrows():
-        control = search.loc[row.finding, row.measure, row.bound]
-        above = row.bound.startswith("above")
-        near, far = ("low", "high") if above else ("high", "low")
-        apart = row[f"value_{near}"] - control[f"value_{far}"]
-        if apart <= 0 if above else apart >= 0:  # False without a control
-            effects.loc[name, ["of_test", "because"]] = "undecided", NOT_BEYOND
-    verdicts = effects.groupby(["finding", "model"]).of_test.agg(lambda each: verdict_of([*each]))
-    effects["verdict"] = [verdicts[row.finding, row.model] for row in effects.itertuples()]
-    built_in = {
-        (name, model) for name, finding in FINDINGS.items()
-        for model, verdict in by_model(finding.get("built_in", {})).items()
-        if verdicts.get((name, model)) == verdict
-    }  # fmt: skip
-    effects["built_in"] = [(row.finding, row.model) in built_in for row in effects.itertuples()]
-    return effects
 
 
 def bootstrap(sides, statistic, level):
@@ -238,16 +249,19 @@ def draw(table):
 
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
-    effects = measure_effects(study)
-    return {"results": tabulate(effects), "effects": effects}
+    effects, values = measure_effects(study)
+    return {"results": tabulate(effects), "effects": effects, "values": values}
 
 
 def main(folder=None):
-    """Measure a folder, or judge the stored effects; join finding body-shares; write all."""
-    stored = {name: pd.read_csv(HERE / f"{name}.csv", index_col=0).fillna({"because": ""})
-              for name in ("effects", "body")}  # fmt: skip
-    effects = measure_effects(load(folder)) if folder else judge_stored(stored["effects"])
-    tables = {"results": tabulate(pd.concat([effects, stored["body"]])), "effects": effects}
+    """Measure a folder, if one is given; join finding body-shares; write all."""
+    body = pd.read_csv(HERE / "body.csv", index_col=0).fillna({"because": ""})
+    tables = measure(load(folder)) if folder else {}
+    if tables:
+        tables["results"] = tabulate(pd.concat([tables["effects"], body]))
+        tables.pop("values").to_csv(
+            HERE / "values.csv.xz", float_format="%.6g", index=False, lineterminator="\n"
+        )
     write_study(HERE, tables, draw)
 
 

@@ -35,13 +35,25 @@ def test_agreement_exceeds_random_search(test, seen, over, tasks, verdict):
     assert (because == HUMAN.NOT_BEYOND) == (over[0] * over[1] < 0)
 
 
-@pytest.mark.parametrize(("low", "verdict"), [(0.9, "agrees"), (0.7, "undecided")])
-def test_stored_intervals_of_planners_lie_apart(low, verdict):
-    """Where no difference to random search was stored: [0.2, 0.8]."""
-    rows = [("two goals ahead", low, 1.2), ("random search", 0.2, 0.8)]
-    effects = pd.DataFrame(rows, columns=["model", "value_low", "value_high"]).assign(
-        finding="two-ahead", measure="m", bound="above 0.01", of_test="agrees", because="",
-        over_random_search=np.nan,
-    )  # fmt: skip
-    judged = HUMAN.judge_stored(effects).set_index("model")
-    assert judged.verdict.to_dict() == {"two goals ahead": verdict, "random search": "agrees"}
+def test_the_control_of_two_arms_has_the_hands_of_each_run(monkeypatch):
+    """Three runs of a model, of which two end in LRRR: of these two its control is twice the mean
+    of random search with LRRR."""
+    rows = [("a", "LRRR", 5), ("a", "LRRR", 6), ("a", "RLRR", 9)]
+    rows = [("learner EC3", 2, *row) for row in rows]
+    rows += [
+        ("random search by hands", 2, "a", "LRRR", 100),
+        ("random search, idle arm still", 2, "a", "LRRR", 1),
+        ("random search, idle arm still", 2, "a", "LRRR", 3),
+        ("random search, idle arm still", 2, "a", "RLRR", 8),
+        ("random search, every hand sequence", 2, "a", "RLRR", 7),
+    ]
+    runs = pd.DataFrame(rows, columns=["model", "arms", "task", "hands", "first"])
+
+    def measure(runs, model):
+        return runs[runs.model == model].groupby("task")["first"].mean()
+
+    measures = dict.fromkeys(HUMAN.OF_TWO_ARMS, (measure, np.mean))
+    monkeypatch.setattr(HUMAN, "MEASURES", measures)
+    first, repeats = "first movement against isolated reach", "near-tie repeats"
+    assert HUMAN.of_control(runs, "learner EC3", first)["a"] == (1 + 3 + 1 + 3 + 8) / 5
+    assert HUMAN.of_control(runs, "learner EC3", repeats)["a"] == 7
