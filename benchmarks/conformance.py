@@ -6,6 +6,7 @@ another process.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, pairwise
 from math import dist
@@ -116,12 +117,16 @@ def _laws_of_runs(
     first = of_kind("first")
     solutions = {task: runs["first", task].solution for task in first}
     rewards = ", ".join(f"{task} {solution.reward}" for task, solution in solutions.items())
+    by_goals = defaultdict[str, list[str]](list)
+    for task, solution in solutions.items():
+        if goals := goals_without_target(solution.movements):
+            by_goals[", ".join(map(str, goals))].append(task)
+    few = f", or are {CHECK_TRIALS} trials too few" if "trials" in info.defaults else ""
     asked = "".join(
-        f"\non {task}, only the corrective process moves to goals {', '.join(map(str, goals))}, "
-        "which have no target: is this meant?"
-        for task, solution in solutions.items()
-        if (goals := goals_without_target(solution.movements))
+        f"\nonly the corrective process moves to goals {goals} on {', '.join(names)}"
+        for goals, names in by_goals.items()
     )
+    asked += f", which have no target: is this meant{few}?" if asked else ""
     yield _law(
         "solution",
         chain(

@@ -30,6 +30,7 @@ from coartic.internal.limits import (
     MOST_RUNS,
     MOST_SEED,
     MOST_TRIALS,
+    brief_value,
     check_limits,
 )
 from coartic.internal.text import counted, unknown
@@ -69,7 +70,17 @@ def _runs_asked(value: Any) -> int | range | None:
     return value if is_range or value is None else int(value)
 
 
-_Files = tuple[Path, ...]
+def _file(value: object) -> object:
+    """Return what names a file, or refuse a method itself."""
+    if isinstance(value, str | Path):
+        return value
+    raise sentence_error(
+        f"own methods and families are named by the paths of their files, not by "
+        f"{brief_value(value)}: write it into a file, such as mine.py"
+    )
+
+
+_Files = tuple[Annotated[Path, BeforeValidator(_file)], ...]
 _plain = BeforeValidator(plain_scalar)
 
 

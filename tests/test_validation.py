@@ -194,6 +194,10 @@ def test_of_many_problems_the_first_are_said(tmp_path):
         ({"jobs": 2}, "jobs is no option: give executor=Local(jobs)"),
         ({"scheduler": "x"}, "scheduler is no option: give executor=Dask(scheduler)"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
+        (
+            {"method_files": [int]},
+            "by the paths of their files, not by <class 'int'>: write it into",
+        ),
         ({"runs": 0}, "runs is 0; it must be a whole number from 1"),
         ({"runs": True}, "runs is True; it must be a whole number"),
         ({"seed": -1}, "seed is -1; it should be at least 0"),
