@@ -32,6 +32,7 @@ _MODULES = {
     "shares": "coartic.analysis.frames",
     "solutions_of": "coartic.analysis.frames",
     "runtimes": "coartic.analysis.sections.costs",
+    "tabulate_runs": "coartic.analysis.pages",
     "with_control": "coartic.analysis.control",
     "write_study": "coartic.analysis.pages",
 }

@@ -8,12 +8,34 @@ from typing import Any
 
 import pandas as pd
 
+from coartic.analysis.signatures.measures import SIGNATURES
+from coartic.analysis.study import Study
 from coartic.analysis.words import interval, listed, number, p_value
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 
 PAGE = "README.md.jinja"
 """Name of the template of a study's page."""
+_OF_RUN = [
+    *("run_id", "task", "method", "setting", "run", "seed", "status", "trials", "reward", "hands"),
+    *("replay_reward", "replay_hands", "initial_reward", "corrective_best", "best_known"),
+]
+"""Columns of runs that a study ships."""
+
+
+@checked_arguments
+def tabulate_runs(study: Study) -> pd.DataFrame:
+    """Return what the numbers of a study rest on: a row for each run, by ``run_id``, with its task,
+    method, seed, rewards (minus ticks), hands and signatures of coarticulation, which are those of
+    the solution and, ``replay_first`` and so on, of the noiseless trial after learning.
+    """
+    runs = study.runs[_OF_RUN].assign(
+        **{name.replace(" ", "_"): study.signature(name) for name in SIGNATURES}
+    )
+    if runs.replay_reward.notna().any():
+        for name in SIGNATURES:
+            runs[f"replay_{name}".replace(" ", "_")] = study.signature(name, replay=True)
+    return runs.set_index("run_id").dropna(axis="columns", how="all")
 
 
 @checked_arguments
@@ -28,8 +50,8 @@ def write_study(
         The study's folder, with a template ``README.md.jinja``. :func:`fill_page` makes the page
         ``README.md`` from it and all CSV files of the folder, each a table named like its file.
     tables : dict
-        Tables by name; table ``results`` becomes ``results.csv``. Other CSV files of the folder
-        stay as they are.
+        Tables by name; table ``results`` becomes ``results.csv``, and ``runs``, which the page does
+        not read, ``runs.csv.xz``. Other CSV files of the folder stay as they are.
     draw : callable
         Function of table ``results``, as read from its file, that returns the figure (Matplotlib)
         to be written as ``figure.svg``.
@@ -53,7 +75,8 @@ def write_study(
     if not (folder / PAGE).is_file():
         raise CoarticError(f"{folder} is no folder of a study: it has no {PAGE}")
     for name, table in tables.items():
-        table.to_csv(folder / f"{name}.csv", float_format="%.6g")
+        file = f"{name}.csv{'.xz' if name == 'runs' else ''}"
+        table.to_csv(folder / file, float_format="%.6g")
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in folder.glob("*.csv")}
     if "results" not in stored:
         raise CoarticError(f"{folder} has no results.csv: give a table 'results'")

@@ -19,6 +19,7 @@ from coartic.analysis import (
     load,
     mean_beyond,
     means,
+    tabulate_runs,
     write_study,
 )  # fmt: skip
 
@@ -211,7 +212,8 @@ def draw(table):
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     runs = measure_runs(study)
-    return {"results": tabulate(study, runs), "claims": judge_claims(runs)}
+    tables = {"results": tabulate(study, runs), "claims": judge_claims(runs)}
+    return tables | {"runs": tabulate_runs(study)}
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from coartic.analysis import (
     mean_beyond,
     means,
     other_tasks,
+    tabulate_runs,
     write_study,
 )  # fmt: skip
 
@@ -253,6 +254,7 @@ def measure(study):
         "gains": plans.set_index(rows)[["family", "task", "horizon", "ticks", "gain"]],
         "repeats": repeats,
         "fourth": tabulate_fourth(repeats),
+        "runs": tabulate_runs(study),
         "claims": judge_claims(study, plans, repeats),
     }
 

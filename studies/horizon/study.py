@@ -23,6 +23,7 @@ from coartic.analysis import (
     load,
     mean_beyond,
     means,
+    tabulate_runs,
     write_study,
 )
 
@@ -178,6 +179,7 @@ def measure(study):
         "signatures": tabulate_signatures(plans),
         "gains": (gains := steps.set_index("task")[["family", "goals", "h", "gap", "gain"]]),
         "movements": tabulate_movements(gains.reset_index()),
+        "runs": tabulate_runs(study),
         "claims": judge_claims(study, plans),
         "repeats": pd.concat(repeats, names=["nodes"]).reset_index("nodes"),
     }
