@@ -30,6 +30,10 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
     return " or ".join(names)
 
 
+_OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
+"""Columns of runs on which no comparison rests: without them a large folder takes less memory."""
+
+
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs, also failed ones, of every method except searches for the optimum, by label
@@ -39,7 +43,7 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
     conditions, too. Runs on tasks without a best known reward are left out, and so are methods
     without other runs.
     """
-    runs = study.runs[study.runs.best_known.notna()]
+    runs = study.runs[study.runs.best_known.notna()].drop(columns=_OF_RECORD, errors="ignore")
     runs.attrs = {}  # which pandas copies with every selection
     by_label = with_joined_learners(dict([*runs.groupby("label", sort=False)]))
     rows = study.methods.index[~study.methods.is_search]

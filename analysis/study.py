@@ -357,7 +357,11 @@ class Study:
         """Runs, also failed, by task and label (method with its setting), in the plan's order."""
         runs = self.runs.copy(deep=False)
         runs.attrs = {}  # which pandas copies with every column that is taken
-        return dict([*runs.groupby(["task", "label"], sort=False)])
+        cells = dict[Any, pd.DataFrame]()
+        for key, rows in runs.groupby(["task", "label"], sort=False).indices.items():
+            in_turn = rows[-1] - rows[0] < len(rows)  # mostly: a slice shares memory with the runs
+            cells[key] = runs.iloc[slice(rows[0], rows[-1] + 1) if in_turn else rows]
+        return cells
 
     @cached
     def sequences(self, task: str) -> pd.DataFrame:

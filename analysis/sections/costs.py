@@ -71,7 +71,6 @@ def spans(study: Study) -> dict[str, tuple[float, int]]:
     return {name: pair for name, pair in rewards.items() if pair[0] < pair[1]}  # NaN: none
 
 
-@cached
 def times_of(
     study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
@@ -116,7 +115,6 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     return times[warm] if warm.any() else times
 
 
-@cached
 def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs of each compared method on the common tasks of methods
     (:func:`.common_tasks`) that have targets (:func:`spans`), by label.
