@@ -87,9 +87,10 @@ def cheapest_plan(
     *,
     stops: bool = False,
 ) -> PathPlan:
-    """Solve from each of ``starts``, configurations ``(G, dof)``; return the cheapest plan that
-    converged, or, if none did, the plan of the last start. With ``stops`` velocities (for jerk also
-    accelerations) are 0 at each goal. The session counts the effort."""
+    """Solve ``problem`` for an instance from each of ``starts``, configurations ``(G, dof)``;
+    return the cheapest converged plan, or, if none converged, the plan of the last start. With
+    ``stops`` velocities (for jerk also accelerations) are 0 at each goal. The session counts the
+    effort."""
     plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
@@ -117,11 +118,8 @@ class TrajectoryOptimisation(Method):
         # goes through the rims.
         inside = task.radius - session.model.tolerances(task.radius)[0]
         radius = task.radius if self.cost == "path-length" else inside
-        plans, failed, stops = (
-            list[PathPlan](),
-            dict[str, str](),
-            getattr(self.parameters, "stop", 0),
-        )
+        plans, failed = list[PathPlan](), dict[str, str]()
+        stops = getattr(self.parameters, "stop", 0)
         with session.solving():
             for hands, starts in self.starts(session, task).items():
                 instance = Instance.of(task, hands, still=False, radius=radius)

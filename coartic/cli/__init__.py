@@ -55,13 +55,14 @@ class _Command(TyperCommand):
     choice, and without types of Python."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the arguments and the options of the command."""
+        """Write the command's arguments and options, without types, into the help,
+        ``formatter``."""
         for parameter in self.params:
             vars(parameter)["display_type_rich"] = lambda *_, **__: ""
         super().format_options(ctx, formatter)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Return the words after the name of the command."""
+        """Return the words after the command's name in the line of its usage, without braces."""
         return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
 
 
