@@ -164,9 +164,9 @@ class TrajectoryOptimisation(Method):
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
         """Return a list of starts, each ``(G, dof)``, for each hand sequence planned: the cheapest
-        chain of each graph; except for jerk of the hand, each chain also with the idle arm moving
-        in equal steps; and copies of the first start with noise. Raises MethodError if a goal has
-        no posture."""
+        chain (a posture for each goal) of each random graph; except for jerk of the hand, each
+        chain also with the idle arm moving in equal steps; and copies of the first start with
+        noise. Raises MethodError if a goal has no posture."""
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(

@@ -273,7 +273,7 @@ def check(
         typer.Option("--verbose", help="Show what the method prints, logs and crashes with."),
     ] = False,
 ) -> None:
-    """Check a method or a task file against the rules."""
+    """Check a method or a task file against the rules; exit with code 1 if it breaks one."""
     from coartic import builtin_tasks
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry

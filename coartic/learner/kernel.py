@@ -264,8 +264,7 @@ def choose_hand(
 ) -> int:
     """Return the hand (0 left, 1 right) of run ``n`` for its goal: the hand of highest value in
     ``entries``, the records of Q and q* by hand; with ``explore``, with probability ε, the hand
-    that the condition explores, a random one of hands that are equally close to the goal.
-    """
+    that the condition explores (random, closest to the goal, or nearest in posture)."""
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:
@@ -422,7 +421,8 @@ def make_trial(
 @inlined
 def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
     """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial,
-    ticks below 0: Σ γ^|h − g| r_h over goals h from g on, or over all; r_h is minus the ticks."""
+    ticks below 0: Σ γ^|h − g| r_h over goals h from g on, or, if earlier goals count, over all; r_h
+    is minus the ticks."""
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
         returns[number] = earlier
@@ -449,7 +449,8 @@ def _learn_from(
 ) -> None:
     """Add trial ``number`` (from 0) of each run to ``results``; in runs that completed it, update Q
     and q* in ``tables``: each visited state and hand is credited with the reward of the trial, or
-    the return of its goal; a credit above Q replaces Q, and where the goal was hit replaces q*."""
+    the return of its goal; a credit above Q replaces Q, and the configuration at the hit replaces
+    q*."""
     others = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
     for n in range(len(tables)):
@@ -486,7 +487,8 @@ def learn_kernel(
 ) -> None:
     """Make all trials of N runs, each with its own generator (``rngs``, :func:`addresses`), and
     then in each a greedy trial without noise, the replay; fill in ``tables``, Q and q*, shape ``(N,
-    G, 3, 2)``, and ``results`` (:class:`Results`)."""
+    G, 3, 2)``, and ``results`` (:class:`Results`). ``learner`` comes from
+    :func:`learner_parameters`."""
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         first, explore, made = number == 0, number < trials, results.last

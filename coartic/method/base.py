@@ -71,7 +71,8 @@ class Outline(NamedTuple):
 
 
 def outline_of(task: Task) -> Outline:
-    """Return the properties of a task by which a method says whether it applies to the task."""
+    """Return name, number of goals, dof, hands and initial hands of a task, by which a method says
+    whether it applies."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 

@@ -251,11 +251,11 @@ Plan = list[list[Movement]]
 
 
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return the movements to a goal before the first movement without a target, for the kernel.
+    """Return what the kernel is asked for at a goal: of its ``movements`` those before the first
+    one without a target, with None before them if the first movement is corrective.
 
-    The corrective process makes that movement; movements after it are not made. If the first
-    movement is corrective, with or without a target, None precedes all that is returned: there the
-    kernel makes no movement, and only checks whether the hand is in the goal.
+    For None the kernel makes no movement, and only checks whether the hand is in the goal. Where a
+    target is missing, the corrective process acts; movements after it are not made.
     """
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:

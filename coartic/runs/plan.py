@@ -98,8 +98,8 @@ class Job:
         return f"{digits}-{self.cell.method.code if code is None else code}"
 
     def run_seed(self, number: int) -> int:
-        """Return the seed of the random numbers of run ``number``, from the seed of the suite and
-        the task's name: the same for all methods."""
+        """Return the seed of the random numbers of run ``number``, from the suite's seed, the
+        task's name and ``number``: the same for all methods."""
         return run_seed(self.seed, self.cell.task.name, number)
 
 

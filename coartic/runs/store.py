@@ -424,7 +424,7 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id of each run of the plan that made trials, with the rewards of its trials,
+        """Yield, for each run of the plan that made trials, its id and the rewards of its trials,
         shape ``(trials,)``; NaN stands for a trial that failed or whose reward is not kept."""
         query = """SELECT run_id, rewards, trials FROM asked
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
@@ -435,8 +435,8 @@ class Store:
     # Rows.
 
     def _suite(self) -> Any:
-        """Return the row of the last suite, with its environment. Raises CoarticError if no suite
-        is stored."""
+        """Return the row of table ``suite`` on the last ``coartic run``, with the columns of its
+        environment. Raises CoarticError if no suite is stored."""
         row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
         if row is None:
             raise CoarticError("it is not finished; repeat the `coartic run` command")
@@ -612,8 +612,8 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 def open_store(folder: Path) -> Iterator[Store]:
     """Open a results folder for reading in the block of this context.
 
-    Raises CoarticError if this version of coartic did not write the folder, and while a
-    ``coartic run`` writes into it.
+    Raises CoarticError if the folder has no results, or results in the format of another version,
+    and while a ``coartic run`` writes into it.
     """
     path = folder / RUNS_FILE
     with explain_errors(folder):
