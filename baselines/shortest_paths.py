@@ -81,8 +81,9 @@ def fewest_ticks(
 ) -> PlanInTicks:
     """Round the plans of a task to whole ticks in every way that may be best, with and without
     goals that are hit without a movement; return the rounding with the fewest ticks when executed.
-    Plans are tried by length; of equal roundings the first with the fewest corrections is kept. The
-    session counts the effort. Raises MethodError if no rounding is solved."""
+    Plans are tried by length; of equal ones that were executed the first with the fewest
+    corrections is kept. The session counts the effort. Raises MethodError if no rounding is solved.
+    """
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 

@@ -73,9 +73,9 @@ def _value_in(text: str) -> Any:
 
 
 def request_option(name: str, what: str, unit: str = "N") -> Any:
-    """Return an option for a number that :func:`.request_for` takes by ``name``, such as
-    ``time_limit_s``; ``what`` is its help, ``unit`` names its value there. Its flag is the name
-    without ``_s``, such as ``--time-limit``. Reading a number that is not allowed raises
+    """Return an option for a value, a number or ``50..99``, that :func:`.request_for` takes by
+    ``name``, such as ``time_limit_s``; ``what`` is its help, ``unit`` names its value there. Its
+    flag is the name without ``_s``: ``--time-limit``. Reading a value that is refused raises
     CoarticError."""
     option = f"--{name.removesuffix('_s').replace('_', '-')}"
 

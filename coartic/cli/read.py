@@ -162,7 +162,8 @@ def verify(
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Execute every stored solution again, or perform runs again, and compare."""
+    """Execute every stored solution again, or perform runs again, and compare; exit with code 1 if
+    something differs."""
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 

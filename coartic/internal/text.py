@@ -125,17 +125,8 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 
 
 FOREIGN = (
-    ".urdf",
-    ".xml",
-    ".osim",
-    ".mot",
-    ".sto",
-    ".trc",
-    ".c3d",
-    ".mat",
-    ".xlsx",
-    ".xls",
-    ".ods",
+    *(".urdf", ".xml", ".osim", ".mot", ".sto", ".trc"),
+    *(".c3d", ".mat", ".xlsx", ".xls", ".ods"),
 )
 """Endings of files of robots and recordings that other programs write."""
 

@@ -44,7 +44,7 @@ def version_of(code: str) -> str:
     return _VERSION_OF_4_0_0 if code in _OF_4_0_0 else code
 
 
-def same_run(run_id: str) -> tuple[str, str]:
+def run_identity(run_id: str) -> tuple[str, str]:
     """Return what identifies a run, from its id: the hex digits at its beginning, and the version
     for which the code at its end stands (:func:`version_of`). Ids of equal pairs name the same run,
     whatever version of coartic stored it."""

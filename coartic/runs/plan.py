@@ -55,9 +55,10 @@ class Cell:
 
     @cached_property
     def digest(self) -> str:
-        """Hash, 64 hex digits, of the cell without the version or code of its method.
+        """Hash, 64 hex digits, of task, method, parameters, model and trial budget, not of the
+        method's code.
 
-        A time limit is not a part of the cell: it can prevent a result, and cannot change one.
+        A time limit is not among them: it can prevent a result, and cannot change one.
         """
         return hash_of(
             {

@@ -358,7 +358,7 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task side by side under the paper's model; scores come from here.
+    """Execute solutions of a task side by side under the paper's model.
 
     Returns for each solution, in order, its execution, or, as an object, the error of a solution
     that breaks the rules of the task, or is too long (:func:`too_long`).
