@@ -399,7 +399,7 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 def load_family(name: str) -> Family:
     """Return a shipped family by its name with version, such as ``two-armed/v1``, or a family of
-    your own by the path of its file. Raises TaskError if there is none."""
+    your own by the path of its file. Raises TaskError if it does not exist."""
     if is_file(name):
         return read_family(Path(name))
     shipped = shipped_families()
