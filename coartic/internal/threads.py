@@ -20,8 +20,8 @@ from pathlib import Path
 from coartic.internal.interruption import ENDING
 
 MOST_JOBS = 10_000
-_LIBRARIES = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
-ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _LIBRARIES], "1")
+_POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
+ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 """Environment variables of a worker, which has one thread, as BLAS threads of workers compete."""
 
 
