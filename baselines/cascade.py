@@ -51,7 +51,8 @@ class Solution(NamedTuple):
 
 
 def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
-    """Solve level 1, then level 2, and return the changes x of the joints.
+    """Solve level 1, for changes x of the joints with A x >= b, as nearly as they can be, then
+    level 2, for the x nearest to z among these; return the solution of both.
 
     ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
     ``(m,)``, length unit; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver

@@ -72,9 +72,10 @@ class Strategy:
         self._evolution: EvolutionStrategy
 
     def generation(self) -> None:
-        """Make the trials of one generation, or as many as are left, and update mean, step size and
-        covariance from their rewards if the generation is whole. To be called only if the
-        corrective process completes the hand sequence."""
+        """Make the trials of one generation of CMA-ES, or as many as are left, and, if none is
+        missing, update mean, step size and covariance from their rewards. Where CMA-ES has ended,
+        it restarts with twice the population. To be called only if the corrective process completes
+        the hand sequence."""
         if self._restarts < 0 or self._evolution.has_ended():
             self._restarts += 1
             size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES

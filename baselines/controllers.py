@@ -78,25 +78,26 @@ class Controller(ABC):
 
     @abstractmethod
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
-        """Return the memory (data that the controller keeps from step to step, of its own kind)
-        with which it begins the leg from configuration ``q`` to the goal of the first of ``aims``,
-        pairs of hand and goal; ``memory`` is the memory at the end of the leg before, None for the
-        first leg."""
+        """Return the memory (data that the controller keeps from step to step) with which it begins
+        a leg, the movement from configuration ``q``, ``(dof,)``, to the goal of the first of
+        ``aims`` (hand and goal); ``memory`` is the memory at the end of the leg before, None for
+        the first leg."""
 
     @abstractmethod
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Any, first: bool
     ) -> tuple[Solution, Array, Any]:
-        """Return three things for a control step from ``q``: the solution of the cascade; the
-        changes that the joints prefer, ``(joints,)``; the memory after the step. Changes are of the
-        joints that are not locked, in lengths of a control step. ``aims``: the goal of the leg with
-        its hand, then goals ahead. ``first``: True for the first step of a leg."""
+        """Return three things for a control step from ``q``, ``(dof,)``: the solution of the
+        cascade; the changes that the joints prefer, ``(joints,)``; the memory after the step.
+        Changes are of the joints that are not locked, in lengths of a control step. ``aims``: the
+        goal of the leg with its hand, then goals ahead. ``first``: True for the first step of a
+        leg."""
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
-        """Simulate control steps until the hand of the first of ``aims`` is in its goal, from the
-        end of the leg ``before``, or, for None, from the task's start; return them as a leg.
-        Further aims are the goals ahead. Raises _StuckError if the hand comes no nearer to its
-        goal, and MethodError if the solver fails."""
+        """Simulate control steps until the hand of the first of ``aims`` (hand and goal) is in its
+        goal, from the end of the movement ``before``, or, for None, from the task's start; return
+        them as a movement, with its ticks and counts. Further aims are the goals ahead. Raises
+        _StuckError if the hand comes no nearer to its goal, and MethodError if the solver fails."""
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         _, tolerance = model.tolerances(radius)
@@ -134,29 +135,29 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Solve level 1, then level 2 of the cascade (:func:`solve_cascade`) and return the changes
-        of the joints; count two programmes in ``solves``, and the iterations in the session. Raises
-        MethodError if the solver fails."""
+        """Solve levels 1 and 2 of the cascade (:func:`solve_cascade`, with these arguments) and
+        return the solution; count two programmes in ``solves``, and the iterations in the session.
+        Raises MethodError if the solver fails."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
         return solution
 
     def error(self, q: Array, aim: Aim) -> Array:
-        """Return the vector from the hand of an aim to its goal's centre in configuration ``q``,
-        shape ``(2,)``, length unit."""
+        """Return the vector from the hand of an aim (hand and goal) in configuration ``q`` to the
+        goal's centre, shape ``(2,)``, length unit; the session counts an evaluation."""
         return np.asarray(
             self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
         )
 
     def distance(self, q: Array, aim: Aim) -> float:
-        """Return the distance of the hand of an aim from its goal's centre in configuration ``q``,
-        length unit."""
+        """Return the distance of the hand of an aim (hand and goal) in configuration ``q`` from the
+        goal's centre, length unit; the session counts an evaluation."""
         return float(np.hypot(*self.error(q, aim)))
 
     def add(self, q: Array, change: Array) -> Array:
-        """Return a copy of ``q`` with ``change``, shape ``(joints,)``, added to the joints that are
-        not locked."""
+        """Return a copy of configuration ``q`` with ``change``, shape ``(joints,)``, length unit
+        and rad, added to the joints that are not locked."""
         result = q.copy()
         result[self.moving] += change
         return result
@@ -205,9 +206,10 @@ class Control(Method):
 
     def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
         """Return the paths, a movement for each goal, of the candidate (hand sequence) with the
-        fewest ticks: the candidate with the fewest ticks so far is extended by a leg until one is
-        complete. Of equal candidates the one with the fewest changes of hand is kept, then the
-        first. Raises MethodError if the hand gets stuck in all candidates."""
+        fewest ticks under ``controller``: the candidate with the fewest ticks so far is extended by
+        a movement until one is complete. Of equal candidates the one with the fewest changes of
+        hand is kept, then the first. Raises MethodError if the hand gets stuck in all candidates.
+        """
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)

@@ -172,9 +172,9 @@ class EvolutionStrategy:
             self._still_at, self._still_since = self._mean, self._generation
 
     def has_ended(self) -> bool:
-        """Return whether to stop, False before the first generation: points or costs change too
-        little, steps have become too long, the covariance is ill-conditioned, or there were too
-        many generations."""
+        """Return whether a criterion to stop is met, False before the first generation: points or
+        costs change too little, steps have become too long, the covariance is ill-conditioned, or
+        there were too many generations."""
         if not self._generation:
             return False
         deviations = self._step_size * np.sqrt(np.diag(self._covariance))

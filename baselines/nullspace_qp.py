@@ -37,16 +37,16 @@ class HandController(Controller):
     prefer other changes. The memory is a posture, shape ``(dof,)``."""
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return ``q``, where the leg begins, itself, as the memory; it is not used."""
+        """Return ``q`` itself as the memory (kept from step to step), which is not used here."""
         return q
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
     ) -> tuple[Solution, Array, Array]:
-        """Return three things for a control step from ``q``: the solution, which moves the hand
-        straight to its goal, and the joints as near to the changes that they prefer as that allows;
-        these preferred changes, shape ``(joints,)``; and ``memory``, unchanged. ``first`` is not
-        used."""
+        """Return three things for a control step from configuration ``q``: the solution, which
+        moves the hand of the first aim straight to its goal, with joint changes as near to the
+        preferred ones as that allows; the preferred changes, ``(joints,)``, in lengths of a control
+        step; and ``memory``, unchanged. ``first`` is not used."""
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)
@@ -59,8 +59,9 @@ class HandController(Controller):
         return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the changes that the joints that are not locked prefer in the next of ``steps``
-        control steps to the goal, shape ``(joints,)``, in lengths of a control step: here zeros."""
+        """Return zeros, shape ``(joints,)``: the changes that the joints that are not locked prefer
+        in a control step. Arguments are for subclasses: configuration, memory, and number of
+        control steps to the goal."""
         return np.zeros(len(self.moving))
 
 
@@ -68,8 +69,9 @@ class NextGoalController(HandController):
     """Approach a posture of the next goal. The memory is that posture, shape ``(dof,)``."""
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return, as the memory of a leg, the posture in which the corrective process hits the next
-        goal from ``q``; ``q`` itself for no next goal, or if the process does not converge."""
+        """Return, as the memory, the posture in which the corrective process from ``q`` hits the
+        goal after the current one, ``(dof,)``: the second of ``aims``. Return ``q`` itself without
+        such a goal, or if the process does not converge."""
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
             if correction.converged:
@@ -77,8 +79,9 @@ class NextGoalController(HandController):
         return q
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the ``steps``-th part of the way from ``q`` to the posture ``memory`` of the next
-        goal, for the joints that are not locked, in lengths of a control step, at most 1 long."""
+        """Return the joint changes from ``q`` to the posture ``memory`` divided by ``steps``, for
+        the joints that are not locked, shape ``(joints,)``, in lengths of a control step; all
+        shortened in proportion where they are longer than 1 together."""
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))
 

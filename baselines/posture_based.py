@@ -194,9 +194,10 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """Return, by goal (from 0) and hand, copies of the stored postures, corrected so that the
-        hand is at the goal, shape ``(n, dof)``; postures that correction cannot bring there are
-        left out. The other arm has its joint angles in ``q``."""
+        """Return, by goal (from 0) and hand, postures ``(n, dof)`` with the hand at the goal: the
+        hand's arm has stored joint angles, the other arm its angles in ``q``, and the base carries
+        the hand to the goal if it can move; then all are corrected. Postures that correction does
+        not bring there are left out."""
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))
@@ -210,7 +211,8 @@ class PosturePlanner:
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
         """Return the sequence of postures with the shortest joint-space path from ``q``, one out of
         each of ``layers``, the retrieved postures ``(n, dof)`` for one goal or for two goals in
-        turn; shape ``(goals, dof)``."""
+        turn, hit by ``hands``; shape ``(goals, dof)``. From the first to the second only the base
+        and the arm of the second hand move."""
         first = layers[0]
         cost = np.linalg.norm(first - self.q, axis=1)
         if len(layers) == 1:

@@ -42,12 +42,13 @@ _NEAR = 2.0  # length unit: from farther away the base carries the hand there fi
 def _sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
-    """Sample n configurations ``(n, dof)`` with ``hand`` in the disc of goal ``goal`` (from 0).
+    """Sample configurations, at most one for each of ``starts``, with ``hand`` in the disc of goal
+    ``goal`` (from 0); return them, shape ``(n, dof)``.
 
-    A Gaussian sample around each of ``starts``, shape ``(count, dof)``, with an SD drawn
-    log-uniformly, is brought to a random point of the disc, from far away by the base and then by
-    Gauss-Newton steps of least norm; samples that do not get there are left out. The other arm
-    stays as in its start. Evaluations are added to ``spent``, in place.
+    A Gaussian sample around each start, shape ``(count, dof)``, with an SD drawn log-uniformly, is
+    brought to a random point of the disc, from far away by the base and then by Gauss-Newton steps
+    of least norm; samples that do not get there are left out. The other arm stays as in its start.
+    Evaluations are added to ``spent``, in place.
     """
     robot, count = task.robot, len(starts)
     moving = np.zeros(robot.dof, dtype=np.bool_)
@@ -145,7 +146,7 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
 
 def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]:
     """Yield the cheapest chains of a beginning extended by one goal, once for each hand that has a
-    node there, left before right."""
+    node in its layer of ``layers``, left before right."""
     hands, nodes, cost, back = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right
@@ -205,9 +206,9 @@ def cheapest_chains(
 
 
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
-    """Return a copy of a chain's configurations, shape ``(G, dof)``, in which each arm moves in
-    equal steps, goal by goal, from the start to the first goal that its hand hits and from each
-    such goal to the next; after its last goal it keeps still."""
+    """Return a copy of a chain's configurations, shape ``(G, dof)``, with ``hands`` for its goals,
+    in which each arm moves in equal steps, goal by goal, from the start to the first goal that its
+    hand hits and from each such goal to the next; after its last goal it keeps still."""
     configurations = chain.copy()
     for hand in task.hands:
         joints = task.robot.joints(hand)

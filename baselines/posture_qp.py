@@ -81,16 +81,18 @@ class PostureController(Controller):
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return the posture for each aim (hand and goal) at the beginning of a leg from ``q``, by
-        aim; postures in ``memory``, from the leg before, are kept (:meth:`find_postures`)."""
+        """Return a posture ``(dof,)`` that hits the goal for each of ``aims`` (hand and goal), by
+        aim, for the movement from configuration ``q``; postures in ``memory`` are kept
+        (:meth:`find_postures`)."""
         return dict(zip(aims, self.find_postures(q, aims, memory or {}), strict=True))
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array], first: bool
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
-        """Update the postures, unless the step is the ``first`` of a leg, and solve for a control
-        step from ``q`` towards the posture of the current goal. Return the solution, the preferred
-        changes, ``(joints,)``, in lengths of a control step, and the postures by aim."""
+        """Update the postures in ``memory``, unless the step is the ``first`` of a movement, and
+        solve for a control step from ``q`` towards the posture of the current goal. Return
+        solution, preferred changes ``(joints,)`` in lengths of a control step, and postures by aim.
+        """
         postures = [memory[aim] for aim in aims]
         if not first:
             self.sweep(q, aims, postures)
@@ -124,10 +126,11 @@ class PostureController(Controller):
         return postures
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Replace each posture in the list ``postures`` by a posture a step nearer to where the
-        path from ``q`` through all is shortest; return the largest length of these steps, length
-        unit and rad mixed (:meth:`step_nearer`). The sum of two distances is least where their
-        ends, each weighted by the inverse of its distance, have their mean (Weiszfeld 1937)."""
+        """Replace each of ``postures``, one for each aim (hand and goal), in place, by a posture a
+        step nearer to where the path from ``q`` through all is shortest; return the largest length
+        of these steps, length unit and rad mixed (:meth:`step_nearer`). The sum of two distances is
+        least where their ends, each weighted by the inverse of its distance, have their mean
+        (Weiszfeld 1937)."""
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]
@@ -160,8 +163,8 @@ class PostureController(Controller):
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
         """Return A, ``(16, joints)``, and b, ``(16,)``, length unit: to first order, a change x of
-        the joints that are not locked brings the hand of an aim from ``q`` into a polygon within
-        its goal's disc if A x >= b."""
+        the joints that are not locked brings the hand of an aim (hand and goal) from configuration
+        ``q`` into a polygon within its goal's disc if A x >= b."""
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET
         return _FACE_NORMALS @ jacobian, _FACE_NORMALS @ self.error(q, aim) - radius

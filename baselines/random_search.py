@@ -90,7 +90,7 @@ def draw_trials(
     attempts.by_correction(*(sequences_of(session) if hands is None else [hands])[:trials])
     if not (chosen := attempts.hands):
         raise MethodError("infeasible", "the corrective process completes no hand sequence")
-    explored = attempts.explored & (parameters.idle_arm | _follows(session, chosen))
+    explored = attempts.explored & (parameters.idle_arm | _base_and_chosen_arm(session, chosen))
     centre, alone = attempts.reached[explored], attempts.trials_made
     targets = np.full((_POINTS_AT_ONCE, *explored.shape), np.nan)
     stage, more = 0, True
@@ -109,9 +109,9 @@ def draw_trials(
     return attempts, attempts.trials_made - alone
 
 
-def _follows(session: Session, hands: str) -> NDArray[np.bool_]:
-    """Return True for the joints of the base and of the arm that is to hit, goal by goal, shape
-    ``(G, dof)``."""
+def _base_and_chosen_arm(session: Session, hands: str) -> NDArray[np.bool_]:
+    """Return True for the base and for the joints of the arm that is to hit, for each goal of a
+    hand sequence such as ``"RRLR"``, shape ``(G, dof)``."""
     joints = np.ones((len(hands), session.dof), dtype=np.bool_)
     for goal, letter in enumerate(hands):
         for hand in HANDS:
@@ -135,8 +135,9 @@ class RandomSearchHands(Method):
     Parameters = RandomSearchHandsParameters
 
     def most_together(self) -> int:
-        """Return the largest number of runs that one job performs: 72, or fewer if they have more
-        than 4,000,000 trials together; at least 1. These runs are made one after the other."""
+        """Return the largest number of sessions for one call of :meth:`solve_together`: 72, or
+        fewer if their runs have more than 4,000,000 trials together; at least 1. The runs are made
+        one after the other."""
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:

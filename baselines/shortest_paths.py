@@ -55,10 +55,10 @@ def shortest_plans(
     *,
     still: bool,
 ) -> ShortestPlans:
-    """Solve from each start, a hand sequence and configurations ``(G, dof)``; return the shortest
-    plan of each hand sequence. With ``still`` the arm whose hand is not chosen for a goal does not
-    move on the way to it. The session counts the effort. Raises MethodError if no solve finds a
-    path."""
+    """Solve the ``problem`` of the shortest path on a task from each of ``starts``, a hand sequence
+    and configurations ``(G, dof)``; return the shortest plan of each hand sequence. With ``still``
+    the arm whose hand is not chosen for a goal does not move on the way to it. The session counts
+    the effort. Raises MethodError if no solve finds a path."""
     best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
     for hands, start in starts:
@@ -79,10 +79,11 @@ def shortest_plans(
 def fewest_ticks(
     session: Session, task: Task, problem: TrajectoryProblem, plans: ShortestPlans
 ) -> PlanInTicks:
-    """Round all plans to whole ticks in every way that may be best, with and without goals that are
-    hit without a movement; return the rounding with the fewest ticks when executed. Plans are tried
-    by length; of equal roundings the first with the fewest corrections among those executed is
-    kept. The session counts the effort. Raises MethodError if no rounding can be solved."""
+    """Round the plans of a task to whole ticks in every way that may be best, with and without
+    goals that are hit without a movement; return the rounding with the fewest ticks when executed.
+    Plans are tried by length; of equal ones that were executed the first with the fewest
+    corrections is kept. The session counts the effort. Raises MethodError if no rounding is solved.
+    """
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 

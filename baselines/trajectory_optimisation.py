@@ -87,9 +87,10 @@ def cheapest_plan(
     *,
     stops: bool = False,
 ) -> PathPlan:
-    """Solve from each of ``starts``, configurations ``(G, dof)``; return the cheapest plan that
-    converged, or, if none did, the plan of the last start. With ``stops`` velocities (for jerk also
-    accelerations) are 0 at each goal. The session counts the effort."""
+    """Solve ``problem`` for an instance from each of ``starts``, configurations ``(G, dof)``;
+    return the cheapest converged plan, or, if none converged, the plan of the last start. With
+    ``stops`` velocities (for jerk also accelerations) are 0 at each goal. The session counts the
+    effort."""
     plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
@@ -117,11 +118,8 @@ class TrajectoryOptimisation(Method):
         # goes through the rims.
         inside = task.radius - session.model.tolerances(task.radius)[0]
         radius = task.radius if self.cost == "path-length" else inside
-        plans, failed, stops = (
-            list[PathPlan](),
-            dict[str, str](),
-            getattr(self.parameters, "stop", 0),
-        )
+        plans, failed = list[PathPlan](), dict[str, str]()
+        stops = getattr(self.parameters, "stop", 0)
         with session.solving():
             for hands, starts in self.starts(session, task).items():
                 instance = Instance.of(task, hands, still=False, radius=radius)
@@ -166,9 +164,9 @@ class TrajectoryOptimisation(Method):
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
         """Return a list of starts, each ``(G, dof)``, for each hand sequence planned: the cheapest
-        chain of each graph; except for jerk of the hand, each chain also with the idle arm moving
-        in equal steps; and copies of the first start with noise. Raises MethodError if a goal has
-        no posture."""
+        chain (a posture for each goal) of each random graph; except for jerk of the hand, each
+        chain also with the idle arm moving in equal steps; and copies of the first start with
+        noise. Raises MethodError if a goal has no posture."""
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(

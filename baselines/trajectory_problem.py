@@ -106,9 +106,9 @@ class Instance:
 
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
-        """Return the instance of a task with a hand for each goal; each hand is to end within
-        ``radius``, length unit, of its goal's centre. With ``still`` the arm whose hand is not
-        chosen for a goal cannot move on the way to it."""
+        """Return the instance of a task with ``hands``, one for each goal; each hand is to end
+        within ``radius``, length unit, of its goal's centre. With ``still`` the arm whose hand is
+        not chosen for a goal cannot move on the way to it."""
         held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
 
@@ -231,9 +231,9 @@ class TrajectoryProblem:
         stops: bool = False,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Return a locally cheapest plan, sought from one configuration per goal, ``start``
-        ``(G, dof)``. A plan has converged if IPOPT says so and every constraint holds; a plan that
-        has not converged is returned as well.
+        """Return a locally cheapest plan for an instance (start, goals, hands), sought from one
+        configuration per goal, ``start`` ``(G, dof)``. A plan has converged if IPOPT says so and
+        every constraint holds; a plan that has not converged is returned as well.
 
         Only for path length: ``lengths`` ``(G,)`` are upper bounds of the joint-space lengths of
         the segments, NaN for a free length; None frees all. With ``deep`` (goals, from 0) the path
@@ -336,9 +336,10 @@ def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
     """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
-    The joints follow quintics between the end states, as for minimum jerk: ``steps``, shape
-    ``(dof, G)``, are their changes, ``rates`` velocities and accelerations at start and goals,
-    ``(dof, G + 1)`` each."""
+    The joints follow quintics between the end states, as for minimum jerk: ``q0`` is the start,
+    ``(dof,)``; ``steps``, ``(dof, G)``, and ``durations``, ``(G,)``, are changes and durations of
+    the segments; ``rates`` are velocities and accelerations at start and goals, ``(dof, G + 1)``.
+    """
     powers = np.arange(6)
     integrals, here = [], q0
     for g in range(steps.shape[1]):

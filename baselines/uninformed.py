@@ -56,9 +56,9 @@ class Attempts:
     def by_correction(self, *hands: str) -> Trials:
         """Make one trial for each of the hand sequences given (at least one), such as ``"RRLR"``:
         without targets, so that the corrective process alone goes to each goal. Remember the best
-        of these trials if it beats all before, and return the results of the trials made, in order:
-        fewer than sequences if the budget ends. Raises BudgetError if no trial of the session is
-        left."""
+        of these trials if it beats all earlier ones, and return the results of the trials made, in
+        order: fewer than sequences if the budget ends. Raises BudgetError if no trial of the
+        session is left."""
         shape = (len(hands), self._session.goals_count, self._session.dof)
         return self.by_targets([*hands], np.full(shape, np.nan))
 
@@ -77,8 +77,9 @@ class Attempts:
     def by_targets(
         self, hands: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
-        """Make N trials with targets of shape ``(N, G, dof)`` and one hand sequence, or a hand
-        sequence for each trial; remember the best trial, and return the results of all trials made.
+        """Make N trials with targets of shape ``(N, G, dof)``, length unit and rad, and one hand
+        sequence, or a hand sequence for each trial; remember the best trial, and return the results
+        of all trials made.
 
         ``until``, rewards of shape ``(N,)``: the first trial whose reward exceeds its entry is the
         last trial made. Raises BudgetError if no trial of the session is left.
@@ -102,7 +103,7 @@ class Attempts:
 
     def result(self, **details: Any) -> Result:
         """Return the movements of the best trial, and as details its number (from 0) and
-        ``details``. Raises MethodError if no trial was made, or none hit every goal."""
+        ``details``. Raises MethodError if no trial hit every goal."""
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
         if not self.hands:

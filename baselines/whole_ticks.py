@@ -80,8 +80,8 @@ class Rounding:
                 yield rounded
 
     def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return a number of ticks that no rounding of a plan falls below, if the goals ``merged``
-        (from 0) are hit without a movement."""
+        """Return a lower bound of the ticks of all roundings of a plan in which the goals
+        ``merged`` (from 0) are hit without a movement."""
         length = float(plan.lengths().sum())
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
@@ -91,9 +91,9 @@ class Rounding:
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
         """Yield pairs: a tuple of goals (from 0) that are hit without a movement, and the shortest
         plan in which these goals are hit so; first the empty tuple with ``plan`` itself. Such a
-        plan pays if its path grows by fewer steps than the ticks that it saves. ``worth`` returns
-        whether a number of ticks is of interest; goals that cannot come to such a number are left
-        out."""
+        plan pays if its path grows by fewer steps than the ticks that it saves. ``worth`` is asked
+        whether a number of ticks is of interest; plans that cannot have such a number are not
+        sought."""
         goals = len(self._instance.hands)
         able = _mergeable(task, self._instance.hands)
         waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
@@ -157,10 +157,9 @@ class Rounding:
 
 
 def _mergeable(task: Task, hands: Sequence[Hand]) -> tuple[int, ...]:
-    """Return the goals (from 0) that may be hit without a movement, as the hand of the goal can be
-    there before: at the start, or since another hand hits the goal before, or since the discs of
-    both goals overlap.
-    """
+    """Return the goals (from 0) of a hand sequence that may be hit without a movement, as the hand
+    of the goal can be there before: at the start, or since another hand hits the goal before, or
+    since the discs of both goals overlap."""
     start = task.robot.forward_kinematics(task.q0, hands[0])
     able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
     able += [

@@ -22,7 +22,7 @@ from coartic.benchmarks.reproduce import compare_runs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
-from coartic.runs.method_info import same_run
+from coartic.runs.method_info import run_identity
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.record import Run
 from coartic.runs.shipped import SHIPPED, open_shipped
@@ -79,7 +79,7 @@ def include_folders(
             del sources[SHIPPED]  # all its runs are there
         with target.transaction():
             target.replace_plan(joined, made_with())
-            origin = dict.fromkeys(map(same_run, target.ids()), str(out))
+            origin = dict.fromkeys(map(run_identity, target.ids()), str(out))
             for name, source in sources.items():
                 _copy_runs(name, source, target, origin)
     return joined
@@ -196,16 +196,16 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
     """Copy the runs of a source's plan that the target lacks. ``origin`` has the folder of each run
-    of the target, by digits of its id and version (:func:`.same_run`); the copied runs are added.
+    of the target, by :func:`.run_identity` of its id; the copied runs are added.
 
     Raises CoarticError if the target has another result of a run.
     """
-    there = {same_run(run_id): (run_id, result) for run_id, result in target.results()}
+    there = {run_identity(run_id): (run_id, result) for run_id, result in target.results()}
     results = source.results()
     for first in range(0, len(results), _WRITTEN_AT_ONCE):
         runs = list[Run]()
         for run_id, result in results[first : first + _WRITTEN_AT_ONCE]:
-            held, held_result = there.get(same_run(run_id), ("", ""))
+            held, held_result = there.get(run_identity(run_id), ("", ""))
             if held and held_result == result:
                 continue
             run = source.run(run_id)
@@ -213,7 +213,7 @@ def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, 
                 runs.append(run)
             elif changes := compare_runs(target.run(held), run):  # of what both runs keep
                 which = f"run {run.number} of {run.cell.method.name} on {run.cell.task.name}"
-                where = f"{origin[same_run(run_id)]} and {name} ({run_id})"
+                where = f"{origin[run_identity(run_id)]} and {name} ({run_id})"
                 raise CoarticError(f"{which} differs in {where}: {changes[0]}")
         target.write(runs)
-        origin |= {same_run(run.id): name for run in runs}
+        origin |= {run_identity(run.id): name for run in runs}

@@ -80,8 +80,8 @@ class Estimate:
 
 
 def vector(values: ArrayLike) -> Array:
-    """Return a sample as a float vector ``(n,)``. Raises ValueError where it is empty or holds NaN,
-    infinity or masked values.
+    """Return a sample as a float vector ``(n,)``. Raises ValueError if it is no vector or empty, or
+    holds NaN, infinity or masked values.
 
     Runs without a solution have no reward: the caller decides what becomes of them.
     """
@@ -104,7 +104,8 @@ def varies(values: Array) -> Array:
 
 
 def centred(values: Array) -> Array:
-    """Return values less their mean over the first axis; 0 where they do not differ."""
+    """Return values less their mean over the first axis; 0 where they do not differ
+    (:func:`varies`)."""
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
 
@@ -135,8 +136,9 @@ def mean_of_means(
 ) -> Estimate:
     """Return the weighted sum of the means of independent samples, with its 95 % BCa interval.
 
-    Samples have shapes ``(n,)``, each with a weight. Each sample is resampled within itself. Raises
-    ValueError without a sample, and for a sample that is empty or not finite. The edge cases:
+    Samples have shapes ``(n,)``; ``weights`` has a factor for each. Each sample is resampled within
+    itself. Raises ValueError without a sample, and for a sample that is empty or not finite. The
+    edge cases:
 
     - a sample of fewer than :data:`FEWEST` values: no interval;
     - no spread in any sample: the interval is that point, which says that the samples have no
@@ -184,8 +186,9 @@ def mean_of_means(
 
 
 def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
-    """Yield batches of at most 1,000 resamples: for each sample the indices of the values drawn,
-    shape ``(batch, size)``. Equal arguments give equal indices."""
+    """Yield batches of at most 1,000 resamples, each a list with an array of indices of the values
+    drawn, shape ``(batch, size)``, for each of ``sizes``, the numbers of values in the samples.
+    Equal arguments give equal indices."""
     rng, batch = np.random.default_rng(SEED), 1_000
     if max(sizes) > LARGE:
         batch = max(1, min(100, 1_000_000 // max(sizes)))

@@ -67,8 +67,9 @@ class Arm(NamedTuple):
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
     """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand.
 
-    Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is anything that can
-    be indexed by joint first and added; ``cos`` and ``sin`` fit its type. Source: Craig (2004).
+    Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is a configuration,
+    or several with the entry as first index, of numbers or symbols; ``cos`` and ``sin`` fit their
+    type. Source: Craig (2004).
     """
     x = q[0] + arm.shoulder_x
     y = q[1] + arm.shoulder_y
@@ -177,14 +178,15 @@ class Robot:
             raise ValueError(f"unknown hand {hand!r}: a hand is 'left' or 'right'") from None
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration that holds the joint angles of a hand's arm:
-        ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad."""
+        """Return the slice of a configuration that holds the joint angles of a hand's arm: ``q[...,
+        robot.joints("left")]`` has shape ``(..., n)``, rad. Raises ValueError for an unknown hand.
+        """
         arm = self.arm(hand)
         return slice(arm.first, arm.first + len(arm.links))
 
     def reach(self, hand: Hand) -> tuple[float, float]:
-        """Return the least and the largest distance of a hand from its shoulder, length unit, by
-        the lengths of the links alone: joints have no limits."""
+        """Return the least and the largest distance of a hand from its shoulder, length unit:
+        joints have no limits. Raises ValueError for an unknown hand."""
         links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 
@@ -303,8 +305,9 @@ class Robot:
         return casadi.vertcat(xs[-1], ys[-1])
 
     def symbolic_hand_jerk(self, q: Sequence[Any], hand: Hand) -> Any:
-        """Return the third time derivative of a hand's position as a CasADi expression, 2 x 1, for
-        a configuration and its first three time derivatives, CasADi expressions of ``dof`` entries.
+        """Return the third time derivative of a hand's position as a CasADi expression, 2 x 1.
+        ``q`` lists the configuration and its first three time derivatives, CasADi expressions of
+        ``dof`` entries.
 
         Written out, as third derivatives by CasADi make Hessians of twice as many operations.
         Raises ValueError for an unknown hand.

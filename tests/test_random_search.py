@@ -8,7 +8,7 @@ from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.benchmarks.planning import plan_suite
 from coartic.method import MethodError, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
-from coartic.runs.method_info import same_run
+from coartic.runs.method_info import run_identity
 from coartic.runs.shipped import open_shipped
 from tests.support.strategies import solve
 from tests.support.suites import KNOWN
@@ -127,9 +127,9 @@ def test_at_their_defaults_new_parameters_change_no_id():
     for suite in ("comparison", "families"):
         with open_shipped(suite) as store:
             shipped = store.runs()
-        shipped = {*map(same_run, shipped.run_id[shipped.method.isin(methods)])}
+        shipped = {*map(run_identity, shipped.run_id[shipped.method.isin(methods)])}
         planned = {
-            same_run(job.run_id(number))
+            run_identity(job.run_id(number))
             for job in plan_suite(suite, methods=methods)
             for number in job.numbers
         }

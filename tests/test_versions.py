@@ -14,7 +14,7 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import find_run
 from coartic.benchmarks.runner import perform
-from coartic.runs.method_info import same_run, version_of
+from coartic.runs.method_info import run_identity, version_of
 from coartic.runs.store import RUNS_FILE, open_store
 from tests.support.processes import python
 from tests.support.suites import ROOT, InProcess
@@ -75,7 +75,7 @@ def test_a_folder_of_4_0_0_and_one_of_now_have_the_same_runs(old, tmp_path):
         assert numbers(load(out)) == numbers(load(old))
         assert check_runs(out).wrong == []
         with open_store(out) as store:
-            assert len({*map(same_run, store.ids())}) == len(store.ids())
+            assert len({*map(run_identity, store.ids())}) == len(store.ids())
 
 
 def test_runs_of_an_earlier_version_are_included_as_they_are_or_not_at_all(old, tmp_path):

@@ -55,13 +55,14 @@ class _Command(TyperCommand):
     choice, and without types of Python."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the arguments and the options of the command."""
+        """Write the command's arguments and options, without types, into the help,
+        ``formatter``."""
         for parameter in self.params:
             vars(parameter)["display_type_rich"] = lambda *_, **__: ""
         super().format_options(ctx, formatter)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Return the words after the name of the command."""
+        """Return the words after the command's name in the line of its usage, without braces."""
         return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
 
 
@@ -83,7 +84,8 @@ for command, example in COMMANDS:
 
 
 def main() -> None:
-    """Run the command line; an error that the user can correct exits with code 2."""
+    """Run the command line; exit with code 2 after an error that the user can correct, with code 1
+    after an error of the system."""
     gc.set_threshold(100_000, 50, 1_000)  # imported modules stay: collect garbage rarely
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # closed: one of our files would get its number

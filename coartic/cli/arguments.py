@@ -46,8 +46,9 @@ MethodFiles = Annotated[
 
 
 def within(option: str, what: str, least: float, most: float) -> Any:
-    """Return an option for a number from ``least`` to ``most``, a whole number if ``least`` is an
-    int. Reading any other value raises CoarticError."""
+    """Return an option, with the flag ``option`` and the help ``what``, for a number from ``least``
+    to ``most``, a whole number if ``least`` is an int. Reading any other value raises CoarticError.
+    """
 
     def read(text: str) -> Any:
         value = _value_in(text)
@@ -71,9 +72,11 @@ def _value_in(text: str) -> Any:
     return value
 
 
-def asked(name: str, what: str, unit: str = "N") -> Any:
-    """Return an option for the field ``name`` of a request, a number; a wrong number raises
-    CoarticError. Its flag is the name without ``_s``, such as ``--time-limit``."""
+def request_option(name: str, what: str, unit: str = "N") -> Any:
+    """Return an option for a value, a number or ``50..99``, that :func:`.request_for` takes by
+    ``name``, such as ``time_limit_s``; ``what`` is its help, ``unit`` names its value there. Its
+    flag is the name without ``_s``: ``--time-limit``. Reading a value that is refused raises
+    CoarticError."""
     option = f"--{name.removesuffix('_s').replace('_', '-')}"
 
     def read(text: str) -> Any:
@@ -88,14 +91,15 @@ def asked(name: str, what: str, unit: str = "N") -> Any:
 
 
 def names_in(text: str | None) -> list[str]:
-    """Return the names in an option, separated by commas; an empty list for None."""
+    """Return the names in ``text``, separated by commas, without blanks; an empty list for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def _id_named(name: str, names: Mapping[str, str]) -> str:
-    """Return the id of a name, whatever its case; an unknown name is returned unchanged.
+    """Return the id for a name or id in any case; an unknown name is returned unchanged.
 
-    ``names`` holds the names that people use by id. If a name is also an id, the id counts.
+    ``names`` has the name that people use for each id, or an empty text. If a name is also an id,
+    the id counts.
     """
     called = {words.casefold(): each for each, words in names.items() if words}
     ids = {each.casefold(): each for each in names}
@@ -103,7 +107,8 @@ def _id_named(name: str, names: Mapping[str, str]) -> str:
 
 
 def tasks_meant(names: Sequence[str]) -> list[str]:
-    """Return the ids of tasks from their ids or titles, in any case; other names stay unchanged."""
+    """Return the ids of shipped tasks from ids or titles in any case; other names stay
+    unchanged."""
     from coartic import builtin_tasks, load_task
 
     known = {name: load_task(name).label for name in builtin_tasks()}
@@ -111,8 +116,8 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
 
 
 def method_names(registered: Registry) -> Mapping[str, str]:
-    """Return the names that people use for methods, by id; empty for a method without a name and
-    for the learner's conditions, such as ``EC4``."""
+    """Return the names that people use for registered methods, by id; an empty text for a method
+    without such a name, and for conditions such as ``EC4``, which are added."""
     from coartic.analysis.methods import title_of
     from coartic.learner.conditions import EVERY_CONDITION
 
@@ -122,8 +127,8 @@ def method_names(registered: Registry) -> Mapping[str, str]:
 
 
 def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = True) -> list[str]:
-    """Return the ids of methods from names and wildcards that users write; without ``expand`` a
-    wildcard for several methods is returned unchanged.
+    """Return the ids of registered methods from ids, names and wildcards (``optimum/*``) that users
+    write; without ``expand`` a wildcard for several methods is returned unchanged.
 
     Raises CoarticError for an unknown name.
     """
@@ -150,7 +155,7 @@ def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = 
 def check_used(
     method_files: Sequence[Path] | None, registered: Registry, methods: Iterable[str]
 ) -> None:
-    """Raise CoarticError for a method file that defines none of ``methods``, ids of methods."""
+    """Raise CoarticError if a file of ``method_files`` defines none of the ids ``methods``."""
     used = {registered[name].where for name in methods if name in registered}
     for path in method_files or ():
         if str(path.resolve()) not in used:

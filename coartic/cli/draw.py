@@ -86,8 +86,8 @@ def _film(
 ) -> None:
     """Write a film (.gif, .mp4) of one or two runs of a results folder, side by side, or, with
     ``initial``, of one run next to the corrective process alone. ``width`` is in pixels. Raises
-    CoarticError for more, and if ``out`` is there and not to ``replace``.
-    """
+    CoarticError for more than two movements or an unknown run, and if ``out`` cannot be written or
+    is there without ``replace``."""
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of

@@ -82,8 +82,9 @@ def report(
 
 
 def _with_id(name: str, row: Mapping[Any, Any]) -> str:
-    """Return the name of a method, for one from a file behind its id, by which commands know it:
-    ``my-search: Random steps``. ``row`` is of :attr:`.Study.methods`."""
+    """Return the name of a method; for a method from a file, unless the name begins with its id,
+    the id, a colon and the name: ``my-search: Random steps``. ``row`` of :attr:`.Study.methods` has
+    ``base``, the id, and ``built_in``."""
     has_id = row["built_in"] or name.startswith(row["base"])
     return name if has_id else f"{row['base']}: {name}"
 
@@ -161,7 +162,8 @@ def verify(
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Execute every stored solution again, or perform runs again, and compare."""
+    """Execute every stored solution again, or perform runs again, and compare; exit with code 1 if
+    something differs."""
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 
@@ -225,8 +227,8 @@ def _perform_again(
 
 
 def _describe_run(run: Run, code: str) -> None:
-    """Print id, seed, parameters and result of a run, and, if ``code``, the version or code of its
-    method here, is another one than the run's, a sentence that says so."""
+    """Print id, seed, parameters and result of a run, and a sentence if ``code``, the version or
+    code of its method in this installation, differs from the run's."""
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.runs.plan import in_words

@@ -41,10 +41,13 @@ def run(
     ] = None,
     runs: Annotated[
         Any,
-        given.asked("runs", "Runs of each method on each task, or a part of them, such as 50..99."),
+        given.request_option(
+            "runs", "Runs of each method on each task, or a part of them, such as 50..99."
+        ),
     ] = None,
     trials: Annotated[
-        Any, given.asked("trials", "Trials of each run, for methods that have this parameter.")
+        Any,
+        given.request_option("trials", "Trials of each run, for methods that have this parameter."),
     ] = None,
     jobs: Annotated[
         int | None, given.within("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
@@ -59,12 +62,12 @@ def run(
     family_file: Annotated[
         list[Path] | None, given.option("FILE", "A family of your own (TOML).")
     ] = None,
-    seed: Annotated[Any, given.asked("seed", "Seed of the suite.")] = 0,
+    seed: Annotated[Any, given.request_option("seed", "Seed of the suite.")] = 0,
     time_limit_s: Annotated[
-        Any, given.asked("time_limit_s", "Most CPU time of a run.", "SECONDS")
+        Any, given.request_option("time_limit_s", "Most CPU time of a run.", "SECONDS")
     ] = None,
     trial_budget: Annotated[
-        Any, given.asked("trial_budget", "Most trials of a run, whatever its method.")
+        Any, given.request_option("trial_budget", "Most trials of a run, whatever its method.")
     ] = None,
     scheduler: Annotated[
         str | None, given.option("ADDRESS", "Dask scheduler to use instead of this machine.")
@@ -270,7 +273,7 @@ def check(
         typer.Option("--verbose", help="Show what the method prints, logs and crashes with."),
     ] = False,
 ) -> None:
-    """Check a method or a task file against the rules."""
+    """Check a method or a task file against the rules; exit with code 1 if it breaks one."""
     from coartic import builtin_tasks
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
@@ -306,8 +309,8 @@ def check(
 
 
 def _show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print the finding of each law of ``name``, a method or a task file, and how many hold; return
-    the number of broken laws."""
+    """Print the finding of each law (a rule that was checked) of ``name``, a method or a task file,
+    and how many hold; return the number of broken laws."""
     for law in laws:
         first, *more = law.finding.splitlines() or [""]
         say(

@@ -24,8 +24,8 @@ _ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\xa0": " "}
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    """Return ASCII for the characters that a terminal lacks, ``-`` for a minus sign, ``?`` for one
-    without a counterpart, and the place after them, as an error handler of ``codecs`` does."""
+    """Return ASCII for the characters that a terminal lacks (``-`` for a minus sign, ``?`` for a
+    character without a counterpart) and the index after them: an error handler for ``codecs``."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lacking = error.object[error.start : error.end]
@@ -36,9 +36,10 @@ codecs.register_error("replaced", _replaced)
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print lines; characters that do not print, such as line breaks in names, are replaced, and
-    those that the terminal lacks (:func:`_replaced`). Raises CoarticError if the standard output
-    cannot be written; where standard error cannot, the lines are lost."""
+    """Print lines on ``stream``, by default standard output, and then ``end``; characters that do
+    not print, such as line breaks in names, and characters that the terminal lacks are replaced.
+    Raises CoarticError if standard output cannot be written, BrokenPipeError if the reader of
+    ``stream`` has ended; if standard error cannot be written, the lines are lost."""
     stream = stream or sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
     text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
@@ -56,7 +57,8 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """Print an ``Error`` or a ``Warning`` on stderr; a terminal breaks lines between words."""
+    """Print each line of ``text`` on stderr after ``kind``, ``Error`` or ``Warning``, and a colon;
+    on a terminal lines are broken between words."""
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
     wrap = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False).wrap
     for line in text.splitlines():
@@ -109,14 +111,14 @@ class Display:
         self.line()
 
     def show(self, doing: str, *, at_once: bool = False) -> None:
-        """Say what the command is doing from now on: on a terminal, with ``at_once``, and if ten
-        seconds have passed since the last line."""
+        """Note what the command is ``doing`` from now on, and print it: on a terminal or with
+        ``at_once`` always, else if ten seconds have passed since the last line."""
         self._doing, self._since = doing, time.monotonic()
         if self._is_live or at_once or self._since - self._last >= self.EVERY_S:
             self._print(doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines, and leave the line that changes."""
+        """Print lines on stderr, below the line of progress, which stays as it is."""
         with self._one_line:
             say("", stream=sys.stderr, end=self._end)
             self._end = ""

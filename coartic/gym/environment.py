@@ -89,8 +89,8 @@ class TaskEnv(Recorded, gymnasium.Env):
 
 def options_of(env: Any) -> dict[str, Any]:
     """Return the options ``task``, ``ahead`` and ``model`` of an environment of this package, or
-    the options with which an id is registered, as a dictionary, not a copy: do not change it.
-    Raises ValueError for an unknown id, and TypeError for anything else."""
+    the options with which an id, such as ``coartic/Task-v2``, is registered, as a dictionary, not a
+    copy: do not change it. Raises ValueError for an unknown id, and TypeError for anything else."""
     if isinstance(env, str):
         if env not in IDS:
             raise ValueError(unknown("environment", env, IDS))
@@ -99,8 +99,8 @@ def options_of(env: Any) -> dict[str, Any]:
 
 
 def robots_of(env: Any) -> TaskVectorEnv:
-    """Return the robots inside an environment of this package and its wrappers. Raises TypeError
-    for anything else."""
+    """Return the :class:`TaskVectorEnv` that moves the robots of an environment of this package,
+    also one in wrappers. Raises TypeError for anything else."""
     *_, inner = layers(env)
     robots = getattr(inner, "robots", inner)
     if not isinstance(robots, TaskVectorEnv):
@@ -111,7 +111,8 @@ def robots_of(env: Any) -> TaskVectorEnv:
 
 
 def layers(env: Any) -> list[Any]:
-    """Return an environment and those inside it, from its outermost wrapper inwards."""
+    """List the wrappers of an environment, from the outermost inwards, and the environment
+    inside."""
     found = [env]
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
         env = env.venv if hasattr(env, "venv") else env.env
@@ -120,8 +121,8 @@ def layers(env: Any) -> list[Any]:
 
 
 def wrappers_of(env: Any) -> list[Any]:
-    """Return the wrappers of an environment, but for those that Gymnasium and Stable-Baselines3 add
-    by themselves (:data:`ADDED`), from the outermost inwards."""
+    """Return a list of the wrappers of an environment, from the outermost inwards, without wrappers
+    that Gymnasium and Stable-Baselines3 add by themselves (:data:`ADDED`)."""
     return [each for each in layers(env)[:-1] if type(each).__name__ not in ADDED]
 
 

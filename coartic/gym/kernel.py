@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method.optimisers import FAILED
-from coartic.motion.batch import SLOTS, Batch, batch_for, robot_parameters
+from coartic.motion.batch import SLOTS, Batch, RobotRecord, RunRecord, batch_for, robot_parameters
 from coartic.motion.compile import entry, fill_row, inlined, inner
 from coartic.motion.trial import (
     MOVE,
@@ -119,7 +119,7 @@ class VectorState(NamedTuple):
 
 
 @inner
-def _squared_distance(run: Any) -> float:
+def _squared_distance(run: RunRecord) -> float:
     """Return the squared joint-space distance from a run's configuration to its target, which the
     corrective process found; infinite if the process did not converge."""
     square = 0.0 if run.converged else math.inf
@@ -129,7 +129,9 @@ def _squared_distance(run: Any) -> float:
 
 
 @inlined
-def _aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) -> None:
+def _aim_by_action(
+    run: RunRecord, other: RunRecord, movable: Any, action: Any, state: VectorState
+) -> None:
     """Set ``hand``, ``target``, ``converged`` and ``action`` (MOVE) of ``run``, in place, from an
     action, shape ``(A,)``: phase 2, *aim*.
 
@@ -154,9 +156,10 @@ def _aim_by_action(run: Any, other: Any, movable: Any, action: Any, state: Any) 
 
 
 @inlined
-def _step_lot(count: int, robot: Any, state: Any) -> None:
-    """Let the first ``count`` robots in ``state.indices``, at most :data:`SLOTS`, reach for their
-    next goal; change ``q``, ``goal``, ``rewards`` and ``going`` of ``state`` in place."""
+def _step_lot(count: int, robot: RobotRecord, state: VectorState) -> None:
+    """Let the robots whose numbers are the first ``count`` of ``state.indices``, at most 72 and all
+    as in record ``robot``, reach for their next goal by ``state.actions``; change ``q``, ``goal``,
+    ``rewards`` and ``going`` of ``state`` in place."""
     for h in range(len(state.sides)):
         for i in range(count):
             n, run = state.indices[i], state.runs[h, i]
@@ -187,10 +190,10 @@ def _step_lot(count: int, robot: Any, state: Any) -> None:
 
 @entry
 def observe(*fields: Any) -> None:
-    """Fill in ``seen``, ``(N, O)``, in place, of the :class:`VectorState` with entries ``fields``:
-    for each robot 1 where a goal exists (the next one and those ahead), x and y of these goals from
-    the base, length unit, the joints, and, if observations are long enough, 1 for each joint that
-    can move."""
+    """Fill in ``seen``, ``(N, O)``, in place, of a :class:`VectorState`, whose entries are
+    ``fields`` in order: for each robot 1 where a goal exists (the next one and those ahead), x and
+    y of these goals from the base, length unit, the joints, and, if observations are long enough, 1
+    for each joint that can move."""
     state = VectorState(*fields)
     goals, joints = state.ahead + 1, len(state.joints)
     for n in range(len(state.task)):

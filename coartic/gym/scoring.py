@@ -133,7 +133,7 @@ def score(
 
 
 def column(rewards: Iterable[float | None]) -> Array:
-    """Return K rewards as an array of shape ``(K, 1)``, with NaN for None."""
+    """Return K rewards as a column, an array of shape ``(K, 1)``, with NaN for None."""
     return np.array([[np.nan if reward is None else reward] for reward in rewards])
 
 
@@ -160,9 +160,10 @@ def _normaliser(given: str | Path | Any) -> Any:
 
 def _acting(policy: Any, env: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
     """Return a function from observations of ``env`` to actions for a policy, a function or an
-    agent with ``predict``. Observations are normalised by ``normal``, or else as an agent's own
-    environment does, if ``env`` does not. Raises TypeError for any other object, and for an agent
-    whose spaces are not those of ``env`` or whose wrappers an ``env`` without wrappers lacks."""
+    agent with ``predict``. Observations are normalised by ``normal``, a ``VecNormalize``, or, for
+    None, as in the agent's own environment, unless ``env`` normalises them itself. Raises TypeError
+    for any other object, and for an agent whose spaces are not those of ``env`` or whose wrappers
+    an ``env`` without wrappers lacks."""
     normalised = any(map(is_normaliser, layers(env)))
     if normal is None and not normalised:
         normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
@@ -236,9 +237,10 @@ def _rollout(
 def _rollout_as_it_is(
     act: Callable[[NDArray[np.float32]], ArrayLike], env: Any, tasks: int, seed: int
 ) -> Array:
-    """Let ``act`` make trials in an environment in wrappers, until each of its ``tasks`` tasks had
-    one; return the total rewards of its robots, ticks, shape ``(tasks, 1)``, NaN where a trial
-    failed or was cut short."""
+    """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make trials in an
+    environment in wrappers, reset with ``seed``, until each of its ``tasks`` tasks had one. Return
+    the total reward of the first trial on each task, ticks, shape ``(tasks, 1)``; NaN where the
+    trial failed or was cut short."""
     robots, is_one = robots_of(env), isinstance(env, gymnasium.Env)
     totals, rewards = np.zeros(robots.num_envs), dict[int, float]()
 
@@ -266,7 +268,8 @@ def _rollout_as_it_is(
 
 @contextmanager
 def _as_learned(env: Any) -> Iterator[None]:
-    """Keep wrappers from learning, such as the means by which they normalise."""
+    """Set ``training`` and ``update_running_mean`` of an environment and its wrappers to False in
+    the block of this context, so that they keep the means by which they normalise."""
     names = "training", "update_running_mean"
     learning = [
         (each, name)
@@ -314,8 +317,8 @@ def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
 
 
 def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Return the reward, ticks, of a method's solution of a task when executed; None if the method
-    does not apply, finds no solution, or the solution misses a goal."""
+    """Return the reward, ticks below 0, of the solution that a method finds for a task; None if the
+    method does not apply, finds no solution, or the solution misses a goal."""
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
         return execute(task, result.solution, model=model).reward

@@ -183,8 +183,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self._rngs: list[Any] = [None] * num_envs
 
     def task_at(self, number: int) -> Task:
-        """Return task ``number``, from 0, of ``tasks``; the first call loads the task into the
-        state of the robots. Raises ValueError for another number."""
+        """Return task ``number``, from 0, of the environment's tasks; the first call loads the task
+        into the state of the robots. Raises ValueError for another number."""
         check_limits("number", number, 0, len(self.tasks) - 1)
         task, state = as_task(self.tasks[number]), self.state
         if state.kinds[number] < 0:
@@ -210,14 +210,14 @@ class TaskVectorEnv(Recorded, VectorEnv):
         return task
 
     def _places_of(self, robot: Robot) -> NDArray[np.int64]:
-        """Return the index, in a configuration of the robot with the most links, of each entry of a
-        configuration of ``robot``, shape ``(dof,)``."""
+        """Return, for each entry of a configuration of ``robot``, its index in a configuration of
+        the robot with the most links, shape ``(dof,)``."""
         left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
         return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self._widest.most_links + right])
 
     def _begin(self, rows: RowIndex, numbers: ArrayLike) -> None:
-        """Put each of the robots ``rows`` at the start of the task of its number (from 0) in
-        ``numbers``; fill in the observations of all robots."""
+        """Put each of the robots ``rows`` at the start of a task, whose number (from 0) ``numbers``
+        has; fill in the observations of all robots."""
         state = self.state
         state.task[rows], state.goal[rows], state.going[rows] = numbers, 0, True
         for number in {*state.task[rows].tolist()}:
@@ -310,7 +310,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
         return tuple(map(self.picture, range(self.num_envs)))
 
     def picture(self, row: int) -> NDArray[np.uint8]:
-        """Return a picture of robot ``row``, from 0, as :meth:`render` does of all."""
+        """Return a picture of robot ``row``, from 0, and its goals, RGB, ``(400, 600, 3)``, in
+        which goals hit so far are filled."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 

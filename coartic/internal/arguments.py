@@ -50,6 +50,6 @@ def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Co
 
 
 def plain_scalar(value: Any) -> Any:
-    """Return a scalar of NumPy as a scalar of Python; any other value, and a span of time, which
-    NumPy counts among whole numbers, as it is."""
+    """Return a NumPy scalar as a Python scalar; return any other value itself, a NumPy span of time
+    (``timedelta64``) among them."""
     return value.item() if isinstance(value, np.generic) and not is_span(value) else value

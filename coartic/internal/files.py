@@ -16,8 +16,8 @@ LISTING = ".coartic-files"
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file, replacing a file of that name, so that it is there whole or not at all. Raises
-    OSError if it cannot be written."""
+    """Write ``data`` as a file, in place of a file of that name; if that fails, the earlier file
+    stays as it was. Raises OSError if it cannot be written."""
     part = path.with_name(f".coartic-{os.getpid()}-{path.name}")
     try:
         part.unlink(missing_ok=True)
@@ -93,9 +93,9 @@ def check_inside(folder: Path, path: Path) -> None:
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write one file, whole or not at all; over a file of that name only with ``replace``. Raises
-    CoarticError if there is such a file without ``replace``, if its folder is missing or not
-    writable, if it is a folder, a link or a device, and if writing fails."""
+    """Write ``data`` as a file, whole or not at all; over a file of that name only with
+    ``replace``. Raises CoarticError if there is such a file without ``replace``, if its folder is
+    missing or not writable, if it is a folder, a link or a device, and if writing fails."""
     check_output(path, replace=replace)
     with errors_in_words(path):
         write_atomically(path, data)

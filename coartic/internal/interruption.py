@@ -30,7 +30,7 @@ _words = ["Interrupted."]
 
 def catch_signals() -> None:
     """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP), unblocked, raise KeyboardInterrupt
-    from now on, but not in the seconds after one that did. A signal that this process was started
+    from now on, except in the 5 s after a signal that did. A signal that this process was started
     to ignore, as under ``nohup``, stays ignored."""
 
     def interrupt(number: int, _: object) -> None:
@@ -75,8 +75,8 @@ def _interrupt_again(lost: UnraisableHookArgs) -> None:
 
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """Have the process print a sentence when it ends (:func:`end_if_interrupted`) if the block of
-    this context is interrupted. ``sentence`` is called then, and returns the text."""
+    """If the block of this context is interrupted, call ``sentence`` and note the text that it
+    returns, which :func:`end_if_interrupted` prints at the end of the process."""
     try:
         yield
     except KeyboardInterrupt:
@@ -86,8 +86,8 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 
 def end_if_interrupted() -> None:
     """Exit if a signal has interrupted this process: print ``Interrupted.`` and the sentences of
-    :func:`interruptible` on stderr, and exit with code 130 after Ctrl-C, else 143. From now on
-    signals are ignored: the command has ended."""
+    :func:`interruptible` on stderr, and exit with code 130 after Ctrl-C, else 143. If none has,
+    return. Either way these signals are ignored from now on."""
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     if _heard:
@@ -98,8 +98,8 @@ def end_if_interrupted() -> None:
 
 @contextmanager
 def blocked_signals() -> Iterator[None]:
-    """Block the signals :data:`ENDING` in the block of this context, also for processes that start
-    in it, because Ctrl-C reaches all processes of a terminal."""
+    """Block the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) in the block of this context, also
+    for processes that start in it, because Ctrl-C reaches all processes of a terminal."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

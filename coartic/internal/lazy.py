@@ -13,7 +13,8 @@ def import_lazily(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return the functions ``__getattr__`` and ``__dir__`` for module ``package``, whose names are
-    imported on first use. ``homes`` has the module of each name, by name."""
+    imported on first use. ``homes`` has the module in which each name is defined, by name.
+    ``__getattr__`` raises AttributeError for any other name."""
     module = sys.modules[package]
 
     def find(name: str) -> Any:
@@ -30,7 +31,7 @@ def import_lazily(
 
 
 def moved(old: str, new: str) -> None:
-    """Put module ``new`` in the place of module ``old``, its former name, with a
+    """Import module ``new`` and make it answer to its former name ``old``, too, with a
     DeprecationWarning."""
     warnings.warn(f"{old} is {new} now", DeprecationWarning, stacklevel=3)
     sys.modules[old] = import_module(new)

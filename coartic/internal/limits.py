@@ -43,13 +43,13 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def is_span(value: Any) -> bool:
-    """Return whether a value is a span of time of NumPy, which counts among whole numbers there."""
+    """Return whether a value is a span of time of NumPy (``timedelta64``), or an array of them."""
     return getattr(getattr(value, "dtype", None), "kind", "") == "m"
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
     """Return real numbers as an array of float64 of their shape (:func:`real_numbers`). Raises
-    ValueError, which calls the value ``name``, for anything else."""
+    ValueError, which calls the value ``name``, for other values."""
     try:
         return real_numbers(value)
     except ValueError as error:

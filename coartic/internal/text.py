@@ -125,25 +125,16 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 
 
 FOREIGN = (
-    ".urdf",
-    ".xml",
-    ".osim",
-    ".mot",
-    ".sto",
-    ".trc",
-    ".c3d",
-    ".mat",
-    ".xlsx",
-    ".xls",
-    ".ods",
+    *(".urdf", ".xml", ".osim", ".mot", ".sto", ".trc"),
+    *(".c3d", ".mat", ".xlsx", ".xls", ".ods"),
 )
 """Endings of files of robots and recordings that other programs write."""
 
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
     """Return a sentence that coartic does not read a file of another program, known by its ending
-    (:data:`FOREIGN`); empty for any other path. ``wanted`` is the end of the sentence, on files
-    that are read."""
+    (:data:`FOREIGN`); an empty text for any other path. ``wanted`` is the end of the sentence, on
+    files that are read."""
     if not path.lower().endswith(FOREIGN):
         return ""
     ending = path.lower().rpartition(".")[2]

@@ -20,16 +20,8 @@ from pathlib import Path
 from coartic.internal.interruption import ENDING
 
 MOST_JOBS = 10_000
-ONE_THREAD = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-    ),
-    "1",
-)
+_POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
+ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 """Environment variables of a worker, which has one thread, as BLAS threads of workers compete."""
 
 
@@ -65,8 +57,9 @@ def threads_for(jobs: int) -> int:
 
 
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
-    """Call ``work`` with consecutive slices that together cover ``count`` rows, each call in a
-    thread of its own and with at least ``least`` rows; once, in this thread, if rows are too few.
+    """Call ``work`` with consecutive slices that together cover the indices 0 to ``count`` - 1: the
+    first in this thread, each other in a thread of its own, with at least ``least`` indices each,
+    or once if there are fewer.
 
     There are at most as many threads as cores, or, if it is set, as ``OMP_NUM_THREADS`` says (one
     in worker processes). Returns when all calls have ended; raises what ``work`` raises.

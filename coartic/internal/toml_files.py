@@ -26,9 +26,9 @@ _MANY_PARTS = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){100}")
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
-    """Return the content of a TOML file as a dictionary. Raises ``error``, which names the file, if
-    it cannot be read, has more than 1,000,000 bytes or a name of more than 100 parts, or is not
-    TOML in UTF-8."""
+    """Return the content of a TOML file as a dictionary. Raises an exception of class ``error``,
+    which names the file, if it cannot be read, has more than 1,000,000 bytes or a name of more than
+    100 parts, or is not TOML in UTF-8."""
     check_file(path, error=error, most=_MOST_TOML)
     shown = plain(str(path), LONGEST_LINE)
     try:
@@ -48,8 +48,8 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
 def check_file(
     path: str | Path, *, error: type[CoarticError] = CoarticError, most: int = MOST_BYTES
 ) -> None:
-    """Raise ``error``, which names the file, if it is missing, may not be read, is a folder, a pipe
-    or a device, or has more than ``most`` bytes."""
+    """Raise an exception of class ``error``, which names the file, if it is missing, may not be
+    read, is a folder, a pipe or a device, or has more than ``most`` bytes."""
     shown = plain(str(path), LONGEST_LINE)
     try:
         found = Path(path).stat()

@@ -82,7 +82,7 @@ def changed_values(thing: Any) -> dict[str, Any]:
 
 def equal_contents(a: Any, b: Any) -> Any:
     """Return whether two objects are of one class and equal in all fields, arrays by their entries,
-    NaN as NaN: the ``__eq__`` of classes with arrays. What they keep besides does not count."""
+    NaN as NaN: the ``__eq__`` of classes with arrays. NotImplemented for objects of two classes."""
     import numpy as np
 
     def plain(value: Any) -> Any:
@@ -117,8 +117,8 @@ class FileData(BaseModel):
 
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
-    """Return lines ``source: sentence``, one for each of the first 20 problems of file ``source``,
-    and a last line with the number of further problems.
+    """Return lines ``source: sentence``, one for each of the first 20 problems in ``error`` of file
+    ``source``, and, if there are more, a last line with their number.
 
     ``keys`` are the keys that the file may have in any of its tables.
     """

@@ -137,7 +137,7 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """Drifts κ as a tuple, which has one number if ``drift`` is a number."""
+        """The field ``drift``, κ, as a tuple: a single number becomes a tuple of one."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
-from coartic.motion.batch import Batch, arm_of, batch_for, load, width_of
+from coartic.motion.batch import Batch, RobotRecord, RunRecord, arm_of, batch_for, load, width_of
 from coartic.motion.compile import (
     entry,
     fill_row,
@@ -149,8 +149,8 @@ class _Workspace(NamedTuple):
 def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
 ) -> LearnerParameters:
-    """Return a task and a condition as the learner's kernel reads them; ``first`` has a movement
-    for each goal, the movements of trial 0; a movement without a target stands for **A**."""
+    """Return a task and a condition as arrays for the learner's kernel; ``first`` has the movements
+    of trial 0, one for each goal; a movement without a target stands for **A**."""
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(first), width), np.nan)
     for target, movement in zip(first_targets, first, strict=True):
@@ -198,7 +198,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
 
 
 def workspace_for(runs: int, task: Task) -> _Workspace:
-    """Return the arrays in which the kernel works on ``runs`` runs, at most 72, of a task."""
+    """Return new arrays in which the kernel works on ``runs`` runs, at most 72, of a task."""
     return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
@@ -210,7 +210,7 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
 
 
 @inlined
-def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
+def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _Workspace) -> float:
     """Return the distance of a hand (0 left, 1 right) of a run from the centre of its goal, length
     unit; add 1 to the run's ``evaluations``."""
     arm = arm_of(robot, hand)
@@ -223,7 +223,9 @@ def distance_to_goal(run: Any, hand: int, robot: Any, workspace: Any) -> float:
 
 
 @inlined
-def _nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
+def _nearest_posture(
+    n: int, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
+) -> int:
     """Return the hand, 0 left or 1 right, with which the corrective process **A** finds the posture
     nearest in joint space for the goal of run ``n``; of equal hands the first. A hand with which
     **A** fails is farthest. Iterations and evaluations are counted; the run does not move.
@@ -247,8 +249,8 @@ def _nearest_posture(n: int, robot: Any, learner: Any, workspace: Any) -> int:
 
 @inlined
 def _best_hand(entries: Any, hands: Any) -> int:
-    """Return the hand, 0 left or 1 right, among ``hands`` whose record in ``entries`` (by hand) has
-    the highest value Q; of equal hands the first."""
+    """Return the hand, 0 left or 1 right, among ``hands`` whose record in ``entries``, an array of
+    two by hand, has the highest ``value``, Q; of equal hands the first."""
     best = hands[0]
     for hand in hands[1:]:
         if entries[hand].value > entries[best].value:
@@ -262,8 +264,7 @@ def choose_hand(
 ) -> int:
     """Return the hand (0 left, 1 right) of run ``n`` for its goal: the hand of highest value in
     ``entries``, the records of Q and q* by hand; with ``explore``, with probability ε, the hand
-    that the condition explores, a random one of hands that are equally close to the goal.
-    """
+    that the condition explores (random, closest to the goal, or nearest in posture)."""
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:
@@ -280,30 +281,13 @@ def choose_hand(
     return _best_hand(entries, hands)
 
 
-@inlined
-def _find_mean(run: Any, stored: Any, learner: Any) -> None:
-    """Set the target of a run, in place, to the mean of exploration: the stored target q*(s, a);
-    the other arm's joints, if the condition does not modify them, keep their current values."""
-    for j in range(len(run.q)):
-        run.target[j] = run.q[j] if learner.follows[run.hand, j] else stored.target[j]
-
-
-@inlined
-def _draw_drift(run: Any, learner: Any, rng: Any) -> None:
-    """Set drift κ and pull β of a run for its next trial; κ is drawn if there are several."""
-    number = len(learner.drifts)
-    run.drift = learner.drifts[int(rng.random() * number) if number > 1 else 0]
-    run.pull = learner.pull
-
-
 @inner
-def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
+def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) -> None:
     """Set the preferred posture p of a run, in place, once its hand for goal ``number`` (from 0) is
-    chosen: the present posture q (*stay*), the start of the trial (*start*), or (*next goal*)
-    (q + t') / 2, with the target t' stored for the next goal and the hand of highest value there
-    after this hand; q for joints that the movement to t' would not explore, and if no target is
-    stored. ``table``: Q and q* of the run, shape ``(G, 3, 2)``.
-    """
+    chosen: the present posture q (*stay*), the start of the trial (*start*), or (*next goal*) (q +
+    t') / 2, with the target t' stored for the next goal and the hand of highest value there after
+    this hand; q for joints that the movement to t' would not explore, and if no target is stored.
+    ``table``: Q and q* of the run, shape ``(G, 3, 2)``. Nothing changes if drift and pull are 0."""
     if run.drift == 0.0 and run.pull == 0.0:
         return
     fill_row(run.preferred, run.q)
@@ -320,7 +304,9 @@ def prefer(run: Any, number: int, table: Any, learner: Any) -> None:
 
 
 @inner
-def drift(run: Any, robot: Any, learner: Any, workspace: Any) -> None:
+def drift(
+    run: RunRecord, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
+) -> None:
     """Move the mean t of exploration, the run's ``target``, in place, by κ N(t) (p − t), and an
     idle arm that is explored by κ (p − t); p is the preferred posture, N projects onto the null
     space of the hand's Jacobian. Without a drift κ nothing changes."""
@@ -356,22 +342,23 @@ def aim(
     before: int,
     table: Any,
     explore: bool,
-    robot: Any,
-    learner: Any,
-    rng: Any,
-    workspace: Any,
+    robot: RobotRecord,
+    learner: LearnerParameters,
+    rng: np.random.Generator,
+    workspace: _Workspace,
 ) -> None:
     """Choose the hand of run ``n`` for goal ``number`` (from 0) after hand ``before`` (0 left, 1
-    right, 2 none); if a target q*(s, a) is stored, set the run's target to the mean of exploration
-    plus noise η, without ``explore`` to q* alone: phase 2, *aim*. ``table``: Q and q* of the run,
-    shape ``(G, 3, 2)``."""
+    right, 2 none); if a target q*(s, a) is stored, set the run's target to q*, where joints that
+    the condition does not modify keep their values, with ``explore`` moved by the drift and with
+    noise η: phase 2, *aim*. ``table``: Q and q* of the run, shape ``(G, 3, 2)``."""
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
     prefer(run, number, table, learner)
     if stored.value > -math.inf:
         run.action, run.corrects = MOVE, learner.corrects
-        _find_mean(run, stored, learner)
+        for j in range(len(run.q)):
+            run.target[j] = run.q[j] if learner.follows[run.hand, j] else stored.target[j]
         if explore:
             drift(run, robot, learner, workspace)
         for j in range(len(run.q)):
@@ -383,22 +370,25 @@ def aim(
 def make_trial(
     first: bool,
     explore: bool,
-    robot: Any,
-    learner: Any,
+    robot: RobotRecord,
+    learner: LearnerParameters,
     tables: Any,
     trial: Any,
     rngs: Any,
-    workspace: Any,
+    workspace: _Workspace,
 ) -> None:
     """Make one trial in each of N runs, up to the first goal missed; fill in ``trial``, the
     accounts of the goals, shape ``(N, G)``, and the counts in ``workspace``. ``first`` makes trial
     0, with hands and targets of ``learner``; without ``explore`` a trial is greedy and has no
-    noise. ``tables``: Q and q* of the runs, ``(N, G, 3, 2)``; ``rngs``: addresses ``(N, 3)``."""
+    noise. ``tables``: Q and q* of the runs, ``(N, G, 3, 2)``; ``rngs``: addresses of their
+    generators, ``(N, 3)`` (:func:`addresses`)."""
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
         if explore and not first:
-            _draw_drift(batch.runs[n], learner, generator_at(rngs, n))
+            several, rng = len(learner.drifts), generator_at(rngs, n)
+            kappa = learner.drifts[int(rng.random() * several) if several > 1 else 0]
+            batch.runs[n].drift, batch.runs[n].pull = kappa, learner.pull
         for k in range(counts.shape[1]):
             counts[n, k] = 0
     for number in range(len(learner.goals)):
@@ -429,9 +419,10 @@ def make_trial(
 
 
 @inlined
-def _find_returns(trial: Any, learner: Any, returns: Any) -> None:
+def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
     """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial,
-    ticks below 0: Σ γ^|h − g| r_h over goals h from g on, or over all; r_h is minus the ticks."""
+    ticks below 0: Σ γ^|h − g| r_h over goals h from g on, or, if earlier goals count, over all; r_h
+    is minus the ticks."""
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
         returns[number] = earlier
@@ -453,18 +444,18 @@ def _copy_accounts(source: Any, destination: Any) -> None:
 
 
 @inlined
-def _learn_from(number: int, learner: Any, tables: Any, results: Any, workspace: Any) -> None:
+def _learn_from(
+    number: int, learner: LearnerParameters, tables: Any, results: Results, workspace: _Workspace
+) -> None:
     """Add trial ``number`` (from 0) of each run to ``results``; in runs that completed it, update Q
     and q* in ``tables``: each visited state and hand is credited with the reward of the trial, or
-    the return of its goal; a credit above Q replaces Q, and where the goal was hit replaces q*."""
+    the return of its goal; a credit above Q replaces Q, and the configuration at the hit replaces
+    q*."""
     others = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
     for n in range(len(tables)):
-        trial, counts, completed = (
-            results.last[n],
-            workspace.counts[n],
-            workspace.batch.runs[n].going,
-        )
+        trial, counts = results.last[n], workspace.counts[n]
+        completed = workspace.batch.runs[n].going
         for k in range(len(counts)):
             results.counts[n, k] += counts[k]
         results.corrections[n, part] += counts[CORRECTIONS]
@@ -494,9 +485,10 @@ def _learn_from(number: int, learner: Any, tables: Any, results: Any, workspace:
 def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
-    """Make all trials of N runs, each with its own generator, and then in each a greedy trial
-    without noise, the replay; fill in ``tables``, Q and q*, shape ``(N, G, 3, 2)``, and
-    ``results`` (:class:`Results`)."""
+    """Make all trials of N runs, each with its own generator (``rngs``, :func:`addresses`), and
+    then in each a greedy trial without noise, the replay; fill in ``tables``, Q and q*, shape ``(N,
+    G, 3, 2)``, and ``results`` (:class:`Results`). ``learner`` comes from
+    :func:`learner_parameters`."""
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         first, explore, made = number == 0, number < trials, results.last

@@ -62,8 +62,8 @@ _MOST_TOGETHER = 4_000_000  # trials of runs whose rewards fit into one answer o
 
 
 def runs_at_once(trials: int) -> int:
-    """Return how many runs of ``trials`` trials one job performs at most: 72, fewer if they have
-    more than 4,000,000 trials together, whose rewards one answer of a worker holds; at least 1."""
+    """Return how many runs of ``trials`` trials a process makes together at most: 72, or fewer if
+    these have more than 4,000,000 trials in all; at least 1."""
     return max(1, min(SLOTS, _MOST_TOGETHER // trials))
 
 
@@ -92,7 +92,7 @@ def learn(
     model : MotionModel
     start : sequence of Movement
         A first solution, such as a planner's or an earlier run's. Trial 0 moves with its hands
-        straight to the first target that it has for each goal, length unit (base) and rad
+        straight to the target of its first movement for each goal, length unit (base) and rad
         (joints); the corrective process acts where that misses the goal, or there is no target.
         Without a first solution it acts alone.
 
@@ -115,8 +115,8 @@ def learn(
     SolutionError
         The first solution breaks the task's rules.
     ValueError
-        The seed is no whole number from 0, there is no trial, a constant of the model is out of
-        bounds, or the task was changed so that it contradicts itself.
+        The seed is no whole number from 0, ``trials`` is not from 1 to 10,000,000, a constant of
+        the model is out of bounds, or the task was changed so that it contradicts itself.
 
     Notes
     -----

@@ -75,7 +75,7 @@ class DualProcess(Method):
     tuned_on = "nothing: the paper's values"
 
     def rules(self) -> ExplorationCondition:
-        """Return the method's exploration condition with the values of the parameters."""
+        """Return the method's exploration condition, with the values of its parameters."""
         return _condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
@@ -92,8 +92,8 @@ class DualProcess(Method):
         return result
 
     def most_together(self) -> int:
-        """Return the largest number of runs that one job performs: 72, or fewer if they have more
-        than 4,000,000 trials together; at least 1."""
+        """Return the largest number of sessions for one call of :meth:`solve_together`: 72, or
+        fewer if their runs have more than 4,000,000 trials together; at least 1."""
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:

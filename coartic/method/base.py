@@ -71,7 +71,8 @@ class Outline(NamedTuple):
 
 
 def outline_of(task: Task) -> Outline:
-    """Return the properties of a task by which a method says whether it applies to the task."""
+    """Return name, number of goals, dof, hands and initial hands of a task, by which a method says
+    whether it applies."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
@@ -154,14 +155,15 @@ def run_method(
 ) -> tuple[Result, Session]:
     """Let a method solve a task, as it does in a suite.
 
-    Methods of this project are trusted to count by themselves; any other method gets the
+    Methods of this project may see the task and count by themselves; any other method gets only the
     information that it declares. ``task`` is a task, its name or its file; ``seed`` is the seed of
     the method's random numbers. There is no budget of trials, and the solution is not executed.
 
     Returns the solution with its details, and the session in which it was found, with its counts
     and rewards. Raises MethodError if the method finds no solution, UndeclaredError if it uses
-    information that it does not declare, NotApplicableError if it does not apply to the task, and
-    ValueError for a seed that is no whole number from 0.
+    information that it does not declare, NotApplicableError if it does not apply to the task,
+    SolutionError if its solution is no list, and ValueError for a seed that is no whole number from
+    0.
     """
     built_in = [getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES]
     is_ours = type(method) in chain.from_iterable(built_in)

@@ -77,10 +77,11 @@ NO_COPIES = (
 
 
 def explored_joints(session: Session) -> NDArray[np.bool_]:
-    """Return True for the entries of a configuration that methods explore, bool, shape ``(dof,)``.
+    """Return True for the entries of a configuration that methods explore on the session's task,
+    bool, shape ``(dof,)``.
 
-    They are the same at every goal: the coordinates of the base that are not locked, and the arms
-    of all hands of the robot, as the learner explores with one hand (EC1) or two (EC4).
+    These are, at every goal, the coordinates of the base that are not locked and the joints of the
+    arms of all hands of the task, as the learner explores with one hand (EC1) or two (EC4).
     """
     mask = np.zeros(session.dof, dtype=np.bool_)
     mask[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
@@ -102,8 +103,8 @@ def sequences_of(session: Session) -> list[str]:
 
 
 def _entries_of(name: str, points: ArrayLike) -> Array:
-    """Return points as an array (:func:`real_array`). Raises ValueError for a frame or a series of
-    pandas, whose names of columns could say another order."""
+    """Return points as an array (:func:`real_array`). Raises ValueError, which calls them ``name``,
+    for other values and for pandas, whose names could say another order."""
     if hasattr(points, "iloc"):
         raise ValueError(f"{name} has names of pandas: give {name}.to_numpy(), in order of entries")
     return real_array(name, points)
@@ -133,19 +134,9 @@ class Objective:
     """
 
     __slots__ = (
-        *("joints", "configurations", "dim", "bounds"),
-        *(
-            "_asked",
-            "_best_cost",
-            "_best_hands",
-            "_best_targets",
-            "_best_x",
-            "_better",
-            "_codes",
-            "_end",
-        ),
-        *("_entries", "_evaluations", "_hands"),
-        *("_process", "_session", "_targets", "_task"),
+        *("joints", "configurations", "dim", "bounds", "_asked", "_best_cost", "_best_hands"),
+        *("_best_targets", "_best_x", "_better", "_codes", "_end", "_entries", "_evaluations"),
+        *("_hands", "_process", "_session", "_targets", "_task"),
     )  # no others are set by mistake, such as a budget
 
     def __init__(
@@ -227,8 +218,9 @@ class Objective:
 
     @property
     def best_known(self) -> int | None:
-        """Lowest cost known of the task, ticks: of any hand sequence, also with goals that are hit
-        without a movement. Raises UndeclaredError in a method, as :attr:`task` does.
+        """Lowest cost known of the task, ticks, of any solution: with any hand sequence, also with
+        goals that are hit without a movement. Raises UndeclaredError in a method, as :attr:`task`
+        does.
 
         None where no cost is shipped: for a task of your own, for instances of a family except the
         first 40 of its test split, and for another model than the paper's.
@@ -259,7 +251,8 @@ class Objective:
 
     @property
     def best_cost(self) -> float:
-        """Cost of the best trial so far, ticks; at first that of the corrective process alone."""
+        """Cost of the best trial so far, ticks; at first the cost of the corrective process
+        alone."""
         return self._best_cost
 
     @property
@@ -269,12 +262,12 @@ class Objective:
 
     @property
     def lower(self) -> Array:
-        """Lower ends of ``bounds``, shape ``(dim,)``, a copy."""
+        """Lower ends of ``bounds``, a box to search in, ``(dim,)``, length unit and rad, a copy."""
         return self.bounds[:, 0].copy()
 
     @property
     def upper(self) -> Array:
-        """Upper ends of ``bounds``, shape ``(dim,)``, a copy."""
+        """Upper ends of ``bounds``, a box to search in, ``(dim,)``, length unit and rad, a copy."""
         return self.bounds[:, 1].copy()
 
     @property
@@ -303,9 +296,9 @@ class Objective:
 
     @property
     def x0(self) -> Array:
-        """A point to begin with, shape ``(dim,)``, a copy: the postures in which the corrective
-        process alone hits the goals. Straight movements to these postures can cost more or less
-        than the corrective process."""
+        """A point to begin with, shape ``(dim,)``, length unit and rad, a copy: the postures in
+        which the corrective process alone hits the goals. Straight movements to these postures can
+        cost more or less than the corrective process."""
         return self.configurations[self.joints].copy()
 
     @property
@@ -317,8 +310,8 @@ class Objective:
 
     @property
     def solution(self) -> tuple[Movement, ...]:
-        """The movements of the best trial, for :func:`coartic.execute`; ValueError before the first
-        trial that succeeds."""
+        """The movements of the best trial so far, for :func:`coartic.execute`; at first the
+        movements of the corrective process alone."""
         return movements_of(self.best_hands, self._best_targets)
 
     def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:
@@ -433,8 +426,9 @@ class Objective:
         self._warn_of_degrees(costs[worst], made, worst)
 
     def _warn_of_degrees(self, cost: float, made: Accounts, trial: int) -> None:
-        """Warn, outside of a method, of a costly trial (row ``trial`` of ``made``) whose targets
-        may be meant in degrees, as :func:`coartic.execute` does."""
+        """Warn, except in a method, that targets of trial ``trial`` (from 0) of ``made`` may be
+        meant in degrees, if one has an angle beyond 20 rad (:func:`.hint_of`) and ``cost``, ticks,
+        exceeds the number of steps in 20 rad."""
         if self._task is not None and cost > WHOLE_TURNS / self._session.model.step:
             targets = self._targets_in(made, trial)
             if hint := hint_of(movements_of(self.hands, targets)):
@@ -443,8 +437,8 @@ class Objective:
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
-        """Note a point as the best so far, evaluated as number ``evaluations`` (from 1): ``trial``
-        (from 0) is the row of its trial in ``codes`` and in ``made``."""
+        """Note a point and its ``cost``, ticks, as the best so far, evaluated as number
+        ``evaluations`` (from 1): its trial is row ``trial`` (from 0) of ``codes`` and ``made``."""
         self._best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
         self._best_hands = letters_of([HANDS[code] for code in codes[trial]])
@@ -452,7 +446,7 @@ class Objective:
 
     def _targets_in(self, made: Accounts, trial: int) -> Configs:
         """Return a copy of the targets to which trial ``trial`` (from 0) of ``made`` moved, shape
-        ``(G, dof)``."""
+        ``(G, dof)``, length unit and rad."""
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:

@@ -144,8 +144,8 @@ class Meter:
     that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add each count to the counter of that name, in place; times are not to be named. Names,
-        signs, sums and budgets are not checked."""
+        """Add each count to the counter of that name (not to times, ``build_s`` and ``solve_s``),
+        in place. Names, signs, sums and budgets are not checked."""
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 
@@ -235,7 +235,7 @@ class Session:
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration that holds the joint angles of a hand's arm."""
+        """Return the slice of a configuration that holds the joint angles, rad, of a hand's arm."""
         return self._task.robot.joints(hand)
 
     # These need a declaration.
@@ -267,7 +267,8 @@ class Session:
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
         """Return the position of a hand, x and y, as a CasADi expression, 2 x 1, length unit, for a
         CasADi ``q``, dof x 1. Raises UndeclaredError without ``Information.KINEMATIC_MODEL``, and
-        ValueError for another size. The method itself counts evaluations, with :meth:`spend`."""
+        ValueError for another size or hand. The method itself counts evaluations (:meth:`spend`).
+        """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot.symbolic_hand(q, hand)
 
@@ -313,9 +314,10 @@ class Session:
         return positions
 
     def jacobian(self, q: Any, hand: Hand) -> Array:
-        """Return derivatives of a hand's x and y by each entry of ``q``, ``(..., 2, dof)``, for
-        configurations ``(..., dof)``; count a Jacobian for each. Raises UndeclaredError without
-        ``Information.JACOBIAN``, and ValueError if ``q`` or ``hand`` does not fit the robot."""
+        """Return derivatives of a hand's x and y by each entry of ``q``, ``(..., 2, dof)``, length
+        unit per length unit (base) or rad, for configurations ``(..., dof)``; count a Jacobian for
+        each. Raises UndeclaredError without ``Information.JACOBIAN``, and ValueError if ``q`` or
+        ``hand`` does not fit the robot."""
         self._use(Information.JACOBIAN)
         jacobians = self._task.robot.jacobian(q, hand)
         self._meter.add(jacobians=jacobians[..., 0, 0].size)
@@ -442,9 +444,9 @@ class Session:
         self, codes: Hands, targets: Configs, *, until: ArrayLike | None = None
     ) -> Accounts:
         """Make and count N trials, with hands 0 (left) or 1 (right), ``(N, G)``, and targets ``(N,
-        G, dof)``, and return their accounts; with ``until``, rewards ``(N,)``, only up to the first
-        trial whose reward exceeds its entry. Neither arguments nor the budget are checked: the
-        caller checks them, and holds ``lock``."""
+        G, dof)``, and return their accounts; with ``until``, rewards ``(N,)``, count and return
+        only trials up to the first whose reward exceeds its entry. Neither arguments nor the budget
+        are checked: the caller checks them, and holds ``lock``."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]

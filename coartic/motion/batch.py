@@ -31,12 +31,18 @@ SLOTS = 72
 _VECTOR = 8  # slots that vectors hold; SLOTS is a multiple of it
 GOING = 0.0
 """Status of a slot that has not ended."""
+RobotRecord = Any
+"""Record of a robot, its task's limits and the model, for kernels (:func:`robot_parameters`)."""
+RunRecord = Any
+"""Record of a run, a robot that makes a trial (:func:`batch_for`)."""
+SlotArrays = Any
+"""Record of the slots' arrays by name, whose last axis is the slot (:func:`layout`)."""
 
 
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which the kernels of a robot are compiled: 4 or 8 if
-    no arm has more, else the number of the arm with more links. So robots of a family share machine
-    code."""
+    no arm has more, else the number of the arm with more links. So most robots share machine code.
+    """
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
@@ -97,7 +103,7 @@ def robot_parameters(
 
 
 @inlined
-def arm_of(robot: Any, hand: int) -> Any:
+def arm_of(robot: RobotRecord, hand: int) -> Arm:
     """Return the :class:`Arm` of a hand (0 left, 1 right) from a record of
     :func:`robot_parameters`; its links share memory with the record."""
     arm = robot.arms[hand]
@@ -123,7 +129,8 @@ class Batch(NamedTuple):
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
-    """Return a batch of ``count`` runs, at most :data:`SLOTS`, whose records are all 0."""
+    """Return a new batch for kernels: ``count`` records of runs, at most 72 (:data:`SLOTS`), and
+    the arrays of 72 slots; all numbers are 0."""
     width = width_of(robot)
     fields = {
         "q": (np.float64, width),  # where the robot is, length unit and rad
@@ -151,10 +158,9 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
 
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
-    """Return the NumPy type of the record of all rows of slots, for arms with ``links`` links, and
-    the slices of rows that a correction and that a movement need. Shorter arms end in links of
-    length 0.
-    """
+    """Return the NumPy type of :data:`SlotArrays` for arms with ``links`` links, and two slices of
+    its rows (a row has a number for each slot): the rows that a correction needs, and those that a
+    movement needs. Shorter arms end in links of length 0."""
     joints = (BASE_DOF + links,)
     corrected = {"q": joints}  # base x and y, then the joints of the arm
     common = {
@@ -187,15 +193,15 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
 
 
 def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
-    """Return the number of rows that quantities take together: the sum of the products of their
-    ``shapes``, which are given by name and without the axis of slots."""
+    """Return the number of rows that quantities take together: the sum of the products of
+    ``shapes``, the shape of each quantity in a slot, by its name."""
     return sum(math.prod(shape) for shape in shapes.values())
 
 
 @inlined
-def _copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
-    """Copy the base and the joints of ``arm`` from configuration ``q`` into column ``slot`` of
-    ``row``, in place; entries beyond the joints become 0."""
+def _copy_arm(row: Any, slot: int, q: Any, arm: Arm) -> None:
+    """Copy base and joints of ``arm`` from configuration ``q``, shape ``(dof,)``, into column
+    ``slot`` of ``row``, shape ``(joints, slots)``, in place; further entries become 0."""
     row[0, slot] = q[0]
     row[1, slot] = q[1]
     for k in range(len(row) - BASE_DOF):
@@ -203,9 +209,9 @@ def _copy_arm(row: Any, slot: int, q: Any, arm: Any) -> None:
 
 
 @inlined
-def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
-    """Copy goal, base and joints of ``run``, which is run ``number`` (from 0) of its batch, and
-    shoulder and links of its ``arm`` into slot ``slot``, a column of the arrays ``at``."""
+def load(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
+    """Copy goal, base and joints of ``run``, record ``number`` (from 0) of its batch, and shoulder
+    and links of its ``arm`` into column ``slot`` of the arrays ``at``, in place."""
     at.run[slot], at.first[slot], at.links[slot] = number, arm.first, len(arm.links)
     at.shoulder[0, slot] = arm.shoulder_x
     at.shoulder[1, slot] = arm.shoulder_y
@@ -216,9 +222,9 @@ def load(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
 
 
 @inlined
-def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
-    """Copy a run into slot ``slot`` (:func:`load`), with start, target and squared joint-space
-    length of its movement to its target, which :func:`move_slots` can then make."""
+def start(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
+    """Copy a run into column ``slot`` of ``at`` (:func:`load`), with start, target and squared
+    joint-space length of the movement to its target, which :func:`move_slots` can then make."""
     load(at, slot, number, run, arm)
     _copy_arm(at.start, slot, run.q, arm)
     _copy_arm(at.target, slot, run.target, arm)
@@ -230,9 +236,9 @@ def start(at: Any, slot: int, number: int, run: Any, arm: Any) -> None:
 
 
 @inlined
-def store(at: Any, slot: int, q: Any) -> None:
-    """Copy the base and the joints of the arm in slot ``slot`` into configuration ``q``, in place;
-    entries of the other arm stay."""
+def store(at: SlotArrays, slot: int, q: Any) -> None:
+    """Copy the base and the joints of the arm in column ``slot`` of ``at`` into configuration
+    ``q``, shape ``(dof,)``, in place; entries of the other arm stay."""
     q[0] = at.q[0, slot]
     q[1] = at.q[1, slot]
     for k in range(at.links[slot]):
@@ -241,8 +247,8 @@ def store(at: Any, slot: int, q: Any) -> None:
 
 @inlined
 def compact(rows: Any, slot: int, last: int) -> None:
-    """Copy column ``last`` of ``rows`` (quantities, slots) over column ``slot``, in place: the run
-    of this slot has ended."""
+    """Copy column ``last`` of ``rows``, shape ``(rows, slots)``, over column ``slot``, in place:
+    the run in ``slot`` has ended, and the run in slot ``last`` takes its place."""
     if slot != last:
         for row in range(len(rows)):
             rows[row, slot] = rows[row, last]
@@ -250,11 +256,9 @@ def compact(rows: Any, slot: int, last: int) -> None:
 
 @inner
 def padded_count(count: int) -> int:
-    """Return the number of slots to work on for ``count`` slots: ``count`` itself for 0 and 1, else
-    rounded up to whole vectors of 8 slots; the last slots may belong to no run.
-
-    A loop over whole vectors leaves no slots over that would be worked on one by one.
-    """
+    """Return the number of slots to work on if ``count`` are in use: ``count`` itself for 0 and 1,
+    else ``count`` rounded up to whole vectors of 8 slots, the last of which may hold no run; so no
+    slots are left over that would be worked on one by one."""
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
@@ -272,9 +276,10 @@ def winding(q: Any, slot: int) -> float:
 
 
 @inner
-def are_near(at: Any, count: int) -> bool:
-    """Return whether all link angles of the first ``count`` slots are certain to be below 1e5 rad,
-    the range of the fast cosine: True if each arm's absolute joint angles have a lower sum."""
+def are_near(at: SlotArrays, count: int) -> bool:
+    """Return True if all links in the first ``count`` columns of ``at`` are certain to have an
+    absolute angle below 1e5 rad, the range of the fast cosine, as the absolute angles of the arm's
+    joints have a lower sum; False if they may have or not."""
     far = 0
     for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1
@@ -282,11 +287,12 @@ def are_near(at: Any, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel ``chains(at, count)`` that fills the rows ``x`` and ``y`` of the first
-    ``count`` slots by forward kinematics, with the functions ``cos`` and ``sin``."""
+    """Return a kernel ``chains(at, count)`` that fills the arrays ``x`` and ``y`` in the first
+    ``count`` columns of ``at`` with the places of shoulder, joints and hand, computed with
+    functions ``cos`` and ``sin``."""
 
     @inner
-    def chains(at: Any, count: int) -> None:
+    def chains(at: SlotArrays, count: int) -> None:
         for i in range(count):
             arm = Arm(BASE_DOF, at.length[:, i], at.shoulder[0, i], at.shoulder[1, i])
             chain_by(at.q[:, i], arm, at.x[:, i], at.y[:, i], cos, sin)
@@ -299,9 +305,10 @@ _far_chains = _chains_by(cosine, sine)
 
 
 @inner
-def place(at: Any, count: int, near: bool) -> None:
-    """Fill the rows ``x`` and ``y`` of the first ``count`` slots, places of shoulder, joints and
-    hand, by forward kinematics; ``near``: the result of :func:`are_near`."""
+def place(at: SlotArrays, count: int, near: bool) -> None:
+    """Fill the arrays ``x`` and ``y`` in the first ``count`` columns of ``at``, in place, with the
+    places of shoulder, joints and hand, length unit, for the configurations ``at.q``. With ``near``
+    all link angles are below 1e5 rad (:func:`are_near`)."""
     if near:
         _near_chains(at, padded_count(count))
     else:

@@ -62,7 +62,7 @@ class _Kernel:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """Numba's dispatcher of the function, which is compiled on first use."""
+        """The function as a dispatcher of Numba, which compiles it when it is first called."""
         return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -70,8 +70,9 @@ class _Kernel:
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """Pass attribute access on to the compiled dispatcher: Numba then accepts a Kernel inside
-        kernels."""
+        """Return an attribute of the compiled dispatcher that Numba asks for (``_numba_type_``,
+        ``py_func`` or ``targetoptions``), so that kernels can call a kernel. AttributeError for
+        others."""
         if name in ("_numba_type_", "py_func", "targetoptions"):
             return getattr(self.dispatcher, name)
         raise AttributeError(f"a kernel has no attribute {name!r}")
@@ -108,7 +109,7 @@ def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
 
 @inlined
 def fill_row(row: Any, values: Any) -> None:
-    """Copy ``values`` into ``row``, in place, as many as both have."""
+    """Copy the first numbers of ``values`` into ``row``, in place, as many as both have."""
     for j in range(min(len(row), len(values))):
         row[j] = values[j]
 
@@ -120,7 +121,7 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
     """Return the addresses with which kernels draw from N NumPy generators (:func:`generator_at`),
-    shape ``(N, 3)``. The generators must outlive the call of the kernel."""
+    of state and two functions, shape ``(N, 3)``. The generators must outlive the kernel's call."""
 
     def draws_of(generator: np.random.Generator) -> list[int | None]:
         c = generator.bit_generator.ctypes
@@ -151,7 +152,7 @@ def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any
 
 @inner
 def generator_at(addresses: Any, run: int) -> Any:
-    """Return the NumPy generator of row ``run`` (from 0) of the result of :func:`addresses`."""
+    """Return the NumPy generator of run ``run`` (from 0), from its row of :func:`addresses`."""
     return _generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
 
 
@@ -305,17 +306,9 @@ def _remove_old(root: Path, current: Path) -> None:
 
 
 @cache
-def _log_compilation() -> None:
-    """Log a message, once a process, that compiling takes up to a minute (logger ``coartic``)."""
-    logging.getLogger("coartic").info("Compiling (once): this takes up to a minute.")
-
-
-@cache
-def _log_wait(process: str, lock: str) -> None:
-    """Log a message, once for each, that this process waits for a process with a lock."""
-    logging.getLogger("coartic").info(
-        f"Waiting for process {process}, which compiles, or is stopped: it holds {lock}"
-    )
+def _log_once(message: str) -> None:
+    """Log a message (logger ``coartic``), once a process."""
+    logging.getLogger("coartic").info(message)
 
 
 class _MachineCode:
@@ -336,7 +329,8 @@ class _MachineCode:
 
     def load_overload(self, *wanted: Any) -> Any:
         """Return the machine code of a signature from disk, waiting for a process that compiles it;
-        None, after a log message, if this process is to compile it."""
+        None, after a log message, if this process is to compile it. ``wanted``: as Numba passes it.
+        """
         self.unlock()
         code = self.load(*wanted)
         if code is None and self.wait_for_lock():
@@ -344,12 +338,12 @@ class _MachineCode:
             if code is not None:
                 self.unlock()
         if code is None:
-            _log_compilation()
+            _log_once("Compiling (once): this takes up to a minute.")
         return code
 
     def load(self, *wanted: Any) -> Any:
-        """Return the machine code of a signature from disk; None if it is not there, or cannot be
-        read: all code of the function on disk is then dropped."""
+        """Return the machine code of a signature (``wanted``, as Numba passes it) from disk; None
+        if it is not there, or cannot be read: all code of the function on disk is then dropped."""
         try:
             # Not load_overload, which first lists all that Numba could compile.
             return self.files._load_overload(*wanted)
@@ -359,7 +353,7 @@ class _MachineCode:
             return None
 
     def save_overload(self, *compiled: Any) -> None:
-        """Keep compiled code on disk if possible, and release the lock."""
+        """Keep compiled code, as Numba passes it, on disk if possible, and release the lock."""
         with contextlib.suppress(Exception):
             self.files.save_overload(*compiled)
         self.unlock()
@@ -382,7 +376,9 @@ class _MachineCode:
                     return True
                 time.sleep(_RETRY_S)
                 if tries == round(_TOLD_S / _RETRY_S):
-                    _log_wait(os.pread(file.fileno(), 20, 0).decode(errors="replace"), file.name)
+                    process = os.pread(file.fileno(), 20, 0).decode(errors="replace")
+                    held = f"which compiles, or is stopped: it holds {file.name}"
+                    _log_once(f"Waiting for process {process}, {held}")
             file.close()
         return False
 

@@ -25,6 +25,7 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coartic.internal.limits import brief_value, check_limits, real_array
 from coartic.internal.text import short_repr
@@ -32,6 +33,9 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.batch import (
     GOING,
+    Batch,
+    RobotRecord,
+    SlotArrays,
     are_near,
     arm_of,
     batch_for,
@@ -110,9 +114,9 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
     Along the line of a movement every absolute link angle turns at a constant rate. So per step the
     hand moves by at most ``s = |Δbase| + Σ length |Δangle|``, and its velocity changes by at most
-    ``c = Σ length Δangle²``. A norm lies above its tangents: with the closing speed u now, the
-    distance to a fixed point after τ steps is at least ``d - u τ - c τ² / 2``. Either bound keeps
-    the hand out of a disc of radius r < d around the point for ::
+    ``c = Σ length Δangle²``. A norm lies above its tangents: with the distance d from a fixed point
+    and the closing speed u now, the distance after τ steps is at least ``d - u τ - c τ² / 2``.
+    Either bound keeps the hand out of a disc of radius r < d around the point for ::
 
         max((d - r) / s, (sqrt(u² + 2 c (d - r)) - u) / c)
 
@@ -134,10 +138,10 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 
 @inner
-def divide_steps(at: Any, count: int, step: float) -> bool:
-    """Set rates, bounds and number of steps, in place, of the movements loaded into the first
-    ``count`` slots, with steps of length ``step`` in joint space; ``distance``, a square before,
-    becomes its root, and the present step is set to 0.
+def divide_steps(at: SlotArrays, count: int, step: float) -> bool:
+    """Set rates, bounds and number of steps of the movements in the first ``count`` columns of
+    ``at`` (:func:`start`), in place, with steps of length ``step`` in joint space; ``distance``, a
+    square before, becomes its root, and the present step is set to 0.
 
     Returns True only if all link angles are certain to stay below 1e5 rad, the range of the fast
     cosine, by a bound: the sum of absolute joint angles. If False, angles may exceed this range or
@@ -173,9 +177,9 @@ def divide_steps(at: Any, count: int, step: float) -> bool:
 
 
 @inner
-def _place_between(at: Any, count: int, step: float) -> None:
-    """Set ``q`` of each of the first ``count`` slots to the point of its movement at its present
-    step; ``step`` is the length of a step."""
+def _place_between(at: SlotArrays, count: int, step: float) -> None:
+    """Set ``q`` in each of the first ``count`` columns of ``at``, in place, to the point of the
+    movement at its present step; ``step`` is the length of a step in joint space."""
     for i in range(padded_count(count)):
         fraction = at.step[i] * step / at.distance[i]
         for j in range(len(at.q)):
@@ -185,13 +189,14 @@ def _place_between(at: Any, count: int, step: float) -> None:
 
 
 @inner
-def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
-    """Evaluate the stopping rule in the first ``count`` slots; return how many of them have ended.
+def check(at: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
+    """Evaluate the stopping rule of movements in the first ``count`` slots, columns of ``at``;
+    return how many of them have ended.
 
-    Each slot gets a status; a slot that goes on gets the next step that can end it. A movement ends
-    at its last step, with the hand at most ``rims[0]`` from the goal's centre, or, with
-    ``stop_on_arrival``, at most ``rims[1]`` from where the target puts the hand, length unit.
-    ``squares`` are the squares of ``rims``, as rounded by :func:`largest_square`.
+    Each slot gets a status, in place; a slot that goes on gets the next step that can end its
+    movement. A movement ends at its last step, with the hand at most ``rims[0]`` from the goal's
+    centre, or, with ``stop_on_arrival``, at most ``rims[1]`` from where the target puts the hand,
+    length unit. ``squares`` are the squares of ``rims``, as rounded by :func:`largest_square`.
     """
     ended = 0
     tip = len(at.length)
@@ -225,10 +230,10 @@ def check(at: Any, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -
 
 
 @shared
-def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> None:
-    """Move the arms in the first ``count`` slots, loaded by :func:`start`, until each movement has
-    ended: with a hit, at its target, or, with ``stop_on_arrival``, as soon as the hand is near the
-    place to which the target brings it. Afterwards the slots are free.
+def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotRecord) -> None:
+    """Move the arms in the first ``count`` slots of ``batch``, loaded by :func:`start`, until each
+    movement has ended: with a hit, at its target, or, with ``stop_on_arrival``, as soon as the hand
+    is near the place to which the target brings it. Afterwards the slots are free.
 
     In the record of each run ``q`` becomes the configuration in which the movement ended, ``hit``
     and ``ticks`` are set, and ``evaluations`` grows by the forward-kinematics evaluations made.
@@ -272,8 +277,9 @@ def move_slots(batch: Any, count: int, stop_on_arrival: bool, robot: Any) -> Non
 
 
 @entry
-def _move_kernel(stop_on_arrival: bool, robot: Any, batch: Any) -> None:
-    """Move run 0 of a batch to its target, in place (:func:`move_slots`)."""
+def _move_kernel(stop_on_arrival: bool, robot: NDArray[np.void], batch: Batch) -> None:
+    """Move the first run of ``batch`` to its target, and set the results in its record
+    (:func:`move_slots`). ``robot`` comes from :func:`robot_parameters`."""
     run = batch.runs[0]
     start(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
     move_slots(batch, 1, stop_on_arrival, robot[0])
@@ -320,7 +326,8 @@ def move(
     Raises
     ------
     ValueError
-        A shape is wrong, a figure is not finite or beyond 100,000, or there is no such hand.
+        A shape is wrong, a figure is not finite or beyond 100,000, there is no such hand, or a
+        constant of the model is out of bounds.
     TypeError
         ``robot``, ``model`` or ``stop_on_arrival`` has another type.
 
@@ -344,9 +351,10 @@ def move(
 
 
 @inner
-def _find_statuses(at: Any, count: int, square: float) -> None:
-    """Set the status of each of the first ``count`` slots: at the goal if the squared distance of
-    the hand from its centre is at most ``square``, failed if it is not finite, else going on."""
+def _find_statuses(at: SlotArrays, count: int, square: float) -> None:
+    """Set the status of each of the first ``count`` columns of ``at``, in place: at the goal if the
+    squared distance of the hand from the goal's centre is at most ``square``, squared length unit;
+    failed if the distance is not finite; else going on."""
     tip = len(at.length)
     for i in range(padded_count(count)):
         error_x = at.goal[0, i] - at.x[tip, i]
@@ -357,11 +365,13 @@ def _find_statuses(at: Any, count: int, square: float) -> None:
 
 
 @inlined
-def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int, bool]:
-    """Make an iteration of the corrective process **A**, q += α Jᵀ e, in every slot that goes on;
-    with a kernel ``pull`` its rows are added (:func:`descend_to_goals`). Return how many of the
-    first ``count`` slots have ended, and whether all link angles are certain to be below 1e5 rad
-    afterwards."""
+def descend(
+    at: SlotArrays, count: int, robot: RobotRecord, runs: Any, pull: Any
+) -> tuple[int, bool]:
+    """Make an iteration of the corrective process **A**, q += α Jᵀ e, in every slot of ``at`` that
+    goes on; with a kernel ``pull`` add what it fills in (:func:`descend_to_goals`; ``runs`` are the
+    batch's records). Return how many of the first ``count`` slots have ended, and whether all link
+    angles are certain to be below 1e5 rad afterwards."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -396,7 +406,7 @@ def descend(at: Any, count: int, robot: Any, runs: Any, pull: Any) -> tuple[int,
 
 
 @inlined
-def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
+def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) -> None:
     """Iterate the corrective process **A** in the first ``count`` slots of ``batch.at[0]`` until
     each has converged or failed: is not finite, no longer moves, or has made ``max_iterations``.
     The record of each run in ``batch.runs`` gets the last iterate as ``target``, ``converged`` and
@@ -434,9 +444,11 @@ def descend_to_goals(batch: Any, count: int, robot: Any, pull: Any) -> None:
 
 @inner
 def project(v: Any, x: Any, y: Any) -> None:
-    """Project joint changes ``v``, in place, onto the null space of the Jacobian with rows x, y.
+    """Project joint changes ``v``, in place, onto the null space of the Jacobian with rows ``x``,
+    ``y``.
 
-    v −= J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺. A singular value below a millionth of the larger counts as 0.
+    v −= J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺; ``v``, ``x`` and ``y`` have shape ``(n,)``. A singular value
+    below a millionth of the larger counts as 0.
     """
     a, b, c, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(v)):
@@ -459,9 +471,10 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 
 @inner
-def _pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
-    """Set the rows ``pull`` of the first ``count`` slots to β N(q) (p − q): the share β of the way
-    to the preferred posture p of the run, in the null space of the hand."""
+def _pull_to_preferred(at: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
+    """Set ``pull`` in each of the first ``count`` columns of ``at``, in place, to β N(q) (p − q):
+    the share β (``pull`` of the run, a record of ``runs``) of the way to its preferred posture p,
+    projected by N onto the null space of the hand's Jacobian."""
     tip = len(at.length)
     for i in range(count):
         run, v = runs[at.run[i]], at.pull[:, i]
@@ -482,22 +495,23 @@ def _pull_to_preferred(at: Any, count: int, robot: Any, runs: Any) -> None:
 
 
 @shared
-def pull_slots(batch: Any, count: int, robot: Any) -> None:
-    """Run the corrective process **A**, pulled to each run's preferred posture, in the first
-    ``count`` slots (:func:`descend_to_goals`)."""
+def pull_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
+    """Run the corrective process with a pull to each run's preferred posture in the first ``count``
+    slots of ``batch``; set ``target`` and ``converged`` of the runs (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, _pull_to_preferred)
 
 
 @shared
-def correct_slots(batch: Any, count: int, robot: Any) -> None:
-    """Run the paper's corrective process in the first ``count`` slots, until all have ended; the
-    results go into ``target`` and ``converged`` of their runs (:func:`descend_to_goals`)."""
+def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
+    """Run the paper's corrective process in the first ``count`` slots of ``batch``; set ``target``
+    and ``converged`` of the runs (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, None)
 
 
 @entry
-def _correct_kernel(robot: Any, batch: Any) -> None:
-    """Run the corrective process for run 0 of a batch; its ``target`` becomes the last iterate."""
+def _correct_kernel(robot: NDArray[np.void], batch: Batch) -> None:
+    """Run the corrective process for the first run of ``batch``; ``target`` in its record becomes
+    the last iterate. ``robot`` comes from :func:`robot_parameters`."""
     run = batch.runs[0]
     load(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
     correct_slots(batch, 1, robot[0])
@@ -512,8 +526,8 @@ def correct(
     locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
 ) -> Correction:
-    """Jacobian-transpose inverse kinematics, the corrective process: find where a hand is at a
-    goal.
+    """Jacobian-transpose inverse kinematics, the corrective process: find a configuration with a
+    hand at a goal.
 
     It descends from ``q`` on the distance to the goal. The other arm does not move.
 
@@ -530,7 +544,8 @@ def correct(
     locked_base : collection of {"x", "y"}
         Coordinates of the base that do not move.
     model : MotionModel
-        The constants; ``gain``, ``correction_tolerance`` and ``max_iterations`` matter.
+        The constants; ``gain``, ``correction_tolerance`` (0.01 length units for None) and
+        ``max_iterations`` matter.
 
     Returns
     -------
@@ -543,8 +558,9 @@ def correct(
     TypeError
         ``robot`` or ``model`` has another type.
     ValueError
-        A shape is wrong, a figure is not finite or beyond 100,000, there is no such hand, or
-        ``locked_base`` has an entry other than ``"x"`` and ``"y"``.
+        A shape is wrong, a figure is not finite or beyond 100,000, there is no such hand,
+        ``locked_base`` has an entry other than ``"x"`` and ``"y"``, or a constant of the model is
+        out of bounds.
 
     Notes
     -----
@@ -568,8 +584,8 @@ def explain_failure(
     locked_base: Collection[str],
     model: MotionModel,
 ) -> str:
-    """Return why the corrective process may have failed from ``q``, as the end of a sentence that
-    begins with a colon; empty if there is no cause that users can mend.
+    """Return the end of a sentence, from its colon on, on why the corrective process may have
+    failed from ``q``, shape ``(dof,)``; an empty text if there is no cause that users can mend.
 
     One cause is a hand whose joints all lie on the line to the goal: no joint moves the hand
     nearer. Other causes are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``,
@@ -614,7 +630,8 @@ def follow(
     ``waypoints`` has shape ``(W, dof)``; points of the path lie ``model.step`` apart along these
     lines (:func:`path_points`). The movement stops at the first point with the hand within
     ``radius``, length unit, of the goal's centre, or at the last waypoint; k steps take k + 1
-    ticks. Raises ValueError for a wrong shape.
+    ticks. Raises ValueError for a wrong shape, a figure that is not finite or beyond 100,000, an
+    unknown hand, or a model out of bounds.
     """
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
@@ -638,11 +655,12 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """Return the configurations at the n steps of a path from ``q`` through ``waypoints``, shape
-    ``(W, dof)``: shape ``(n + 1, dof)``.
+    """Return the n + 1 configurations at the n steps of a path from ``q`` through ``waypoints``,
+    shape ``(W, dof)``, as an array ``(n + 1, dof)``, length unit and rad.
 
     Point k, from 0 (``q``), lies at length k times ``model.step`` of the polyline in joint space;
-    the last point is the last waypoint. Raises ValueError for a wrong shape.
+    the last point is the last waypoint. Raises ValueError for a wrong shape or a figure that is not
+    finite or beyond 100,000.
     """
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))

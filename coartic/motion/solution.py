@@ -237,8 +237,10 @@ def execute_many(
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
             executions.append(error)
         else:
-            with_path = _has_path(plan)
-            executions.append(_make_one_by_one(compiled, plan, outside) if with_path else plan)
+            kinds = {movement.kind for movements in plan for movement in movements}
+            executions.append(
+                _make_one_by_one(compiled, plan, outside) if "path" in kinds else plan
+            )
     plans = [each for each in executions if isinstance(each, list)]
     straight = iter(_make_straight(compiled, plans, outside))
     return [next(straight) if isinstance(x, list) else x for x in executions]
@@ -248,17 +250,12 @@ Plan = list[list[Movement]]
 """The movements of a solution, goal by goal; the plan of a suite is another thing."""
 
 
-def _has_path(plan: Plan) -> bool:
-    """Return whether a plan, the movements of a solution by goal, has a movement of kind path."""
-    return "path" in [movement.kind for movements in plan for movement in movements]
-
-
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return the movements to a goal before the first movement without a target, for the kernel.
+    """Return what the kernel is asked for at a goal: of its ``movements`` those before the first
+    one without a target, with None before them if the first movement is corrective.
 
-    The corrective process makes that movement; movements after it are not made. If the first
-    movement is corrective, with or without a target, None precedes all that is returned: there the
-    kernel makes no movement, and only checks whether the hand is in the goal.
+    For None the kernel makes no movement, and only checks whether the hand is in the goal. Where a
+    target is missing, the corrective process acts; movements after it are not made.
     """
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -294,7 +291,7 @@ def movements_in(
     accounts: NDArray[np.void], dof: int, given: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
     """Return a list of the movements made in each of N trials, up to the first goal missed, from
-    the accounts of goals, shape ``(N, G, M)``.
+    the accounts of goals, records of shape ``(N, G, M)``; ``dof`` is the length of a configuration.
 
     ``given`` has the movements that were to be made, by trial and goal, with None for a check of
     the hand without a movement (:func:`_with_targets`); the kinds come from these movements. A goal
@@ -446,8 +443,8 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
 
 def _check_movement(task: Task, movement: Movement) -> Movement:
     """Return the movement itself, or a copy with a path's last waypoint as its target or with
-    locked base coordinates as at the start. Raises SolutionError or ValueError if the movement
-    lacks what its kind needs or leads to a configuration that the task does not allow."""
+    locked base coordinates as at the start. Raises SolutionError or ValueError for an unknown hand
+    or kind, or if target or waypoints do not fit the kind or the task."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
@@ -488,8 +485,8 @@ def _check_point(task: Task, point: Any) -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Set locked base coordinates of points, ``(..., dof)``, to their values at the start, in the
-    array itself, and return the array. Raises ValueError where a coordinate differs from the start
+    """Set locked base coordinates of points, ``(..., dof)``, to their values at the start, in
+    place, and return ``points`` itself. Raises ValueError where a coordinate differs from the start
     by more than :data:`HELD`, 1e-6 length units; NaN stays."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
@@ -504,9 +501,9 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Return a copy of targets, shape ``(N, G, dof)``, in which locked base coordinates are as at
-    the start; NaN passes. Raises ValueError for another shape, for infinite entries and for
-    targets that move a locked base by more than 1e-6."""
+    """Return a copy of targets, shape ``(N, G, dof)``, length unit and rad, in which locked base
+    coordinates are as at the start; NaN passes. Raises ValueError for another shape, for infinite
+    entries and for targets that move a locked base by more than 1e-6."""
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
@@ -534,7 +531,8 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     Returns
     -------
     tuple of Movement
-        A movement for each goal, for :func:`coartic.execute` and :func:`coartic.trajectory`.
+        A movement for each goal, of kind ``learned``, or ``corrective`` where the row is NaN, for
+        :func:`coartic.execute` and :func:`coartic.trajectory`.
 
     Raises
     ------
@@ -673,8 +671,8 @@ def initial_hands(
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
     """Return the reward, minus the ticks, of a trial by the corrective process alone with a task's
-    initial hands; None if the trial fails, or a policy finds no hands that complete the task, or
-    has too many sequences to try."""
+    initial hands; None if the trial fails, or if the hands are to be found by a policy and no
+    sequence completes the task or more than 4096 would have to be tried."""
     try:
         hands = initial_hands(task, model=model)
     except NotApplicableError:

@@ -36,6 +36,8 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import (
     SLOTS,
     Batch,
+    RobotRecord,
+    RunRecord,
     arm_of,
     batch_for,
     load,
@@ -61,14 +63,13 @@ IDLE, CHECK, MOVE, REPEAT = range(4)
 """Next action of a run: none; it checks whether its hand is in the goal; it moves to its target and
 ends on arrival, too; it repeats a corrective movement, which ends on a hit or at the target."""
 COUNTED = (
-    "movement_ticks",
-    "forward_kinematics",
-    "corrective_iterations",
-    "corrections",
-    "failed_trials",
+    *("movement_ticks", "forward_kinematics", "corrective_iterations"),
+    *("corrections", "failed_trials"),
 )
 """Counters of :class:`~coartic.method.Meter` that the kernels keep: columns of counts."""
 TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
+GoalAccount = Any
+"""Record of what happened at a goal (:func:`account_type`)."""
 
 
 @cache
@@ -99,19 +100,19 @@ def account_type(width: int) -> np.dtype[np.void]:
 
 
 @inlined
-def set_off(run: Any, q: Any) -> None:
-    """Start the trial of a run (record of a robot in its trial), in place: the robot stands at
-    configuration ``q``, shape ``(dof,)``, the trial has not ended (``going``), and the count of
-    evaluations is 0. Other fields stay: :func:`begin` sets them."""
+def set_off(run: RunRecord, q: Any) -> None:
+    """Start the trial of a run, in place: the robot stands at configuration ``q``, shape
+    ``(dof,)``, the trial has not ended (``going``), and the count of evaluations is 0. Other fields
+    stay: :func:`begin` sets them."""
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
 
 
 @inlined
-def begin(run: Any, goal: Any) -> None:
-    """Set the next goal, x and y, of a run (record of a robot in its trial), in place: phase 1,
-    *begin*. Unless *aim* sets a target, the run only checks whether its hand is in the goal; a run
-    whose trial has ended does nothing."""
+def begin(run: RunRecord, goal: Any) -> None:
+    """Set the next goal of a run, x and y, in place: phase 1, *begin*. Unless *aim* sets a target,
+    the run only checks whether its hand is in the goal; a run whose trial has ended does nothing.
+    """
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
     run.action = CHECK if run.going else IDLE
@@ -119,9 +120,9 @@ def begin(run: Any, goal: Any) -> None:
 
 
 @inlined
-def aim(run: Any, target: Any) -> None:
-    """Set the target of a run (record of a robot in its trial), in place: phase 2, *aim*. A joint
-    whose entry of ``target`` is NaN stays where it is; if all are NaN, no movement is made."""
+def aim(run: RunRecord, target: Any) -> None:
+    """Set the target of a run, in place: phase 2, *aim*. A joint whose entry of ``target``, shape
+    ``(dof,)``, is NaN stays where it is; if all are NaN, no movement is made."""
     for j in range(len(target)):
         if not math.isnan(target[j]):
             run.target[j] = target[j]
@@ -129,12 +130,11 @@ def aim(run: Any, target: Any) -> None:
 
 
 @inlined
-def move_runs(count: int, robot: Any, batch: Any) -> None:
-    """Move each of the first ``count`` runs of a batch (records of robots) to its target, or check
-    whether its hand is in the goal, as its ``action`` says (``IDLE``, ``CHECK``, ``MOVE`` or
-    ``REPEAT``): phase 3, *move*. A movement ends on a hit, too. ``q``, ``hit``, ``ticks`` and
-    ``acting`` change in place, and ``evaluations`` grows; a run without a movement takes 0
-    ticks."""
+def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
+    """Move each of the first ``count`` runs of a batch to its target, or check whether its hand is
+    in the goal, as its ``action`` says (``IDLE``, ``CHECK``, ``MOVE`` or ``REPEAT``): phase 3,
+    *move*. A movement ends on a hit, too. ``q``, ``hit``, ``ticks`` and ``acting`` change in place,
+    and ``evaluations`` grows; a run without a movement takes 0 ticks."""
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action
@@ -147,28 +147,27 @@ def move_runs(count: int, robot: Any, batch: Any) -> None:
 
 
 @inlined
-def correct_runs(count: int, robot: Any, batch: Any) -> None:
-    """Correct missed goals of the first ``count`` runs, in place: phase 4, *correct*. The
-    corrective process **A** finds configurations that hit, and the runs move there; ``target`` and
-    ``ticks`` of a run become the target and the ticks of its corrective movement, 0 ticks if none
-    is made."""
+def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
+    """Correct missed goals of the first ``count`` runs of a batch, in place: phase 4, *correct*.
+    The corrective process **A** finds configurations that hit, and the runs move there; ``target``
+    and ``ticks`` of a run become the target and the ticks of its corrective movement, 0 ticks if
+    none is made."""
     find_corrections(count, robot, batch)
     make_corrections(count, robot, batch)
 
 
 @inlined
-def make_corrections(count: int, robot: Any, batch: Any) -> None:
-    """Move each of the first ``count`` runs for which **A** converged, in place, towards its
-    ``target``, the configuration that **A** found. The movement ends as soon as the hand is in the
-    goal, mostly before the target.
-    """
+def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
+    """Move each of the first ``count`` runs of a batch for which **A** converged, in place, towards
+    its ``target``, the configuration that **A** found. The movement ends as soon as the hand is in
+    the goal, mostly before the target."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
 
 
 @inlined
-def account(run: Any, moved: int, goal: Any) -> None:
+def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
     """Write the result of a run for its goal into the record ``goal``, in place: phase 5,
     *account*. ``moved``: ticks of the run's movements to targets. If the run missed its goal, its
     trial ends."""
@@ -184,7 +183,7 @@ def account(run: Any, moved: int, goal: Any) -> None:
 
 
 @inlined
-def count_goal(goal: Any, counts: Any) -> None:
+def count_goal(goal: GoalAccount, counts: Any) -> None:
     """Add ticks, evaluations, iterations, corrections and failure in the account of a goal to the
     counts of a trial, shape ``(5,)``, in place."""
     counts[TICKS] += goal.ticks
@@ -195,10 +194,10 @@ def count_goal(goal: Any, counts: Any) -> None:
 
 
 @shared
-def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
-    """Move each of the first ``count`` runs whose ``acting`` is True to its target, in place; a
-    movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near the place
-    to which the target brings it."""
+def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> None:
+    """Move each of the first ``count`` runs of ``batch`` whose ``acting`` is True to its target, in
+    place; a movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near
+    the place to which the target brings it."""
     at, slot = batch.at[0], 0
     for i in range(count):
         if batch.runs[i].acting:
@@ -209,11 +208,11 @@ def _move_acting(count: int, stops: bool, robot: Any, batch: Any) -> None:
 
 
 @inlined
-def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
+def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
     """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
-    for each of the first ``count`` runs that missed it, goes on and may be corrected; no run moves.
-    ``converged`` becomes True for a run for which **A** found a target, False for all others;
-    ``ticks`` become 0, and ``iterations`` the number made, 0 without **A**."""
+    for each of the first ``count`` runs of ``batch`` that missed it, goes on and may be corrected;
+    no run moves. ``converged`` becomes True for a run for which **A** found a target, False for all
+    others; ``ticks`` become 0, and ``iterations`` the number made, 0 without **A**."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -227,19 +226,19 @@ def _find_by(count: int, robot: Any, batch: Any, descend: Any) -> None:
 
 
 @shared
-def find_corrections(count: int, robot: Any, batch: Any) -> None:
+def find_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Have the paper's corrective process **A** find a ``target`` that hits the goal for each of
-    the first ``count`` runs that missed it; ``converged`` says where **A** did. No run moves
-    (:func:`_find_by`)."""
+    the first ``count`` runs of ``batch`` that missed it; ``converged`` of a run says whether **A**
+    did. No run moves (:func:`_find_by`)."""
     _find_by(count, robot, batch, correct_slots)
 
 
 @shared
-def find_pulled_corrections(count: int, robot: Any, batch: Any) -> None:
+def find_pulled_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Have **A**, pulled to each run's preferred posture, find a ``target`` that hits the goal for
-    each of the first ``count`` runs of ``batch`` (records of a kernel, as ``robot`` is) that missed
-    it, go on and may be corrected. Their ``target``, the last iterate, and ``converged`` change in
-    place. No run moves (:func:`_find_by`)."""
+    each of the first ``count`` runs of ``batch`` that missed it, go on and may be corrected. Their
+    ``target``, the last iterate, and ``converged`` change in place. No run moves
+    (:func:`_find_by`)."""
     _find_by(count, robot, batch, pull_slots)
 
 
@@ -283,7 +282,7 @@ class Accounts(NamedTuple):
 
 @inlined
 def row_of(rows: Any, n: int) -> Any:
-    """Return row ``n`` of ``rows``, or row 0 if there is one row, which all arms share."""
+    """Return entry ``n`` of ``rows``, or entry 0 if there is only one, which all arms share."""
     return rows[n if len(rows) > 1 else 0]
 
 
@@ -348,7 +347,8 @@ def _reach_lot(
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any) -> None:
     """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
-    ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`.
+    ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`, in place. ``robot``
+    comes from :func:`robot_parameters`.
 
     ``others`` are the entries of :class:`Requests` and then the entries of a batch, one by one: a
     tuple with names takes Numba half a microsecond.
@@ -368,8 +368,8 @@ _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 
 
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
-    """Return accounts of ``count`` trials with ``goals`` goals and ``moves`` movements to targets
-    for each goal. The counts of the trials are 0; the caller fills in all else."""
+    """Return new accounts of ``count`` trials with ``goals`` goals and ``moves`` movements to
+    targets for each goal. The counts of the trials are 0; the caller fills in all else."""
     return Accounts(
         np.empty((count, goals, moves), account_type(width_of(robot))),
         np.zeros((count, len(COUNTED)), dtype=np.int64),
@@ -523,10 +523,10 @@ _last_compiled: CompiledTask | None = None
 
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
-    """Return a task with a model as the kernels read it. The last result is kept: do not change its
-    arrays. Raises ValueError for a model out of bounds, and for a task with goals or a start beyond
-    100,000 or of a wrong shape, as an unchecked copy (``model_copy``) can have; TypeError if the
-    model is no MotionModel."""
+    """Return a task with a model as arrays for the kernels. The last result is kept: do not change
+    its arrays. Raises ValueError for a model out of bounds, and for a task with goals or a start
+    beyond 100,000 or of a wrong shape, as an unchecked copy (``model_copy``) can have; TypeError if
+    the model is no MotionModel."""
     global _last_compiled
     last = _last_compiled  # another thread may replace it
     if last is not None and last.task is task and last.model is model:
@@ -575,9 +575,10 @@ def make_trials(
     outside: bool = True,
 ) -> Accounts:
     """Make N trials of a task and return their accounts. ``hands``, 0 left or 1 right, has shape
-    ``(N, G)``, ``targets`` shape ``(N, G, M, dof)``, with NaN for joints that stay; ``stops``, of
-    shape ``(N, G, M)``, is True for movements that end on arrival, too (by default all). Trials are
-    counted as made outside the session of a run if ``outside``."""
+    ``(N, G)``, ``targets`` shape ``(N, G, M, dof)``, M movements a goal, length unit and rad, NaN
+    for joints that stay; ``stops``, of shape ``(N, G, M)``, is True for movements that end on
+    arrival, too (by default all). Trials are counted as made outside the session of a run if
+    ``outside``."""
     if outside:
         count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
@@ -678,9 +679,9 @@ def ranked_sequences(
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
     """Make a trial by the corrective process alone with each hand sequence; return a list, ordered
     by reward, the best first and failed trials last. An entry has the sequence, the reward (None if
-    the trial failed), the reason of the failure (or empty), and the counts of the trial by
-    :data:`COUNTED`. Of equal rewards the sequence with the fewest changes of hand comes first, then
-    the sequence given first. Trials are counted as made outside the session of a run if
+    the trial failed), the reason of the failure (or an empty text), and the counts of the trial by
+    name (:data:`COUNTED`). Of equal rewards the sequence with the fewest changes of hand comes
+    first, then the sequence given first. Trials are counted as made outside the session of a run if
     ``outside``."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
@@ -704,8 +705,8 @@ def ranked_sequences(
 
 
 def changes_of_hand(sequence: str) -> int:
-    """Return the number of goals for which a hand sequence has another hand than for the goal
-    before: 3 for ``"LRLR"``."""
+    """Return how often the hand changes from one goal to the next in a hand sequence: 3 for
+    ``"LRLR"``."""
     return sum(a != b for a, b in itertools.pairwise(sequence))
 
 
@@ -729,8 +730,8 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Return ``hands`` as a tuple, for None all hands of the task's robot. Raises ValueError for no
-    hand and for a hand that the robot does not have."""
+    """Return ``hands`` as a tuple; for None return all hands of the task. Raises ValueError if
+    there is none, or one is not a hand of the task."""
     if hands is None:
         return task.hands
     chosen = tuple(hands) if isinstance(hands, Iterable) else ()

@@ -34,7 +34,8 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Return sine and cosine of angle less k quarter turns (k: the nearest), and k modulo 4."""
+    """Return sine and cosine of ``angle``, rad, less its nearest whole number k of quarter turns,
+    and k modulo 4. Only for angles below 1e5 rad."""
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
     # Estrin's order: short chains of dependent operations.
@@ -80,6 +81,6 @@ def sine(angle: float) -> float:
 
 @inner
 def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
-    """Fill ``xs`` and ``ys`` in place (:func:`coartic.robot.chain`), with the cosine and sine of
-    this module."""
+    """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand in
+    configuration ``q``: :func:`coartic.robot.chain` with this module's cosine and sine."""
     chain_by(q, arm, xs, ys, cosine, sine)

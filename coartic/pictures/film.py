@@ -91,8 +91,9 @@ def write_film(
 
 
 def check_film(path: Path, *, replace: bool = False) -> None:
-    """Raise CoarticError for a film that does not end in .gif or .mp4, for MP4 without ffmpeg, and
-    if the file cannot be written or is there without ``replace``. Nothing is written."""
+    """Raise CoarticError for a film whose name does not end in .gif or .mp4, for MP4 without
+    ffmpeg, and if the file cannot be written or is there without ``replace``. Nothing is written.
+    """
     check_ending(path, FILMS)
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
@@ -100,9 +101,9 @@ def check_film(path: Path, *, replace: bool = False) -> None:
 
 
 def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
-    """Draw goals, robot, traces and the counter of ticks, and return a function that updates the
-    drawing to a row of the movement's configurations, from 0; a row past the end shows the last
-    configuration."""
+    """Draw goals, robot, paths of the hands and a counter of ticks, and return a function that
+    updates the drawing to a row of the movement's configurations, from 0; a row past the end shows
+    the last configuration."""
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
     traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}

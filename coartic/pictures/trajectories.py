@@ -153,7 +153,8 @@ class Trajectory:
         Raises
         ------
         CoarticError
-            The file cannot be written, or is there and ``replace`` is False.
+            The name ends otherwise, no control tick was made, or the file cannot be written, or is
+            there and ``replace`` is False.
         """
         from coartic.pictures.film import write_film
 

@@ -43,10 +43,10 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
     """Return the figure as HTML for a page, which has the styles of ``play.css`` and defines the
     colours that these name.
 
-    ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is for the
-    scripts: the ``page`` to which links lead, None for none; ``first``, the choice at first;
-    ``folder`` with the stored runs, quoted for a shell; ``cells`` of the table ``ranking`` that
-    show films, each with row, column and the choice that it makes.
+    ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is data for the
+    scripts: ``page``, the address to which links lead, or None; ``first``, what is shown at first;
+    ``folder``, the folder with the stored runs, quoted for a shell; ``cells``, the fields of table
+    ``ranking`` that start films, each with row, column and the film.
     """
     content = {"presets": presets, "version": coartic.__version__, **more}
     data = json.dumps(content, allow_nan=False, separators=(",", ":"))
@@ -83,13 +83,13 @@ def up_or_down() -> dict[str, Any]:
 
 
 def part_of_page(name: str) -> str:
-    """Return the text of a file next to this one, without a first line ``"use strict";``."""
+    """Return the text of file ``name`` of this folder, without a first line ``"use strict";``."""
     return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
 
 
 @cache
 def templates() -> Environment:
-    """Return the environment of the templates next to this file, always the same."""
+    """Return Jinja's environment of the templates next to this file, always the same object."""
     return Environment(
         loader=FileSystemLoader(FOLDER),
         undefined=StrictUndefined,

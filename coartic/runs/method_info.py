@@ -44,10 +44,10 @@ def version_of(code: str) -> str:
     return _VERSION_OF_4_0_0 if code in _OF_4_0_0 else code
 
 
-def same_run(run_id: str) -> tuple[str, str]:
-    """Return the hex digits at the beginning of a run's id, and the version for which the code at
-    its end stands (:func:`version_of`). Two runs for which both agree are the same run, whatever
-    version of coartic stored them."""
+def run_identity(run_id: str) -> tuple[str, str]:
+    """Return what identifies a run, from its id: the hex digits at its beginning, and the version
+    for which the code at its end stands (:func:`version_of`). Ids of equal pairs name the same run,
+    whatever version of coartic stored it."""
     digits, _, code = run_id.partition("-")
     return digits, version_of(code)
 
@@ -119,9 +119,9 @@ class MethodInfo:
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """Return ``quick``, parameters with which a check takes seconds, and ``config``, from
-        Pydantic: ``extra`` is ``"forbid"`` if unknown parameters are refused, ``frozen`` is True if
-        parameters cannot be changed."""
+        """Return a dictionary: ``quick`` has parameters with which a check takes seconds,
+        ``config`` two settings of Pydantic: ``extra`` is ``"forbid"`` if unknown parameters are
+        refused, ``frozen`` is True if parameters cannot be changed."""
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
@@ -177,7 +177,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Return the info of a method from its class and three fields of :class:`MethodInfo`."""
+    """Return the info of a method from its class and the other fields of :class:`MethodInfo`."""
     return MethodInfo(
         name=method.name,
         title=method.title,
@@ -203,7 +203,8 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 
 @cache
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
-    """Return the class of a method from its module or file. Raises CoarticError if it is not there.
+    """Return the class of the method with id ``name`` from ``where``, a module or the path of a
+    file. Raises CoarticError if it is not there.
 
     Another ``code``, the hash of a file, makes the process import the file again.
     """
@@ -216,8 +217,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 
 
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
-    """Return the classes of methods that a module itself defines: concrete classes, or, with
-    ``abstract``, abstract classes, which lack a function."""
+    """Return the classes of methods that a module itself defines: complete classes, or, with
+    ``abstract``, classes that lack a function, such as ``solve``."""
     return [
         value
         for value in vars(module).values()

@@ -55,9 +55,10 @@ class Cell:
 
     @cached_property
     def digest(self) -> str:
-        """Hash, 64 hex digits, of the cell without the version or code of its method.
+        """Hash, 64 hex digits, of task, method, parameters, model and trial budget, not of the
+        method's code.
 
-        A time limit is not a part of the cell: it can prevent a result, and cannot change one.
+        A time limit is not among them: it can prevent a result, and cannot change one.
         """
         return hash_of(
             {
@@ -98,8 +99,8 @@ class Job:
         return f"{digits}-{self.cell.method.code if code is None else code}"
 
     def run_seed(self, number: int) -> int:
-        """Return the seed of the random numbers of run ``number``, from the seed of the suite and
-        the task's name: the same for all methods."""
+        """Return the seed of the random numbers of run ``number``, from the suite's seed, the
+        task's name and ``number``: the same for all methods."""
         return run_seed(self.seed, self.cell.task.name, number)
 
 
@@ -110,7 +111,7 @@ def cell_of(
     trials: int | None = None,
     trial_budget: int | None = None,
 ) -> Cell:
-    """Return the cell of a method with these parameters and defaults for all others.
+    """Return the cell of a method on a task, with these parameters and defaults for all others.
 
     ``trials`` becomes the default number of trials if the method has this parameter; a number in
     ``parameters`` goes before it. Raises CoarticError for parameters that the method does not take.
@@ -122,8 +123,8 @@ def cell_of(
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
-    """Return tasks by name. Raises CoarticError for two different tasks of one name: names
-    distinguish results."""
+    """Return tasks by name. Equal tasks count once. Raises CoarticError for two different tasks of
+    one name."""
     named = dict[str, Task]()
     for task in tasks:
         if named.setdefault(task.name, task) != task:
@@ -160,10 +161,10 @@ def trials_in(parameters: Mapping[str, Any]) -> int:
 
 
 def size_of(plan: Sequence[Job]) -> int:
-    """Return the number of runs of a plan."""
+    """Return the number of runs of a plan, over all its jobs."""
     return sum(len(job.numbers) for job in plan)
 
 
 def label_of(method: str, setting: str) -> str:
-    """Return the label of a method under a setting, such as ``cma-es/bandit sigma=0.1``."""
+    """Return a method's id followed by its setting, such as ``cma-es/bandit sigma=0.1``."""
     return f"{method} {setting}".strip()

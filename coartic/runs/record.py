@@ -63,13 +63,14 @@ class Score(NamedTuple):
     """Joint travel of the arm that a solution does not choose, rad."""
 
 
-def mark_of(method: str, kind: str, files: Sequence[str]) -> str:
-    """Return a sentence on a method some of whose runs have an entry ``kind`` in their details: on
-    ``files`` that were loaded too late (:data:`LATE`), or the tasks of these (:data:`EARLIER`)."""
+def mark_of(method: str, kind: str, names: Sequence[str]) -> str:
+    """Return a warning about the runs of a method, in a sentence: with ``kind`` :data:`LATE` that
+    the files ``names`` were first loaded during a run, so that changes of them are not seen; with
+    :data:`EARLIER` that results on the tasks ``names`` depend on earlier runs."""
     if kind == EARLIER:
-        return f"{method}: results depend on earlier runs (seen on {', '.join(files)})"
-    some = ", ".join(files[:5]) + (f" and {len(files) - 5} more" if len(files) > 5 else "")
-    was = "was" if len(files) == 1 else "were"
+        return f"{method}: results depend on earlier runs (seen on {', '.join(names)})"
+    some = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    was = "was" if len(names) == 1 else "were"
     return (
         f"{method}: {some} {was} first loaded during a run, so that a change there is "
         "not seen, and its runs stay: import it at the top of the method file"
@@ -192,8 +193,8 @@ class Run:
 
     def _corrections(self, place: int) -> int | None:
         """Return the corrective movements of a learner in trial 0 (place 0) or in a tenth of the
-        other trials (places 1 to 10; -1 is the last); None if they were not counted. A method of a
-        file can keep something else by this name."""
+        other trials (places 1 to 10; -1 is the last); None if they were not counted, or if what the
+        method stored by this name is no list of 11 counts."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         if not isinstance(counts, list) or len(counts) != 11:
             return None
@@ -208,7 +209,7 @@ class Run:
 
     def downsample(self) -> Run:
         """Return a copy of the run with the rewards of its best trial and of the trials that were
-        better than all earlier trials, and None for other trials. It takes a tenth of the space."""
+        better than all earlier trials, and None for other trials."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best
@@ -218,7 +219,8 @@ class Run:
 
     @cached_property
     def result(self) -> str:
-        """Hash, 16 hex digits, of status, every joint of every movement, and rewards of all trials.
+        """Hash, 16 hex digits, of status, movements with their ticks and configurations, and
+        rewards of all trials.
 
         Two runs with the same outcome have the same hash, whatever time and evaluations they took.
         """
@@ -356,7 +358,7 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task side by side under the paper's model; scores come from here.
+    """Execute solutions of a task side by side under the paper's model.
 
     Returns for each solution, in order, its execution, or, as an object, the error of a solution
     that breaks the rules of the task, or is too long (:func:`too_long`).

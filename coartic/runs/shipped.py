@@ -37,8 +37,8 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:
     """Open a results folder for reading, or by the name ``shipped`` the shipped results of suite
-    ``comparison``. Raises CoarticError for a folder without results of this version, while a run
-    writes into it, and for shipped results that were changed."""
+    ``comparison``. Raises CoarticError for a folder without results in this version's format, while
+    a run writes into it, and for shipped results that were changed."""
     return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
 
 

@@ -181,8 +181,8 @@ class Store:
     # The plan.
 
     def begin_as(self, other: Store) -> bool:
-        """Become a copy of another store if this store has no run; return True if it has become
-        a copy."""
+        """If this store has no run, replace its content by a copy of another store's, and return
+        True; else return False."""
         if empty := not self.ids():
             other._db.backup(self._db)
         return empty
@@ -223,8 +223,9 @@ class Store:
             self._db.execute("UPDATE suite SET plan_hash = ?", (self._plan_hash(),))
 
     def plan(self) -> list[Job]:
-        """Return the plan of the folder, the jobs of its last suite; their methods have no
-        ``where``. Raises CoarticError if no plan is stored yet, or if it was changed since."""
+        """Return the plan of the folder, a list of the jobs of the last suite; ``where`` of their
+        methods is empty. Raises CoarticError if no plan is stored yet, or if it was changed since.
+        """
         with explain_errors(self.folder):
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
@@ -284,7 +285,7 @@ class Store:
 
     def stale(self) -> Counter[tuple[str, str, str]]:
         """Return the number of runs of the plan that are there from another version or code of
-        their method, by the method, that version and the version of the plan."""
+        their method, by a triple: id of the method, that version, and the version in the plan."""
         query = """SELECT now.method, old.code, now.code, count(*)
             FROM suite JOIN plan JOIN cells AS now ON now.id = plan.cell
             JOIN cells AS old ON old.digest = now.digest AND old.code != now.code
@@ -295,8 +296,8 @@ class Store:
         )
 
     def marks(self) -> dict[str, list[str]]:
-        """Return, by method, sentences on what details of runs of the plan say against them
-        (:func:`.mark_of`)."""
+        """Return, by method, warnings about runs of the plan, in sentences (:func:`.mark_of`): that
+        files were loaded too late, or that results depend on earlier runs."""
         found = defaultdict[str, list[str]](list)
         for kind in (LATE, EARLIER):
             query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{kind}')
@@ -306,8 +307,8 @@ class Store:
         return dict(found)
 
     def imports(self) -> dict[str, list[str]]:
-        """Return, by method from a file, names and versions of the packages that its file imports,
-        of all runs of the plan."""
+        """Return, by method from a file, the packages that its file imports, over all runs of the
+        plan, each as a name with a version."""
         query = """SELECT DISTINCT method, value FROM asked
             JOIN environments ON environments.id = environment, json_each(content, '$.imports')
             WHERE json_type(content, '$.imports') = 'array' ORDER BY method, value"""
@@ -315,9 +316,8 @@ class Store:
         return {method: [plain(str(value), 100) for _, value in of] for method, of in rows}
 
     def others(self) -> Counter[int]:
-        """Return the number of runs in the folder that the plan does not ask for, by the seed of
-        their suite; runs of another version or code of their method (:meth:`stale`) are among
-        them."""
+        """Return numbers of runs in the folder that the plan does not ask for, by the seed of their
+        suite; runs of another version or code of their method (:meth:`stale`) are among them."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
         return Counter(dict(self._rows(query)))
@@ -349,8 +349,8 @@ class Store:
                     ) from None
 
     def run(self, run_id: str) -> Run:
-        """Return a run by its id; its job has no ``suite``, its method no ``where``. Raises
-        CoarticError if the folder has no such run, or if the id belongs to another run."""
+        """Return a run by its id; ``suite`` of its job and ``where`` of its method are empty.
+        Raises CoarticError if the folder has no such run, or if the id belongs to another run."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
@@ -396,11 +396,14 @@ class Store:
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``, the runs of the plan in order, as a data frame (nullable types)."""
+        """Return view ``runs``, a row for each run of the plan, in order, as a data frame with the
+        columns :data:`.COLUMNS` (nullable types)."""
         return self._frame(_RUNS)
 
     def solutions(self) -> pd.DataFrame:
-        """Return view ``solutions``, a row for each movement, as a data frame (nullable types)."""
+        """Return view ``solutions``, a row for each movement of the plan's solutions, as a data
+        frame (nullable types). Columns: ``run_id``, ``order`` (from 0), ``goal`` (from 1),
+        ``hand``, ``kind``, ``ticks`` and ``path`` (configurations as JSON)."""
         self._check_lengths()
         return self._frame(_SOLUTIONS)
 
@@ -421,7 +424,7 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id of each run of the plan that made trials, with the rewards of its trials,
+        """Yield, for each run of the plan that made trials, its id and the rewards of its trials,
         shape ``(trials,)``; NaN stands for a trial that failed or whose reward is not kept."""
         query = """SELECT run_id, rewards, trials FROM asked
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
@@ -432,8 +435,8 @@ class Store:
     # Rows.
 
     def _suite(self) -> Any:
-        """Return the row of the last suite, with its environment. Raises CoarticError if no suite
-        is stored."""
+        """Return the row of table ``suite`` on the last ``coartic run``, with the columns of its
+        environment. Raises CoarticError if no suite is stored."""
         row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
         if row is None:
             raise CoarticError("it is not finished; repeat the `coartic run` command")
@@ -464,7 +467,7 @@ class Store:
             self._insert("learning", {"result_id": result, "rewards": blob})
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
-        """Return a cell from its row of table ``cells``; its method has no ``where``. Raises
+        """Return a cell from its row of table ``cells``; ``where`` of its method is empty. Raises
         ValueError or TaskError if coartic cannot have written the row."""
         method = {name: row[name] for name in _OF_METHOD} | {
             "name": row["method"],
@@ -486,8 +489,9 @@ class Store:
         return cell
 
     def _check_lengths(self, condition: str = "", *values: object) -> None:
-        """Raise CoarticError, before it is read, for a solution that is longer than runs keep, of
-        all runs or of those that satisfy an SQL ``condition``."""
+        """Raise CoarticError, before movements are read, if the paths of a solution have more than
+        10,000,000 characters together; of all runs, or of runs that satisfy an SQL ``condition``,
+        with ``values`` for its question marks."""
         query = f"""SELECT max(length) FROM (SELECT sum(length(path)) AS length FROM movements
             {condition} GROUP BY result_id, part)"""
         with explain_errors(self.folder):
@@ -501,14 +505,15 @@ class Store:
 
     def _environment(self, content: dict[str, Any]) -> int:
         """Return the id of the row of an environment, the versions, platform and commit of a
-        process (``current_environment``); insert the row if it is missing."""
+        process by name; insert the row if it is missing."""
         commit = content.get("commit")
         row = {
             "content": json.dumps(content, ensure_ascii=False, sort_keys=True),
             "commit_id": commit and commit["id"] + "+" * commit["dirty"],
             "packages": hash_of([content.get("python"), content.get("packages")])[:8],
         }
-        return self._id_of("environments", row, "content")
+        stored = self._one("SELECT id FROM environments WHERE content = ?", row["content"])
+        return self._insert("environments", row) if stored is None else int(stored["id"])
 
     def _cell(self, cell: Cell) -> tuple[int, str]:
         """Return the id and the code of the row of a cell; insert the row if it is missing. A row
@@ -519,33 +524,27 @@ class Store:
                 return number, code
         return self._insert("cells", _cell_row(cell)), cell.method.code
 
-    def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
-        """Return the id of the row with the values of these keys; insert the row if it is
-        missing."""
-        condition = " AND ".join(f"{key} = ?" for key in keys)
-        query = f"SELECT id FROM {table} WHERE {condition}"
-        stored = self._one(query, *(row[key] for key in keys))
-        return self._insert(table, row) if stored is None else int(stored["id"])
-
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
-        """Insert a row, lists and tables as JSON, and return its id."""
+        """Insert a row, values by column, into a table; return its id. Lists and dictionaries
+        become JSON."""
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
         return int(self._db.execute(text, [*map(_as_text, row.values())]).lastrowid or 0)
 
     def _execute(self, query: str, values: Sequence[object] = ()) -> sqlite3.Cursor:
-        """Execute a query, in which ``asked`` is the runs of the plan."""
+        """Execute a query with ``values``, in which ``asked`` is a table of the runs of the
+        plan."""
         return self._db.execute(f"WITH asked AS ({_ASKED}) {query}", values)
 
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return a list of the rows of a query, in which ``asked`` is the runs of the plan. Raises
-        CoarticError if the file cannot be read."""
+        """Return a list of the rows of a query (:meth:`_execute`). Raises CoarticError if the file
+        cannot be read."""
         with explain_errors(self.folder):
             return self._execute(query, values).fetchall()
 
     def _one(self, query: str, *values: object) -> Any:
-        """Return the first row of a query; None if it has no row."""
+        """Return the first row of a query (:meth:`_rows`); None if it has no row."""
         return next(iter(self._rows(query, *values)), None)
 
     def _frame(self, query: str) -> pd.DataFrame:
@@ -571,7 +570,8 @@ class Store:
             return pd.concat(parts, ignore_index=True)
 
     def _wait_for(self, statement: str) -> None:
-        """Execute a statement; wait as long as other programs that have the file open lock it."""
+        """Execute a statement; while another program locks the file, try again, later with a
+        warning."""
         for tries in itertools.count():
             if tries == 2:
                 warnings.warn(
@@ -610,10 +610,10 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Open a results folder for reading.
+    """Open a results folder for reading in the block of this context.
 
-    Raises CoarticError if this version of coartic did not write the folder, and while a
-    ``coartic run`` writes into it.
+    Raises CoarticError if the folder has no results, or results in the format of another version,
+    and while a ``coartic run`` writes into it.
     """
     path = folder / RUNS_FILE
     with explain_errors(folder):
@@ -649,7 +649,8 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[Store]:
-    """Open a results folder for writing, for this process alone, and make a missing folder.
+    """Open a results folder for writing in the block of this context, by this process alone, and
+    make a missing folder.
 
     Raises CoarticError if the folder holds something else or cannot be written, and while another
     process writes into it.
@@ -680,8 +681,9 @@ def writing(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
-    """Lock a folder for this process, which performs a ``command``, or share the lock with other
-    readers. Systems and disks without such locks are left as they are.
+    """Lock a folder for this process in the block of this context, or, with ``shared``, share the
+    lock with other readers; ``command`` is named in the error. Systems and disks without such locks
+    are left as they are.
 
     Raises CoarticError while another process holds the lock.
     """
@@ -713,7 +715,8 @@ def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") ->
 
 
 def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """Return a connection to a ``file:`` address that waits ``timeout_s`` for a lock."""
+    """Return a connection to a ``file:`` address or ``:memory:`` that waits ``timeout_s`` for a
+    lock."""
     connection = sqlite3.connect(where, timeout=timeout_s, isolation_level=None, uri=True)
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")

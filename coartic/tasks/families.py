@@ -221,8 +221,9 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
     """Draw ``count`` goals and return their x and y, thousandths of a length unit: in a box within
-    the region, or, if the family has a line, on a line (``vertical`` or horizontal) except one
-    goal, neither first nor last, that is off it. Goals on a line may be outside the region."""
+    the region, or, if the family has a line, on a line (``vertical`` or horizontal) except, if
+    there are more than two, one goal, neither first nor last, that is off it. Goals on a line may
+    be outside the region."""
     region, line = family.region, family.line
     share, sides = draws.integer(*region.scale), []
     for low, high in (region.x, region.y):
@@ -311,8 +312,8 @@ def first_good(
 
 def instance_of(family: Family, address: Address) -> Task:
     """Draw the instance of a family at an address, and return it as a task with a title, initial
-    hands and provenance. Raises TaskError if each of the first 10,000 drafts breaks a rule.
-    """
+    hands and provenance. Raises TaskError if each of the first 10,000 drafts (random tasks) breaks
+    a rule of the family."""
     task, _ = first_good(family, address)
     name = str(address)
     short = name.rpartition("/")[2]
@@ -356,8 +357,7 @@ def named_by(text: str) -> list[str]:
     """List the names of the instances of a range such as ``two-armed/v1/i000..i039``, both ends
     included; for a text that is no range, such as a task's name or a path, list this text alone,
     unchecked. Raises TaskError for a range that is malformed, goes backwards or has more than
-    10,000 instances.
-    """
+    10,000 instances. Whether a shipped family exists is not checked."""
     if "/" not in text or ".." not in text.rpartition("/")[2] or text.endswith(".toml"):
         return [text]
     written = _RANGE.fullmatch(text)
@@ -399,7 +399,7 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 def load_family(name: str) -> Family:
     """Return a shipped family by its name with version, such as ``two-armed/v1``, or a family of
-    your own by the path of its file. Raises TaskError for an unknown name."""
+    your own by the path of its file. Raises TaskError if it does not exist."""
     if is_file(name):
         return read_family(Path(name))
     shipped = shipped_families()
@@ -447,7 +447,8 @@ def instance_names(
     else 10.
 
     Raises ValueError for another split, for a count that is not from 1 to 10,000, for fresh
-    instances without a year and for others with one; TaskError for an unknown family.
+    instances without a year from 1000 to 9999, and for others with a year; TaskError for an unknown
+    family.
     """
     load_family(str(family))
     if split not in COUNTS:

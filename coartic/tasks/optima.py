@@ -55,9 +55,11 @@ def essence(task: Task) -> str:
 
 
 def best_shipped(task: Task) -> KnownOptimum | None:
-    """Return the best reward known of a task, from the shipped files, whatever the task's name.
+    """Return the best reward known of a task, from the shipped files; the task is recognised by
+    :func:`essence`, whatever its name.
 
-    Returns None for a task that is not shipped, and for instances after the first 40 of a family.
+    Returns None for a task that is not shipped, and for instances of a family except the first 40
+    of its test split.
     """
     return _by_essence().get(essence(task))
 

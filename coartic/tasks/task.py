@@ -61,7 +61,7 @@ def hands_of(letters: str) -> tuple[Hand, ...]:
 
 
 def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
-    """Return the letters of hands, the paper's name of a hand sequence: ``"RL"`` for
+    """Return the first letters of hands, as the paper writes a hand sequence: ``"RL"`` for
     ``("right", "left")``."""
     return "".join(hand[0].upper() for hand in hands)
 
@@ -175,8 +175,8 @@ class Task(FileData):
         return goals
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
-        """Return a copy with the fields in ``update`` changed, which are not checked; the copy's
-        arrays ``q0`` and ``goal_array`` follow from the changed fields."""
+        """Return a copy with the fields in ``update`` changed, which are not checked (with ``deep``
+        a deep copy); the copy's arrays ``q0`` and ``goal_array`` follow from the changed fields."""
         copied = super().model_copy(update=update, deep=deep)
         for name in ("q0", "goal_array"):
             copied.__dict__.pop(name, None)
@@ -218,7 +218,7 @@ class Task(FileData):
         """Return the content of a task with ``q0``, shape ``(dof,)``, if given, as ``start``, or,
         without either, with the base at (0, 0) and both arms along +x; what is no dictionary comes
         back unchanged. Raises a validation error for both, for a ``q0`` of another shape or with
-        entries that are no finite numbers, and for a ``penalty``."""
+        entries that are no finite numbers, and for the key ``penalty``."""
         if not isinstance(content, dict):
             return content
         if "penalty" in content:
@@ -292,15 +292,15 @@ class Task(FileData):
     @checked_arguments
     def save(self, path: str | Path, *, replace: bool = False) -> None:
         """Write the task as a file ``.toml``, which :func:`load_task` reads. With ``replace`` a
-        file of that name is written over. Raises CoarticError if the file cannot be written, or is
-        there without ``replace``."""
+        file of that name is written over. Raises CoarticError if its name does not end in
+        ``.toml``, if the file cannot be written, or if it is there and ``replace`` is False."""
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
             raise CoarticError(f"cannot write {file}: the name of a task's file ends in .toml")
         write_output(file, task_text(self).encode(), replace=replace)
 
     def __repr__(self) -> str:
-        """Return the name, the goals and the hands of the task."""
+        """Return name, number of goals, hands and initial hands of the task, in one line."""
         return short_repr(
             self,
             repr(self.name),
@@ -377,9 +377,9 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return the least distance that a hand can have from a goal's centre, less ``tolerance``,
-    length unit: positive if the goal is out of reach. Base coordinates that are not locked can
-    take any value."""
+    """Return by how much a goal's centre lies outside the distances that a hand can have from its
+    shoulder, less ``tolerance``, length unit: above 0 if the goal is out of reach, else at most 0.
+    Base coordinates that are not locked can take any value."""
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)
     dx = goal[0] - task.start.base[0] - arm.shoulder_x if "x" in task.locked_base else 0.0
@@ -468,8 +468,8 @@ def task_text(task: Task) -> str:
 
 
 def _toml_value(value: Any) -> str:
-    """Return a value as TOML text: a string (of printable characters) as JSON writes it, a
-    dictionary as an inline table."""
+    """Return a string of printable characters, a number, or a list or dictionary of these as TOML
+    text: a string as JSON writes it, a dictionary as an inline table."""
     if isinstance(value, dict):
         return (
             "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
