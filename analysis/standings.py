@@ -18,10 +18,10 @@ from coartic.runs.plan import trials_in
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
-    best known rewards are proven, or without tasks; ``best known`` if some are not; with ``or best
-    of this folder`` where some, or this alone where all are known from methods of this folder
-    alone. Raises KeyError for a task without a best known reward."""
+    """Return a name for the best known rewards of these tasks: ``optimum`` if all are proven, or
+    without tasks, else ``best known``. Unproven rewards of methods of this folder alone do not
+    count there, and add ``or best of this folder``; if all are such, the name is ``best of this
+    folder``. Raises KeyError for a task without a best known reward."""
     best = [study.optima[task] for task in tasks]
     others = [each.proven for each in best if each.proven or not each.only_here]
     names = ["optimum" if all(others) else "best known"] if others or not best else []
@@ -60,7 +60,7 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the pair of task and label of each cell of some runs, in the order of the runs."""
+    """Return the different pairs of task and method (label) among some runs, in their order."""
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
@@ -76,8 +76,8 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 @cached
 def equal_trials(study: Study) -> int:
     """Return the number of trials of a run with which methods are ranked: the number in the suite's
-    file or, where no compared method has it, the number of most algorithms, the least of several;
-    the most that a run made, where no method has such a parameter."""
+    file or, if no compared method has it, the number that most algorithms have (of equals the
+    least); if no method has a parameter ``trials``, the most trials that a run made."""
     asked, algorithms = _trials_asked(study), dict[int, set[str]]()
     for method in compared(study):
         for part in study.methods.parts[method]:
@@ -94,9 +94,9 @@ def equal_trials(study: Study) -> int:
 
 @cached
 def trials_of(study: Study) -> dict[str, int]:
-    """Return the number of trials of a run of each row of :attr:`.Study.methods`, by label:
-    :func:`equal_trials` for a method that has no such parameter and made no more, and for a method
-    that does not use the reward of trials."""
+    """Return, by label, the number of trials of a run of each row of :attr:`.Study.methods`: its
+    parameter ``trials``; without this parameter the most trials made, at least
+    :func:`equal_trials`; for a method that does not use the reward of trials, this number."""
     asked, equal = _trials_asked(study), equal_trials(study)
     made = study.runs.fillna({"trials": 0}).groupby("label").trials.max()
     return {
@@ -109,7 +109,7 @@ def trials_of(study: Study) -> dict[str, int]:
 
 @cached
 def _trials_asked(study: Study) -> dict[str, int]:
-    """Return the number of trials that the parameters of each label name; 0 if they name none."""
+    """Return the parameter ``trials`` of each method with its setting, by label; 0 without it."""
     return {job.cell.label: trials_in(job.cell.parameters) for job in study.plan}
 
 
@@ -184,8 +184,8 @@ def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
 
 
 def own_methods(study: Study) -> list[str]:
-    """Return the labels of the methods from files that solved every run on a task or more, the
-    smallest gap first."""
+    """Return the labels of the methods from files that solved every run on a task or more, in the
+    order of :func:`board`."""
     rows = board(study)
     return [*rows.index[~rows.built_in.astype(bool)]]
 
@@ -198,8 +198,8 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
 
 
 def shown_name(study: Study, method: str) -> str:
-    """Return the title of a method and, for a method of :func:`compared`, what sets its numbers
-    apart from those of other methods:
+    """Return the title of a method and, for a method of :func:`compared`, why its numbers are not
+    comparable with the numbers of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
     :func:`common_tasks`; ``mine (at most 77 of 10,000 trials)`` for one whose runs all stopped
     before their trials were made; ``mine (400 trials)`` for another number of trials than

@@ -71,7 +71,7 @@ UNCHECKED = (
 
 
 def need(holds: Any, words: str) -> None:
-    """Raise ValueError with these words unless something holds."""
+    """Raise ValueError with the message ``words`` if ``holds`` is false."""
     if not holds:
         raise ValueError(words)
 
@@ -85,7 +85,7 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in ran
 
 def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     """Return cosine and sine of angles, rad, by the Taylor series of what is left after k quarters
-    of a turn (π/2)."""
+    of a turn (π/2); from 1e5 rad on by the C library."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
     z, k = x * x, quarters.astype(np.int64)
@@ -252,7 +252,8 @@ def check_runs(folder: Path) -> _Report:
 
 
 def _check_all(db: sqlite3.Connection) -> _Report:
-    """Return the report on plan, cells and runs; none is checked if a table or view is foreign."""
+    """Return the report of :func:`check_runs` on an open database; nothing is checked if a table or
+    view is not as coartic makes it. Raises ValueError for another format."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
     db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
@@ -349,7 +350,7 @@ def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]
 
 
 def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence if the plan is not as it was written, by its stored hash."""
+    """Yield a sentence if the hash of the plan is not the hash that was stored with it."""
     hashes = [row[0] for row in db.execute("SELECT plan_hash FROM suite")]
     rows = [[*row] for query in PLANNED for row in db.execute(query)]
     if hashes != [hash_of(rows)] and (hashes or rows):
@@ -358,7 +359,7 @@ def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
 
 
 def _missing(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence if the plan, or a part of its runs, is not there."""
+    """Yield a sentence if no plan is stored, or if runs of the plan are not stored."""
     if not db.execute("SELECT count(*) FROM suite").fetchone()[0]:
         yield NO_PLAN
     query = """SELECT runs, count(run), min(run) FROM plan LEFT JOIN asked USING (position)

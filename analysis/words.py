@@ -165,7 +165,7 @@ def tally(counts: Mapping[Any, int]) -> str:
 
 
 def commonest(reasons: Iterable[str]) -> list[str]:
-    """Return texts of the (at most) three commonest reasons with numbers, ``12 × no hit``."""
+    """Return the three commonest reasons at most, each with its number, ``12 × no hit``."""
     return [f"{count} × {reason}" for reason, count in Counter(reasons).most_common(3)]
 
 

@@ -40,8 +40,10 @@ _LIBRARIES = (
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Return, by name, versions, platform, processor, arithmetic and commit of this process, and
-    the environment variables of its workers: always the same dictionary, not to be changed."""
+    """Return what results of this process can depend on, by name: versions (``coartic``,
+    ``python``, ``packages``, ``model_code``, ``commit``), ``platform``, ``processor``,
+    ``arithmetic``, ``cores`` and ``threads``, the environment variables of workers. It is always
+    the same dictionary, not to be changed."""
     processor = platform.processor()
     with contextlib.suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
@@ -110,8 +112,8 @@ def arithmetic() -> str:
 
 
 def _say_arithmetic(pipe: Any) -> None:
-    """Send hashes of bits through a pipe: of eigenvectors, logarithms and powers by NumPy and its
-    linear algebra, and of functions by the C library."""
+    """Send the text of :func:`arithmetic` through a pipe: a hash of eigenvectors, logarithms and
+    powers by NumPy, and a hash of functions by the C library."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
     numbers = np.abs(matrix).ravel().tolist()

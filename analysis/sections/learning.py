@@ -32,8 +32,9 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1",
 )
 def list_learning(study: Study) -> Rows:
-    """List the best reward after each number of trials in :data:`BUDGETS` (mean over runs), for
-    methods whose runs on a task all made trials, 100 at least, and have a solution."""
+    """Yield a row for each task and method: the best reward, ticks, after each number of trials in
+    :data:`BUDGETS`, a mean over runs, if all runs there have a solution and made 100 trials or
+    more."""
     learned = improvements(study)
     for (task, label), every in study.cells.items():
         runs = [learned[run] for run in every.run_id if run in learned]
@@ -56,8 +57,8 @@ def list_learning(study: Study) -> Rows:
     "method on a task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Draw the best reward so far of the learner, hill climbing, CMA-ES and methods from files, by
-    task."""
+    """Draw :func:`learning_curves`, the best reward so far against the trial, a panel for each
+    task; None without a curve."""
     data = learning_curves(study)
     if not len(data):
         return None

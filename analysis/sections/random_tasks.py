@@ -44,9 +44,9 @@ def on_instances(study: Study) -> pd.DataFrame:
 
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
-    """Return the gaps of a method's runs on each instance, shape ``(n,)`` each, by family.
-    ``runs`` are rows of :func:`on_instances`; families that lack an instance there are left
-    out."""
+    """Return, by family, the gaps of a method's runs on each of its instances, a list of arrays of
+    shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; families that lack an
+    instance there are left out."""
     return {
         str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
         for family, of_family in runs.groupby("family", sort=False)
@@ -59,8 +59,8 @@ def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
     "method; instances; missing; gap[]: gap (%) .1; in [*]: {} (%) .1",
 )
 def list_family_gaps(study: Study) -> Rows:
-    """List gaps to the best known reward over families with two arms, and in each family, with
-    intervals about other tasks.
+    """Yield a row for each method: its gap to the best known reward, over families with two arms
+    and in each family, with intervals for other tasks of the families.
 
     A method that did not solve every run of every instance of a family has gap NaN in the family,
     and over families with two arms if the family has two, as in the ranking. ``instances`` is the
