@@ -364,7 +364,8 @@ class Study:
         """Return the results of the corrective process alone on a task, by hand sequence.
 
         A row for each sequence, the best first: ``hands``, ``reward`` (ticks, missing for a
-        failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences.
+        failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences. Raises
+        CoarticError for a task that the study does not have.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
@@ -379,15 +380,15 @@ class Study:
     @cached_property
     def solutions(self) -> pd.DataFrame:
         """A row for each movement of the solutions: ``run_id``, ``order``, ``goal``, ``hand``,
-        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder, also in a study
-        by :meth:`only`."""
+        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder's plan, also in a
+        study by :meth:`only`."""
         with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run that made trials, with the rewards of its trials, negative
         ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept; of all
-        runs of the folder, also in a study by :meth:`only`."""
+        runs of the folder's plan, also in a study by :meth:`only`."""
         with open_results(self.folder) as store:
             yield from store.rewards()
 

@@ -273,7 +273,7 @@ class Worker:
 
     @property
     def cpu_s(self) -> float:
-        """CPU time of the process so far, s; 0 where the system does not report it, unlike Linux."""
+        """CPU time of the process so far, s; 0 where the system does not report it (Linux does)."""
         with contextlib.suppress(AttributeError, OSError, OverflowError):
             return time.clock_gettime((~(self.process.pid or 0) << 3) | 2)
         return 0.0

@@ -155,8 +155,8 @@ def picture(drawing: Figure, ending: str) -> bytes:
 
 
 def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
-    """Return a figure as the bytes of a file, with settings of Matplotlib and arguments of
-    ``Figure.savefig``, which without this layout would draw the figure twice to place its parts."""
+    """Return a figure as the bytes of a file, made by ``Figure.savefig`` with the arguments ``how``
+    and with ``settings`` of Matplotlib (rcParams). Its parts are laid out once, not twice."""
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     canvas = drawing.canvas
     try:

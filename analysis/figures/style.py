@@ -60,8 +60,8 @@ Look = dict[str, Any]
 
 
 def look_of(names: tuple[str, str], bold: bool) -> Look:
-    """Return the look of lines and marks by ``names``, of :data:`.COLORS` and of
-    :data:`.MARKS`; ``bold``: with a wider line and larger marks."""
+    """Return the look of lines and marks from the names of a colour in :data:`.COLORS` and of a
+    mark in :data:`.MARKS`; ``bold``: with a wider line and larger marks."""
     marker, dash = MARKS[names[1]]
     look: Look = {"color": COLORS[names[0]], "marker": marker, "linestyle": dash}
     look |= {"markevery": 0.2, "markeredgewidth": 0}  # a mark at every fifth of the diagonal
@@ -78,8 +78,8 @@ def grid(panels: int) -> tuple[int, int]:
 
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
-    """Let :func:`panels` make figures of a width, inches, in the block of this context; with None,
-    figures have the width that is asked of :func:`panels`."""
+    """Let :func:`panels` make figures of a width, inches, within a ``with`` block; None: of the
+    width in its argument ``size``."""
     before = _width.set(width)
     try:
         yield
@@ -88,7 +88,7 @@ def drawn_at(width: float | None) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Return whether the width chosen by :func:`drawn_at` is below five inches; False without a
+    """Return True if the width chosen by :func:`drawn_at` is below five inches; False without a
     chosen width."""
     return (_width.get() or TWO) < 5
 

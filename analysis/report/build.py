@@ -128,15 +128,16 @@ def _files_of_figures(study: Study, section: Section, width: float | None) -> di
 
 @cached
 def _plots_of(study: Study, section: Section, width: float | None = None) -> list[Plot]:
-    """Return the figures of a section for which the folder has runs, of a width, inches."""
+    """Return the figures of a section for which the folder has runs, of a width, inches; None:
+    each of its usual width."""
     drawn = (draw(study, width=width) for draw in section.figures)
     return [plot for plot in drawn if plot is not None]
 
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
-    a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, a dictionary
-    for each table with rows.
+    a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, for each
+    table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers) and ``html``.
 
     Settings and ablations have rows in the ranking, in the table of contexts, whose verdicts are
     counted in a sentence, in the table of all methods, and in CSV files.
@@ -164,7 +165,7 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
 
 
 def stamp(runs: pd.DataFrame) -> str:
-    """Return the hash of the results of runs, by which a report identifies its runs."""
+    """Return a hash, 64 hexadecimal digits, of the ids and results of runs, in any order."""
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 

@@ -51,9 +51,9 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 
 def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
-    """Return a run's best reward, negative ticks, after each of the numbers of trials in ``trials``,
-    in their shape; NaN before the first reward. ``steps``: the trials of a run with a new best reward, from 1, and these
-    rewards (:func:`improvements`)."""
+    """Return a run's best reward, negative ticks, after each number of trials in ``trials``, in the
+    shape of ``trials``; NaN before the first reward. ``steps``: the trials of the run with a new
+    best reward, from 1, and these rewards (:func:`improvements`)."""
     numbers, rewards = steps
     return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
 
@@ -238,8 +238,8 @@ def list_runtimes(study: Study) -> Rows:
     f"{style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
-    """Draw the share of targets that methods reach within numbers of trials and of forward-kinematics
-    evaluations, a panel each; None without a target that is reached."""
+    """Draw the share of targets that methods reach within a number of trials, and of
+    forward-kinematics evaluations, a panel each; None if no target is reached."""
     tabled = list_runtimes(study)
     rows = study.methods.loc[[*tabled.index]]
     rows = rows.loc[headline_methods(rows)]

@@ -33,8 +33,8 @@ def _other(hand: Hand) -> Hand:
 def isolated_reaches(
     task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
 ) -> tuple[Array, Array]:
-    """Return r(q, g, h) and R(q, g, h), the ticks and the configurations at the end of reaches from
-    q to goal g with hand h by the corrective process.
+    """Return the ticks r(q, g, h) of reaches by the corrective process from configuration q to goal
+    g with hand h, and the configurations R(q, g, h) at their ends.
 
     Parameters
     ----------
@@ -163,19 +163,19 @@ class Signature:
 
 @checked_arguments
 def hand(runs: Solutions) -> Array:
-    """Return, for each run, the share of goals before the last whose hand is not the fastest for
-    that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`. NaN on a task for
-    one hand or with one goal."""
+    """Return for each run, shape ``(n,)``, the share of goals before the last whose hand is not the
+    fastest for that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`. NaN on
+    a task for one hand or with one goal."""
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
 @checked_arguments
 def as_in_isolation(runs: Solutions) -> Array:
-    """Return a(i, g): 1 if the chosen hand is the fastest for goal g alone, or else 0.
+    """Return a(i, g) for run i and goal g, shape ``(n, G)``: 1 if the chosen hand is the fastest
+    for goal g alone, or else 0; NaN on a task for one hand.
 
-    a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)]. Shape ``(n, G)``;
-    NaN on a task for one hand.
+    a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)].
     """
     if not runs.runs or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals)), np.nan)

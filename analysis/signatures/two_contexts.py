@@ -49,8 +49,8 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
 
 
 def movable(task: Task, hand: Hand) -> Array:
-    """Return the indices in a configuration that move a hand, shape ``(k,)``: of base coordinates
-    that are not locked, and of the joints of its arm."""
+    """Return the indices of the entries of a configuration that move a hand, shape ``(k,)``: base
+    coordinates that are not locked, and joints of its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
