@@ -119,12 +119,8 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
         hands = {*solved(cell).hands}
         every = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
         if len(every) == 1:
-            key = (
-                every.pop(),
-                _most_trials(study, task, label),
-                explores_idle_arm(study, task, label),
-            )
-            labels.setdefault(key, label)
+            explored = explores_idle_arm(study, task, label)
+            labels.setdefault((every.pop(), _most_trials(study, task, label), explored), label)
     return labels
 
 
@@ -204,10 +200,8 @@ def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS
     for (task, label), of_method in study.cells.items():
         if not selects(study, label):
             continue
-        trials, explored = (
-            int(_most_trials(study, task, label)),
-            explores_idle_arm(study, task, label),
-        )
+        trials = int(_most_trials(study, task, label))
+        explored = explores_idle_arm(study, task, label)
         for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
             if share >= LEAST_SHARE and not control_of(study, task, label, str(hands), alike=True):
                 blocks[task, str(hands), trials, explored] = None

@@ -207,20 +207,14 @@ def shown_name(study: Study, method: str) -> str:
     row, trials = study.methods.loc[method], trials_of(study)[method]
     if method not in compared(study):
         return str(row.title)
-    apart = [] if row.built_in else [_on_tasks(study, method), _trials_made(study, method)]
+    apart = [] if row.built_in else [_on_tasks(study, method)]
+    made = int(compared(study)[method].trials.fillna(0).max())
+    if not row.built_in and row.information == BY_TRIAL and made < trials:
+        apart.append(f"at most {number(made)} of {number(trials)} trials")
     if trials != equal_trials(study) and "trials=" not in row.title:
         apart.append(f"{number(trials)} trials")
     words = "; ".join(filter(None, apart))
     return f"{row.title} ({words})" if words else str(row.title)
-
-
-def _trials_made(study: Study, method: str) -> str:
-    """Return how many of its trials a method made at most, ``at most 77 of 10,000 trials``; empty
-    if a run made all of them, and for a method that does not use the reward of trials."""
-    made = int(compared(study)[method].trials.fillna(0).max())
-    asked = trials_of(study)[method]
-    is_short = study.methods.information[method] == BY_TRIAL and made < asked
-    return f"at most {number(made)} of {number(asked)} trials" if is_short else ""
 
 
 def _on_tasks(study: Study, method: str) -> str:

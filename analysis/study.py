@@ -20,12 +20,7 @@ import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.method_frame import methods_of, parameter_varied
-from coartic.analysis.optima import (
-    BestKnown,
-    best_known,
-    gap_share,
-    restrictions,
-)
+from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
 from coartic.analysis.signatures.measures import signature_named
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart

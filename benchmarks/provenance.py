@@ -25,16 +25,7 @@ from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import threads_for, worker_variables
 from coartic.motion.compile import FINGERPRINT, PACKAGE
 
-_LIBRARIES = (
-    "casadi",
-    "daqp",
-    "llvmlite",
-    "numba",
-    "numpy",
-    "pandas",
-    "pydantic",
-    "scipy",
-)
+_LIBRARIES = ("casadi", "daqp", "llvmlite", "numba", "numpy", "pandas", "pydantic", "scipy")
 """Libraries that results may depend on."""
 
 

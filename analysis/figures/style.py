@@ -24,7 +24,7 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
-from coartic.analysis.methods import COLORS, MARKS
+from coartic.analysis.methods import COLORS
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -57,16 +57,6 @@ styled = style.context(["default", RC])
 
 Look = dict[str, Any]
 """Look of a method's lines and marks: arguments of Matplotlib's ``plot``."""
-
-
-def look_of(names: tuple[str, str], bold: bool) -> Look:
-    """Return the look of lines and marks from the names of a colour in :data:`.COLORS` and of a
-    mark in :data:`.MARKS`; ``bold``: with a wider line and larger marks."""
-    marker, dash = MARKS[names[1]]
-    look: Look = {"color": COLORS[names[0]], "marker": marker, "linestyle": dash}
-    look |= {"markevery": 0.2, "markeredgewidth": 0}  # a mark at every fifth of the diagonal
-    sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
-    return look | sizes
 
 
 def grid(panels: int) -> tuple[int, int]:

@@ -41,10 +41,7 @@ def list_methods(study: Study) -> Rows:
         yield f"{[*places][place]} {label}", row
 
 
-@table(
-    "Runs without a solution",
-    "task; method; failed: failed runs; runs; reasons",
-)
+@table("Runs without a solution", "task; method; failed: failed runs; runs; reasons")
 def list_failed(study: Study) -> Rows:
     """Yield a row for each method on each task on which runs failed: their number and commonest
     reasons."""

@@ -120,13 +120,9 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
             place = order.index(label)
             heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
             size = looks[label]["markersize"]
-            dot: Any = {
-                "color": looks[label]["color"],
-                "markersize": size / 2,
-                "markeredgewidth": 0,
-            }
+            dot: Any = {"color": looks[label]["color"], "markersize": size / 2, "alpha": 0.5}
             gaps = rows.gap.clip(upper=1.0)
-            axes.plot(gaps, heights, "o", linestyle="", alpha=0.5, **dot)
+            axes.plot(gaps, heights, "o", linestyle="", markeredgewidth=0, **dot)
             mean = rows.iloc[0]
             ends = [mean.mean_low, mean.mean_high]
             axes.plot(ends, [-place, -place], color=style.INK, linewidth=1)
