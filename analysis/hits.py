@@ -507,7 +507,8 @@ def _implausible(
     hit. ``source`` names the recording and the subject in messages; ``unit``: ticks in a unit of
     time; ``slowest``: longest subtask of the corrective process, ticks.
 
-    Warns of an arm that is faster or slower than people's. Raises CoarticError if times are those
+    Warns of times that seem rounded, of other rows or with a reaction time in them, and of an arm
+    that is much faster or slower than the task's. Raises CoarticError if times are those
     of a clock that runs on, rounded or constant, or if the median hit takes a number of ticks that
     no arm of the task could take.
     """

@@ -175,8 +175,9 @@ def hits_from_markers(
         return pd.DataFrame(values).groupby(number).median().to_numpy()
 
     def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
-        """Refuse, or warn of, a quantity that changes between trials; ``each``: in a trial;
-        ``share``: of the trials at either end that are left out."""
+        """Raise CoarticError if quantity ``name``, ``each`` by trial, changes between trials by
+        more than ``most``; warn if by more than ``doubt``. The share ``share`` of trials with the
+        smallest, and with the largest, values does not count; ``words`` end the message."""
         long = np.flatnonzero(many & np.isfinite(each))
         ordered, out = np.sort(each[long]), int(share * len(long))
         if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):
@@ -434,8 +435,9 @@ def _odd_steps(ways: Array, least: float) -> str:
 
 
 def _stretches(lengths: Array, angles: Array) -> list[str]:
-    """Return, in words, which links, and how much, change in length with a joint at one of their
-    ends, other than the first of the arm; ``lengths`` and ``angles``: ``(n, links)``."""
+    """Return in words each link whose length follows the angle of a joint at one of its ends
+    (except the first joint of the arm), and by how much. ``lengths``, length unit, and ``angles``,
+    rad, have shape ``(n, links)``."""
     changes = []
     for link, length in enumerate(lengths.T):
         for joint in range(max(link, 1), min(link + 2, angles.shape[1])):

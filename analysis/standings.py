@@ -133,9 +133,10 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
     :func:`.ranking` and of :attr:`.Study.methods`, and with ``ranked``.
 
     Ranked are methods that solved every run on :func:`common_tasks`, in at most
-    :func:`equal_trials`; the smallest gap is first. Below them, not ranked, are methods with more
-    trials, and methods from files or of the labels ``also`` that lack a run or a solution on one of
-    these tasks, over the tasks on which they solved every run. Other methods have no row.
+    :func:`equal_trials` unless trials are varied; the smallest gap is first. Below them, not
+    ranked, are methods with more trials, and methods from files or of the labels ``also`` that lack
+    a run or a solution on one of these tasks, over the tasks on which they solved every run. Other
+    methods have no row.
     """
     runs, methods = common_runs(study), study.methods
     parts = [ranking(runs)] if len(runs) else []

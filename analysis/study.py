@@ -237,8 +237,8 @@ class Study:
 
     @cached_property
     def varied(self) -> tuple[str, dict[str, Any]]:
-        """Name of the only parameter in which the compared methods differ, and its values by label
-        (:func:`.parameter_varied`); empty if they differ in more."""
+        """Name of the only parameter in which all compared runs differ, settings of one method, and
+        its values by label (:func:`.parameter_varied`); otherwise empty."""
         return parameter_varied(self.runs)
 
     @cached_property
@@ -479,8 +479,8 @@ class Study:
 
     @cached
     def _signature_of_each(self, name: str, task: str, method: str, *, replay: bool) -> Array:
-        """Return a signature of each run of :meth:`executed`, ``(n,)``; NaN for runs that lack
-        it."""
+        """Return signature ``name`` of each run of :meth:`executed`, ``(n,)``; NaN for runs without
+        this signature."""
         return signature_named(name).each(self.executed(task, method, replay=replay))
 
     @cached

@@ -92,8 +92,8 @@ class Table:
 def table(caption: str, columns: str) -> Callable[[Callable[[Study], Rows]], Table]:
     """Return a decorator that turns a function of a study that yields rows into a table.
 
-    The id of the table is the name of the function. ``columns`` has the texts of the columns
-    (:func:`_column_of`), separated by semicolons.
+    The id of the table is the name of the function without ``list_``, with dashes. ``columns`` has
+    the texts of the columns (:func:`_column_of`), separated by semicolons.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
@@ -178,9 +178,9 @@ def is_setting(frame: pd.DataFrame) -> pd.Series:
 
 
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
-    """Return entries of a row on the runs of one method on one task: titles ``task`` and label
-    ``method``, numbers of ``runs`` and ``solved`` runs, mean ``reward`` (ticks) with ``reward_sd``
-    and ``reward_median``, mean ``gap`` and ``run_ids``.
+    """Return entries of a row on the runs of one method on one task: title of the ``task``, label
+    of the ``method``, numbers of ``runs`` and ``solved`` runs, mean ``reward`` (ticks) with
+    ``reward_sd`` and ``reward_median``, mean ``gap`` and ``run_ids``.
 
     Without a solved run reward and gap are NaN. A table leaves out entries without a column.
     """

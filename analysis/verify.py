@@ -169,7 +169,7 @@ def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Fl
 
 
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
-    """Return the configuration where a movement from ``q`` stops, its ticks, and whether the hand
+    """Return the configuration where a movement from ``q`` stops, its ticks, and True if the hand
     hits its goal there. A movement that takes more ticks than are stored is cut one tick later."""
     _, goal, hand, kind, most, corners = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
@@ -187,8 +187,9 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 
 
 def _recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
-    """Return reward, hands, corrections made, and joint travel of the arms not chosen, from hit to
-    hit, rad. Raises ValueError if a movement breaks a rule or takes other ticks than are stored."""
+    """Return reward, hands, number of corrective movements made, and travel in joint space of the
+    arms not chosen, from hit to hit, rad. Raises ValueError if a movement breaks a rule or takes
+    other ticks than are stored."""
     _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
@@ -380,9 +381,10 @@ def hash_of(content: Any) -> str:
 
 
 def _check_rewards(row: Any) -> bytes:
-    """Return the rewards of a run as bytes: the best reward, then by how much each trial is worse,
-    plus 1, or 0 without a reward; all lowest bytes come first, then the next. Raises ValueError for
-    damage, and if the stored best trial is not the first with the reward of the run."""
+    """Return the rewards of a run, unpacked: integers of four bytes, the best reward, then for each
+    trial 1 plus the ticks by which it is worse (0 without a reward), the lowest bytes of all first.
+    Raises ValueError for damage, and if the stored best trial is not the first with the reward of
+    the run."""
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
         content = (packed := zlib.decompressobj()).decompress(row["rewards"] or EMPTY, size + 1)

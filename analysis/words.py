@@ -86,7 +86,7 @@ def p_value(p: float) -> str:
 
 
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
-    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals, by default three figures.
+    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals, by default as :func:`number`.
 
     Empty for NaN, and for an interval of no length, which would look like certainty.
     """

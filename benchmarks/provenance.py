@@ -60,8 +60,8 @@ def now() -> str:
 
 
 def made_with() -> dict[str, Any]:
-    """Return the environment of this process with its ``command``, a list of words (``a notebook``
-    in a notebook), and the ``date``."""
+    """Return :func:`current_environment` with the ``command`` that started this process, a list of
+    words (``a notebook`` in a notebook), and the ``date``, UTC."""
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}
@@ -89,9 +89,9 @@ def _commit_of_checkout() -> dict[str, Any] | None:
 
 
 def arithmetic() -> str:
-    """Return how workers round, as ``NumPy HASH, libm HASH``: hashes of the bits of some results,
-    computed in a process that is started like a worker; empty if no process starts. Where a hash is
-    the same, that library rounds alike; a processor's name says little on virtual machines."""
+    """Return a fingerprint of how workers round, ``NumPy HASH, libm HASH``: hashes of the bits of
+    some results, computed in a process that is started like a worker; empty if no process starts.
+    Where a hash is the same, that library rounds alike."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
     process = CONTEXT.Process(target=_say_arithmetic, args=(theirs,), daemon=True)
     try:

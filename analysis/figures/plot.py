@@ -52,7 +52,8 @@ class Plot:
     """Drawn numbers as a tidy frame, enough to draw the figure again."""
 
     def save(self, path: str | Path) -> None:
-        """Write the picture into a file ``.svg``, ``.pdf`` or ``.png``, over an earlier one."""
+        """Write the picture into a file ``.svg``, ``.pdf`` or ``.png``, over an earlier one. Raises
+        CoarticError for another ending, and if the file cannot be written."""
         path = Path(path)
         with errors_in_words(path):
             path.write_bytes(picture(self.figure, path.suffix))

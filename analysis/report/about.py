@@ -78,8 +78,8 @@ def attempt(
 
 
 def finding(study: Study, section: Section) -> list[str]:
-    """Return the lines of a section's sentence, a template, filled in from its tables; an empty
-    list if the section has no sentence, or its first table no rows."""
+    """Return the finding of a section in words, a list of lines: its template ``sentence``, filled
+    in from its tables; an empty list if it has no sentence, or its first table no rows."""
     if not section.sentence or not len(frame := section.tables[0](study)):
         return []
     rows, *others = (

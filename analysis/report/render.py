@@ -167,8 +167,9 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
 
 
 def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
-    """Return the HTML classes of each row, separated by a space: ``own`` for methods from files in
-    a table with other methods, ``setting`` for settings and ablations of others in the ranking."""
+    """Return the HTML classes of each row, separated by a space: ``own`` for a method from a file,
+    if the table has other methods, and ``setting``, in the ranking, for a setting or an ablation
+    of a built-in method."""
     is_own = [label in frame.attrs.get("own", ()) for label in frame.get("method", frame.index)]
     is_folded = is_setting(frame) & (table.id == "ranking") & ~np.array(is_own, dtype=bool)
     return [

@@ -127,17 +127,18 @@ class TwoContexts:
 
     @property
     def n(self) -> int:
-        """Number of runs in both contexts."""
+        """Number of runs in the two contexts together."""
         return sum(map(len, self.configurations))
 
     @property
     def posture_difference(self) -> float:
-        """Distance of the mean postures in both contexts, length unit and rad mixed."""
+        """Distance between the mean postures of the two contexts, length unit and rad mixed."""
         return distance_of_means(*self.configurations)
 
     @property
     def standardised_posture_difference(self) -> float:
-        """Posture difference in pooled SDs within contexts; NaN if runs do not differ."""
+        """Posture difference in pooled SDs within contexts; NaN if runs within contexts do not
+        differ, and if each context has a single run."""
         return standardised_posture_difference(*self.configurations)
 
     @cached_property

@@ -38,8 +38,8 @@ def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Return the budgets at which the share of reached targets rises, ``(k,)``, and the share from
-    each budget on, ``(k,)``.
+    """Return the budgets at which the share of reached targets rises, ``(k,)``, and the share that
+    is reached within each of these budgets, ``(k,)``.
 
     If no target is reached, one infinite budget with a share of 0.
     """
