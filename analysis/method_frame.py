@@ -109,7 +109,7 @@ def methods_of(
 
 def parameter_varied(runs: pd.DataFrame) -> tuple[str, dict[str, Any]]:
     """Return the name of a parameter and its values by label, numbers from low to high, if all runs
-    but searches for the optimum are of one method, on all tasks, with two or more values of this
+    except searches for the optimum are of one method, on all tasks, with two or more values of this
     parameter and equal others; or else an empty name and no value. ``runs`` are as in
     :func:`methods_of`."""
     runs = runs[~runs.method.isin(SEARCHES)]

@@ -21,7 +21,7 @@ import pandas as pd
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.method_frame import methods_of, parameter_varied
 from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
-from coartic.analysis.signatures.measures import signature_named
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
@@ -480,8 +480,10 @@ class Study:
     @cached
     def _signature_of_each(self, name: str, task: str, method: str, *, replay: bool) -> Array:
         """Return signature ``name`` of each run of :meth:`executed`, ``(n,)``; NaN for runs without
-        this signature."""
-        return signature_named(name).each(self.executed(task, method, replay=replay))
+        this signature. Raises CoarticError for an unknown name."""
+        if name not in SIGNATURES:
+            raise CoarticError(unknown("signature", name, SIGNATURES))
+        return SIGNATURES[name].each(self.executed(task, method, replay=replay))
 
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:

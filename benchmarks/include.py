@@ -161,7 +161,7 @@ def _warn_of_gaps(
 
 def _named(jobs: Sequence[Job]) -> str:
     """Return words that name the cell of the first job, and count the other jobs, such as
-    ``cma-es on ascending and of 2 others``."""
+    ``cma-es/bandit on ascending and of 2 others``."""
     others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 

@@ -301,7 +301,7 @@ def perform(
 
 
 def _seconds(run: Run) -> float:
-    """Return the wall time of a run, s, but 60 for a shorter run; infinite if it is not known."""
+    """Return the wall time of a run, s, at least 60; infinite if it is not known."""
     return max(run.outcome.times.wall_s or math.inf, LONG_S)
 
 

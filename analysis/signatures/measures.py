@@ -17,9 +17,7 @@ from numpy.typing import ArrayLike
 
 from coartic import Execution, Hand, Task
 from coartic.analysis.solutions import Solutions, initial_solution
-from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.text import unknown
 from coartic.motion.trial import reach_goals
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
@@ -237,10 +235,3 @@ SIGNATURES = {
 """Signatures by their names in claims: ``first`` is t(i, 1) − c(i, 1), and ``whole`` is
 Σ_g c(i, g) − t(i, g); NaN if the corrective process does not complete the task with the hands of
 the run."""
-
-
-def signature_named(name: str) -> Signature:
-    """Return a signature by its name. Raises CoarticError for an unknown name."""
-    if name not in SIGNATURES:
-        raise CoarticError(unknown("signature", name, SIGNATURES))
-    return SIGNATURES[name]
