@@ -176,8 +176,8 @@ def hits_from_markers(
 
     def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
         """Raise CoarticError if quantity ``name``, ``each`` by trial, changes between trials by
-        more than ``most``; warn if by more than ``doubt``. The share ``share`` of trials with the
-        smallest, and with the largest, values does not count; ``words`` end the message."""
+        more than ``most``; warn if by more than ``doubt``. Of the trials, a share ``share`` with
+        the smallest values, and one with the largest, do not count; ``words`` end the message."""
         long = np.flatnonzero(many & np.isfinite(each))
         ordered, out = np.sort(each[long]), int(share * len(long))
         if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):

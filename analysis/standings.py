@@ -96,7 +96,8 @@ def equal_trials(study: Study) -> int:
 def trials_of(study: Study) -> dict[str, int]:
     """Return, by label, the number of trials of a run of each row of :attr:`.Study.methods`: its
     parameter ``trials``; without this parameter the most trials made, at least
-    :func:`equal_trials`; for a method that does not use the reward of trials, this number."""
+    :func:`equal_trials`; for a method that does not use the reward of each trial always
+    :func:`equal_trials`."""
     asked, equal = _trials_asked(study), equal_trials(study)
     made = study.runs.fillna({"trials": 0}).groupby("label").trials.max()
     return {
@@ -114,8 +115,8 @@ def _trials_asked(study: Study) -> dict[str, int]:
 
 
 def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Return runs of rows of :attr:`.Study.methods`, given by label, as one frame with a new index,
-    the label in column ``method`` and an empty ``setting``; without runs a frame without rows."""
+    """Join frames of runs, by label of a row of :attr:`.Study.methods`, into one frame with a new
+    index, the label in column ``method`` and an empty ``setting``; without runs it has no rows."""
     parts = [runs.assign(method=method) for method, runs in by_method.items()]
     return pd.concat([*parts, study.runs[:0]], ignore_index=True).assign(setting="")
 

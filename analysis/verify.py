@@ -44,9 +44,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
-SCHEMA = (
-    "4be4698e3d72c02c"  # of format 6: hash of all statements that make OURS, and of all triggers
-)
+SCHEMA = "4be4698e3d72c02c"  # of format 6: hash of the statements that make OURS, and of triggers
 OURS = (  # of tables, then of views
     *("suite", "plan", "cells", "environments", "results", "movements", "learning"),
     *("asked", "runs", "solutions"),
@@ -187,9 +185,8 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 
 
 def _recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
-    """Return reward, hands, number of corrective movements made, and travel in joint space of the
-    arms not chosen, from hit to hit, rad. Raises ValueError if a movement breaks a rule or takes
-    other ticks than are stored."""
+    """Return reward, hands, number of corrections made, and joint travel of idle arms from hit to
+    hit, rad. Raises ValueError if a movement breaks a rule or takes other ticks than stored."""
     _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
@@ -381,10 +378,9 @@ def hash_of(content: Any) -> str:
 
 
 def _check_rewards(row: Any) -> bytes:
-    """Return the rewards of a run, unpacked: integers of four bytes, the best reward, then for each
-    trial 1 plus the ticks by which it is worse (0 without a reward), the lowest bytes of all first.
-    Raises ValueError for damage, and if the stored best trial is not the first with the reward of
-    the run."""
+    """Return a run's rewards, unpacked: integers of four bytes, the best reward, then of each trial
+    1 plus the ticks by which it is worse (0 without a reward), the lowest bytes of all first.
+    Raises ValueError for damage, and if the best trial is not the first with the run's reward."""
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
         content = (packed := zlib.decompressobj()).decompress(row["rewards"] or EMPTY, size + 1)

@@ -95,7 +95,8 @@ class Local:
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with the outcomes of its runs, in the order in which jobs finish. The jobs
         of a method are divided among processes; with ``in_order`` one process performs them all in
-        their order. The outcomes of a job whose process ends are ``timeout`` or ``crashed``.
+        their order. A job whose process ends is repeated once if its method may not be the cause,
+        or else has outcomes ``timeout`` or ``crashed`` (:meth:`Workers.perform`).
 
         Raises CoarticError if five processes in a row end before their first job, and if answers
         cannot be written.

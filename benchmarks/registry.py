@@ -78,7 +78,8 @@ def current_code(method: MethodInfo) -> str:
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
     """Raise CoarticError for the id of a method from ``origin`` that has other characters than ids
-    have, is reserved, or is the id or name of another method, whatever the case."""
+    have, is reserved, or is an id in ``registered``, a condition of the learner or one of
+    :data:`NAMES`, whatever the case of its letters."""
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
             f"{origin}: the name {name!r} must begin with a letter or digit and have only letters, "

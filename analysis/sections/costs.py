@@ -239,7 +239,7 @@ def list_runtimes(study: Study) -> Rows:
 )
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of targets that methods reach within a number of trials, and of
-    forward-kinematics evaluations, a panel each; None if no target is reached."""
+    forward-kinematics evaluations, a panel each; None without a curve."""
     tabled = list_runtimes(study)
     rows = study.methods.loc[[*tabled.index]]
     rows = rows.loc[headline_methods(rows)]

@@ -21,7 +21,7 @@ from coartic.estimates import Estimate
 
 @cached
 def _instances(study: Study) -> dict[str, list[str]]:
-    """Return the names of the instances with a best known reward, by family."""
+    """Return, by family, the names of its instances (random tasks) with a best known reward."""
     families: dict[str, list[str]] = {}
     for name in study.optima:
         if (family := study.tasks[name].family) is not None:
