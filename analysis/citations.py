@@ -91,7 +91,7 @@ def bibliography(
 
 
 def _misc(key: str, **fields: str) -> str:
-    """Return a ``@misc`` entry of BibTeX, a line for each field."""
+    """Return an entry ``@misc`` of BibTeX with this key and these fields, a line for each."""
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@misc{{{key},", *lines, "}"])
 

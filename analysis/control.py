@@ -78,23 +78,23 @@ def with_control(
     return pairs
 
 
-def control_of(study: Study, task: str, label: str, hands: str, *, own: bool = False) -> str:
-    """Return the label of the control of a method on a task: random search with these hands and as
-    many trials; ``hands`` empty: with every hand sequence. Empty without such runs.
+def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
+    """Return the label of the control of a method on a task: random search with the hand sequence
+    ``hands`` (empty: with every hand sequence) and as many trials. Empty without such runs.
 
     Random search that explores the idle arm as the method does comes before random search that
-    explores both arms, and is the only control for ``own``.
+    explores both arms; with ``alike`` only the former is a control.
     """
     controls, trials = _controls(study, task), _most_trials(study, task, label)
     explored = explores_idle_arm(study, task, label)
-    other = "" if own else controls.get((hands, trials, True), "")
+    other = "" if alike else controls.get((hands, trials, True), "")
     return controls.get((hands, trials, explored), other)
 
 
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
-    """Return whether a method gives noise to the arm that is not to hit: the learner by its
-    condition, random search by its parameter ``idle_arm``. True for other methods, and on tasks for
-    one arm."""
+    """Return True if a method adds exploration noise to the arm that is not to hit: the learner by
+    its condition, random search by its parameter ``idle_arm``. Always True for other methods, and
+    on tasks for one arm."""
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True
@@ -107,9 +107,9 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 
 @cached
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
-    """Return the labels of random search without memory on a task by the hand sequence of all its
-    runs (empty for random search with every hand sequence), the number of its trials, and whether
-    it explores the idle arm."""
+    """Return the labels of forms of random search on a task, by hand sequence of all runs (empty if
+    every hand sequence is tried), number of trials, and True if the idle arm is explored, too.
+    Random search in several ``stages`` is left out."""
     labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
@@ -119,12 +119,8 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
         hands = {*solved(cell).hands}
         every = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
         if len(every) == 1:
-            key = (
-                every.pop(),
-                _most_trials(study, task, label),
-                explores_idle_arm(study, task, label),
-            )
-            labels.setdefault(key, label)
+            explored = explores_idle_arm(study, task, label)
+            labels.setdefault((every.pop(), _most_trials(study, task, label), explored), label)
     return labels
 
 
@@ -145,15 +141,16 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
 
 
 def selects(study: Study, label: str) -> bool:
-    """Return whether a method, not random search, may select its solution by rewards of trials."""
+    """Return True if a method may select its solution by rewards of trials, and is not random
+    search."""
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
 @checked_arguments
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """Return the control of ``contexts``: the runs of random search (the first 500 solved on each
-    task) on the same two tasks, for the same goal and hand; runs with the other hand do not count.
+    """Return the runs of random search, the control of ``contexts``, on the same two tasks (the
+    first 500 solved on each) for the same goal and hand; runs with the other hand do not count.
 
     Random search makes as many trials as the method, with the commonest hand sequence of the
     method's runs on each task. None for random search itself, for a method that does not select its
@@ -203,12 +200,10 @@ def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS
     for (task, label), of_method in study.cells.items():
         if not selects(study, label):
             continue
-        trials, explored = (
-            int(_most_trials(study, task, label)),
-            explores_idle_arm(study, task, label),
-        )
+        trials = int(_most_trials(study, task, label))
+        explored = explores_idle_arm(study, task, label)
         for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
-            if share >= LEAST_SHARE and not control_of(study, task, label, str(hands), own=True):
+            if share >= LEAST_SHARE and not control_of(study, task, label, str(hands), alike=True):
                 blocks[task, str(hands), trials, explored] = None
     lines = [
         'title = "Random search with the hands of learners"',

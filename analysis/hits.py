@@ -129,9 +129,9 @@ def read_hits(
 def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     """Return a CSV file as a frame of texts, and a name for each row, such as ``line 2``.
 
-    Blank lines and lines that begin with ``#`` are left out. ``kind``: what files of this kind
-    have, for the message on one of another program. Raises CoarticError for a file that cannot be
-    read or is no table of text separated by commas.
+    Blank lines and lines that begin with ``#`` are left out. ``kind``: what should be in the file,
+    with a verb, such as ``recorded hits are``, for a message. Raises CoarticError for a file that
+    cannot be read, is no table of text separated by commas, or repeats its headings.
     """
     if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
@@ -156,8 +156,9 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
 
 
 def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
-    """Return the table of :func:`read_table`, fast, or None for a text with quotes, comments, blank
-    lines, rows that differ in length, or odd headings."""
+    """Return frame and names of rows as :func:`read_table`, by a fast parser; None for a text with
+    quotes, comments, blank lines, rows that differ in length, or empty, equal or single
+    headings."""
     head, _, body = text.replace("\r\n", "\n").removesuffix("\n").partition("\n")
     headings, rows = [*map(_written, head.split(","))], body.count("\n") + 1
     if (
@@ -181,7 +182,9 @@ def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
 
 
 def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return the table of :func:`read_table`, line by line."""
+    """Return frame and names of rows as :func:`read_table`, by a parser that goes line by line.
+    Raises CoarticError for another separator, a row with another number of values than the
+    headings, and a repeated heading. Warns of rows that are left out because they begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
     rows, lines, wrong, hidden = [], [], [], []
@@ -228,8 +231,8 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
 
 
 def _refuse_separator(path: str | Path, separator: str, headings: str = "") -> None:
-    """Raise CoarticError for a file whose values are separated by anything else than commas;
-    ``headings``: its first line, which the message then shows."""
+    """Raise CoarticError if ``separator`` is not a comma; the message names the file and shows
+    ``headings``, its first line, if given."""
     if separator != ",":
         raise CoarticError(
             f"{path}: the separator is {separator!r}; needed are values separated by commas, and "
@@ -238,14 +241,14 @@ def _refuse_separator(path: str | Path, separator: str, headings: str = "") -> N
 
 
 def also(names: Sequence[str]) -> str:
-    """Return the names after the first, up to the fifth, and the number of others, in brackets;
-    empty for a single name."""
+    """Return `` (also B, C, D, E, 2 more)`` for names A to G: the second to the fifth name and the
+    number of others; empty for a single name."""
     named = [*names[1:_NAMED], *[f"{len(names) - _NAMED} more"] * (len(names) > _NAMED)]
     return f" (also {', '.join(named)})" if named else ""
 
 
 def warn(text: str) -> None:
-    """Warn as from the caller of a public function."""
+    """Warn with this text; the warning names the line of the program that called this package."""
     warnings.warn(text, stacklevel=5)
 
 
@@ -501,9 +504,11 @@ def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
 ) -> NDArray[np.object_]:
     """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
-    hit. ``unit``: ticks in a unit of time; ``slowest``: longest subtask of the corrective process.
+    hit. ``source`` names the recording and the subject in messages; ``unit``: ticks in a unit of
+    time; ``slowest``: longest subtask of the corrective process, ticks.
 
-    Warns of an arm that is faster or slower than people's. Raises CoarticError if times are those
+    Warns of times that seem rounded, of other rows or with a reaction time in them, and of an arm
+    that is much faster or slower than the task's. Raises CoarticError if times are those
     of a clock that runs on, rounded or constant, or if the median hit takes a number of ticks that
     no arm of the task could take.
     """
@@ -611,8 +616,8 @@ def _refuse_clocks(
     """Raise CoarticError if the times of a subject are those of a clock that runs on from goal to
     goal, and warn if those of some trials are.
 
-    ``paces``: ticks for each of a straight path, (n,); ``first`` and ``later``: hits of goal 1, and
-    hits whose goal before was hit, too.
+    ``paces``: ticks of each hit over the ticks of a straight movement to it, shape ``(n,)``;
+    ``first`` and ``later``, masks ``(n,)``: hits of goal 1, and hits whose goal before was hit.
     """
     if later.sum() < _MANY:
         return
@@ -631,7 +636,8 @@ def _refuse_clocks(
 
 
 def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
-    """Return where the hands of hits are, ``(n, 2)``; ``q``: their postures, ``(n, dof)``."""
+    """Return the places of the hands of n hits, ``(n, 2)``, length unit, from their postures ``q``,
+    ``(n, dof)``, and ``hands``, left or right."""
     places = np.empty((len(q), 2))
     for hand in task.hands:
         rows = (hands == hand).to_numpy()
@@ -640,8 +646,9 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
-    """Return the change of a recording, in words, that puts most hits that are far from their goals
-    there; empty if none of those that are tried does so with four of five."""
+    """Return in words a change of a recording (degrees to rad, another sign, swapped columns, ...)
+    that puts over 80 % of the hits in mask ``far`` within two radii of their goals; empty if no
+    change does, or if there are fewer than three such hits."""
     joints, hands = [*task.robot.joint_names], frame.hand
     q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
     arms = [task.robot.joints(hand) for hand in task.hands]
@@ -690,8 +697,8 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
 
 
 def _warn_of_places(frame: pd.DataFrame, task: Task, source: str) -> None:
-    """Warn of hits that are nearly all close to the centres of goals, and of a goal outside of
-    which hits are much more often than at others."""
+    """Warn if three of four hits are close to the centres of their goals, and of a goal with a much
+    larger share of hits outside of it than other goals have."""
     q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
     places = _hand_places(q, frame.hand, task)
     ways = places - task.goal_array[goals - 1]
@@ -713,8 +720,9 @@ def _warn_of_places(frame: pd.DataFrame, task: Task, source: str) -> None:
 
 
 def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
-    """Warn if an angle of an arm is rounded, or if one value or posture is that of many hits of a
-    goal; ``hits``: those of a subject with this arm."""
+    """Warn if an angle of an arm is rounded, or if many hits of a goal have one posture or one
+    angle in common. ``hits`` are the hits of a subject with this arm, ``joints`` the columns of its
+    angles; ``source`` begins the warning."""
     if (postures := len(hits[joints].drop_duplicates())) < _MANY:
         return
     for name in joints:

@@ -175,8 +175,9 @@ def hits_from_markers(
         return pd.DataFrame(values).groupby(number).median().to_numpy()
 
     def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
-        """Refuse, or warn of, a quantity that changes between trials; ``each``: in a trial;
-        ``share``: of the trials at either end that are left out."""
+        """Raise CoarticError if quantity ``name``, ``each`` by trial, changes between trials by
+        more than ``most``; warn if by more than ``doubt``. Of the trials, a share ``share`` with
+        the smallest values, and one with the largest, do not count; ``words`` end the message."""
         long = np.flatnonzero(many & np.isfinite(each))
         ordered, out = np.sort(each[long]), int(share * len(long))
         if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):
@@ -410,12 +411,12 @@ def hits_from_markers(
 
 
 def _odd_steps(ways: Array, least: float) -> str:
-    """Return, in words, that most samples repeat the one before, or that in many markers go twice
-    as far as before and after; empty if neither is so.
+    """Return, in words, that most samples repeat the sample before, or that between many samples
+    markers go twice as far as before and after; empty if neither is so.
 
-    ``ways``: of coordinates of markers from sample to sample, ``(n, coordinates)``, NaN where a
-    trial begins and after gaps; ``least``: the shortest of them that are compared, as a rounded
-    place can double shorter ones.
+    ``ways``: changes of the coordinates of markers from sample to sample, ``(n, coordinates)``,
+    length unit, NaN where a trial begins and after gaps. Paths up to ``least``, which rounding can
+    double, are not compared.
     """
     moves = np.flatnonzero((ways != 0).any(axis=1) & np.isfinite(ways).all(axis=1))
     if len(moves) < _MANY:
@@ -434,8 +435,9 @@ def _odd_steps(ways: Array, least: float) -> str:
 
 
 def _stretches(lengths: Array, angles: Array) -> list[str]:
-    """Return, in words, which links, and how much, change in length with a joint at one of their
-    ends, other than the first of the arm; ``lengths`` and ``angles``: ``(n, links)``."""
+    """Return in words each link whose length follows the angle of a joint at one of its ends
+    (except the first joint of the arm), and by how much. ``lengths``, length unit, and ``angles``,
+    rad, have shape ``(n, links)``."""
     changes = []
     for link, length in enumerate(lengths.T):
         for joint in range(max(link, 1), min(link + 2, angles.shape[1])):
@@ -456,12 +458,13 @@ def _listed(lengths: Array) -> str:
 
 
 def _points(places: Iterable[Array]) -> str:
-    """Return places as text, such as ``(0.088, 0.486)``."""
+    """Return places as text, such as ``(0.088, 0.486) and (0.1, 0)``."""
     return " and ".join(f"({_listed(np.round(place, 6) + 0.0)})" for place in places)
 
 
 def _rests(places: Array, time: Array, radius: float) -> list[int]:
-    """Return samples at which rests on the way begin; ``places``: ``(n, markers, 2)``.
+    """Return the indices of samples at which rests of over 0.2 s on the way begin; ``places`` of
+    markers, ``(n, markers, 2)``, and ``radius`` in length unit, ``time`` of samples, ``(n,)``, s.
 
     A smooth movement that ends and another that begins are within a radius of the place between
     them for 1.26 (the cube root of 2) times as long as within half a radius, without the rest.
@@ -488,8 +491,9 @@ def _rests(places: Array, time: Array, radius: float) -> list[int]:
 
 
 def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
-    """Return which two markers of an arm may be swapped, in words; empty if no two of them, in
-    place of each other, give the lengths of links; ``places``: ``(n, markers, 2)``."""
+    """Return in words two markers of an arm whose exchange makes all median distances of markers
+    agree with the lengths of links within 10 %; empty if there are none. ``places``: ``(n, markers,
+    2)``, and ``links``, in length unit."""
     for one, other in combinations(range(len(markers)), 2):
         order = [*range(len(markers))]
         order[one], order[other] = other, one

@@ -109,7 +109,7 @@ def methods_of(
 
 def parameter_varied(runs: pd.DataFrame) -> tuple[str, dict[str, Any]]:
     """Return the name of a parameter and its values by label, numbers from low to high, if all runs
-    but searches for the optimum are of one method, on all tasks, with two or more values of this
+    except searches for the optimum are of one method, on all tasks, with two or more values of this
     parameter and equal others; or else an empty name and no value. ``runs`` are as in
     :func:`methods_of`."""
     runs = runs[~runs.method.isin(SEARCHES)]
@@ -173,9 +173,9 @@ def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.Dat
 
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the label of each row with the names of its colour and mark: those in its ``look``; or
-    for the first methods from files the colour of own methods and a mark; or the next pair that no
-    other method has, colours that no other method has first."""
+    """Yield the label of each row with its names of colour and mark: its ``look``, if it has one;
+    for the first methods from files :data:`OWN_COLOR` and a mark; for others the next pair that is
+    not in the ``look`` of a row, colours that are in no ``look`` first."""
     fixed = {row["look"] for row in rows.values()}
     taken = {look[0] for look in fixed if look}
     colors = [color for color in COLORS if color not in (OWN_COLOR, "ink")]
@@ -191,14 +191,14 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return ``rows``, some rows of :attr:`.Study.methods`, less settings and ablations whose own
-    method is in ``rows``, too."""
+    """Return ``rows``, some rows of :attr:`.Study.methods`, without settings and ablations of
+    methods that are in ``rows``, too."""
     return rows[~rows.under.isin(rows.index)]
 
 
 def headline_methods(rows: pd.DataFrame) -> list[str]:
-    """Return a list of the labels of the methods that represent their algorithms, of ``rows``, some
-    rows of :attr:`.Study.methods`; all labels if no method does.
+    """Return the labels of the rows that represent their algorithms (column ``headline``), among
+    ``rows``, some rows of :attr:`.Study.methods`; all labels if no row does.
 
     A setting counts where its method has no row. A row that joins conditions of the learner takes
     the place of the single conditions; of several such rows only the last counts, with the

@@ -25,9 +25,10 @@ _OF_RUN = [
 
 @checked_arguments
 def tabulate_runs(study: Study) -> pd.DataFrame:
-    """Return what the numbers of a study rest on: a row for each run, by ``run_id``, with its task,
-    method, seed, rewards (minus ticks), hands and signatures of coarticulation, which are those of
-    the solution and, ``replay_first`` and so on, of the noiseless trial after learning.
+    """Return a row for each run of a study, by ``run_id``, with its task, method, seed, rewards
+    (minus ticks), hands and signatures of coarticulation: of the solution (``first``, ``arm``, ...)
+    and, if runs have a replay, of the noiseless trial after learning (``replay_first``, ...).
+    Columns without a value are left out.
     """
     runs = study.runs[_OF_RUN].assign(
         **{name.replace(" ", "_"): study.signature(name) for name in SIGNATURES}

@@ -18,10 +18,10 @@ from coartic.runs.plan import trials_in
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return the name of the rewards to which gaps on these tasks are taken: ``optimum`` if all
-    best known rewards are proven, or without tasks; ``best known`` if some are not; with ``or best
-    of this folder`` where some, or this alone where all are known from methods of this folder
-    alone. Raises KeyError for a task without a best known reward."""
+    """Return a name for the best known rewards of these tasks: ``optimum`` if all are proven, or
+    without tasks, else ``best known``. Unproven rewards of methods of this folder alone do not
+    count there, and add ``or best of this folder``; if all are such, the name is ``best of this
+    folder``. Raises KeyError for a task without a best known reward."""
     best = [study.optima[task] for task in tasks]
     others = [each.proven for each in best if each.proven or not each.only_here]
     names = ["optimum" if all(others) else "best known"] if others or not best else []
@@ -64,7 +64,7 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the pair of task and label of each cell of some runs, in the order of the runs."""
+    """Return the different pairs of task and method (label) among some runs, in their order."""
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
@@ -80,8 +80,8 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 @cached
 def equal_trials(study: Study) -> int:
     """Return the number of trials of a run with which methods are ranked: the number in the suite's
-    file or, where no compared method has it, the number of most algorithms, the least of several;
-    the most that a run made, where no method has such a parameter."""
+    file or, if no compared method has it, the number that most algorithms have (of equals the
+    least); if no method has a parameter ``trials``, the most trials that a run made."""
     asked, algorithms = _trials_asked(study), dict[int, set[str]]()
     for method in compared(study):
         for part in study.methods.parts[method]:
@@ -98,9 +98,10 @@ def equal_trials(study: Study) -> int:
 
 @cached
 def trials_of(study: Study) -> dict[str, int]:
-    """Return the number of trials of a run of each row of :attr:`.Study.methods`, by label:
-    :func:`equal_trials` for a method that has no such parameter and made no more, and for a method
-    that does not use the reward of trials."""
+    """Return, by label, the number of trials of a run of each row of :attr:`.Study.methods`: its
+    parameter ``trials``; without this parameter the most trials made, at least
+    :func:`equal_trials`; for a method that does not use the reward of each trial always
+    :func:`equal_trials`."""
     asked, equal = _trials_asked(study), equal_trials(study)
     made = study.runs.fillna({"trials": 0}).groupby("label").trials.max()
     return {
@@ -113,13 +114,13 @@ def trials_of(study: Study) -> dict[str, int]:
 
 @cached
 def _trials_asked(study: Study) -> dict[str, int]:
-    """Return the number of trials that the parameters of each label name; 0 if they name none."""
+    """Return the parameter ``trials`` of each method with its setting, by label; 0 without it."""
     return {job.cell.label: trials_in(job.cell.parameters) for job in study.plan}
 
 
 def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Return runs of rows of :attr:`.Study.methods`, given by label, as one frame with a new index,
-    the label in column ``method`` and an empty ``setting``; without runs a frame without rows."""
+    """Join frames of runs, by label of a row of :attr:`.Study.methods`, into one frame with a new
+    index, the label in column ``method`` and an empty ``setting``; without runs it has no rows."""
     parts = [runs.assign(method=method) for method, runs in by_method.items()]
     return pd.concat([*parts, study.runs[:0]], ignore_index=True).assign(setting="")
 
@@ -137,9 +138,10 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
     :func:`.ranking` and of :attr:`.Study.methods`, and with ``ranked``.
 
     Ranked are methods that solved every run on :func:`common_tasks`, in at most
-    :func:`equal_trials`; the smallest gap is first. Below them, not ranked, are methods with more
-    trials, and methods from files or of the labels ``also`` that lack a run or a solution on one of
-    these tasks, over the tasks on which they solved every run. Other methods have no row.
+    :func:`equal_trials` unless trials are varied; the smallest gap is first. Below them, not
+    ranked, are methods with more trials, and methods from files or of the labels ``also`` that lack
+    a run or a solution on one of these tasks, over the tasks on which they solved every run. Other
+    methods have no row.
     """
     runs, methods = common_runs(study), study.methods
     parts = [ranking(runs)] if len(runs) else []
@@ -188,8 +190,8 @@ def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
 
 
 def own_methods(study: Study) -> list[str]:
-    """Return the labels of the methods from files that solved every run on a task or more, the
-    smallest gap first."""
+    """Return the labels of the methods from files that solved every run on a task or more, in the
+    order of :func:`board`."""
     rows = board(study)
     return [*rows.index[~rows.built_in.astype(bool)]]
 
@@ -202,8 +204,8 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
 
 
 def shown_name(study: Study, method: str) -> str:
-    """Return the title of a method and, for a method of :func:`compared`, what sets its numbers
-    apart from those of other methods:
+    """Return the title of a method and, for a method of :func:`compared`, why its numbers are not
+    comparable with the numbers of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
     :func:`common_tasks`; ``mine (at most 77 of 10,000 trials)`` for one whose runs all stopped
     before their trials were made; ``mine (400 trials)`` for another number of trials than
@@ -211,20 +213,14 @@ def shown_name(study: Study, method: str) -> str:
     row, trials = study.methods.loc[method], trials_of(study)[method]
     if method not in compared(study):
         return str(row.title)
-    apart = [] if row.built_in else [_on_tasks(study, method), _trials_made(study, method)]
+    apart = [] if row.built_in else [_on_tasks(study, method)]
+    made = int(compared(study)[method].trials.fillna(0).max())
+    if not row.built_in and row.information == BY_TRIAL and made < trials:
+        apart.append(f"at most {number(made)} of {number(trials)} trials")
     if trials != equal_trials(study) and "trials=" not in row.title:
         apart.append(f"{number(trials)} trials")
     words = "; ".join(filter(None, apart))
     return f"{row.title} ({words})" if words else str(row.title)
-
-
-def _trials_made(study: Study, method: str) -> str:
-    """Return how many of its trials a method made at most, ``at most 77 of 10,000 trials``; empty
-    if a run made all of them, and for a method that does not use the reward of trials."""
-    made = int(compared(study)[method].trials.fillna(0).max())
-    asked = trials_of(study)[method]
-    is_short = study.methods.information[method] == BY_TRIAL and made < asked
-    return f"at most {number(made)} of {number(asked)} trials" if is_short else ""
 
 
 def _on_tasks(study: Study, method: str) -> str:

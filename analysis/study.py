@@ -20,13 +20,8 @@ import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.method_frame import methods_of, parameter_varied
-from coartic.analysis.optima import (
-    BestKnown,
-    best_known,
-    gap_share,
-    restrictions,
-)
-from coartic.analysis.signatures.measures import signature_named
+from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
@@ -242,8 +237,8 @@ class Study:
 
     @cached_property
     def varied(self) -> tuple[str, dict[str, Any]]:
-        """Name of the only parameter in which the compared methods differ, and its values by label
-        (:func:`.parameter_varied`); empty if they differ in more."""
+        """Name of the only parameter in which all compared runs differ, settings of one method, and
+        its values by label (:func:`.parameter_varied`); otherwise empty."""
         return parameter_varied(self.runs)
 
     @cached_property
@@ -368,7 +363,8 @@ class Study:
         """Return the results of the corrective process alone on a task, by hand sequence.
 
         A row for each sequence, the best first: ``hands``, ``reward`` (ticks, missing for a
-        failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences.
+        failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences. Raises
+        CoarticError for a task that the study does not have.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
@@ -383,15 +379,15 @@ class Study:
     @cached_property
     def solutions(self) -> pd.DataFrame:
         """A row for each movement of the solutions: ``run_id``, ``order``, ``goal``, ``hand``,
-        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder, also in a study
-        by :meth:`only`."""
+        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder's plan, also in a
+        study by :meth:`only`."""
         with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run that made trials, with the rewards of its trials, negative
         ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept; of all
-        runs of the folder, also in a study by :meth:`only`."""
+        runs of the folder's plan, also in a study by :meth:`only`."""
         with open_results(self.folder) as store:
             yield from store.rewards()
 
@@ -487,9 +483,11 @@ class Study:
 
     @cached
     def _signature_of_each(self, name: str, task: str, method: str, *, replay: bool) -> Array:
-        """Return a signature of each run of :meth:`executed`, ``(n,)``; NaN for runs that lack
-        it."""
-        return signature_named(name).each(self.executed(task, method, replay=replay))
+        """Return signature ``name`` of each run of :meth:`executed`, ``(n,)``; NaN for runs without
+        this signature. Raises CoarticError for an unknown name."""
+        if name not in SIGNATURES:
+            raise CoarticError(unknown("signature", name, SIGNATURES))
+        return SIGNATURES[name].each(self.executed(task, method, replay=replay))
 
     @cached
     def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:

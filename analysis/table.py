@@ -92,8 +92,8 @@ class Table:
 def table(caption: str, columns: str) -> Callable[[Callable[[Study], Rows]], Table]:
     """Return a decorator that turns a function of a study that yields rows into a table.
 
-    The id of the table is the name of the function. ``columns`` has the texts of the columns
-    (:func:`_column_of`), separated by semicolons.
+    The id of the table is the name of the function without ``list_``, with dashes. ``columns`` has
+    the texts of the columns (:func:`_column_of`), separated by semicolons.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
@@ -143,7 +143,7 @@ def _rows_of(study: Study, table: Table) -> pd.DataFrame:
 
 
 def _shown_names(study: Study) -> dict[Hashable | None, Any]:
-    """Return names for showing a table.
+    """Return names for showing a table, by kind.
 
     ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
     and ablation, by label; ``own``: labels of methods from files; ``reference``: name of the
@@ -170,20 +170,19 @@ def caption_of(table: Table, frame: pd.DataFrame) -> str:
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:
-    """Return for each row of a :class:`Table`'s frame True if it is of a setting or ablation of a
-    method that has a row, too."""
+    """Return for each row of the frame of a :class:`Table` True if the row is of a setting or an
+    ablation of a method that has a row, too."""
     named = next((name for name in ("against", "method") if name in frame), "")
     label = frame[named] if named else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
 
 
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
-    """Return the common entries of a row for a cell with these runs: task, method, numbers of runs
-    and of solved runs, mean, SD and median of the reward, gap, and the ids of the runs.
+    """Return entries of a row on the runs of one method on one task: title of the ``task``, label
+    of the ``method``, numbers of ``runs`` and ``solved`` runs, mean ``reward`` (ticks) with
+    ``reward_sd`` and ``reward_median``, mean ``gap`` and ``run_ids``.
 
-    Entries are ``task``, ``method``, ``runs``, ``solved``, ``reward``, ``reward_sd``,
-    ``reward_median``, ``gap`` and ``run_ids``; a table leaves out entries for which it has no
-    column. Without a solved run reward and gap are NaN.
+    Without a solved run reward and gap are NaN. A table leaves out entries without a column.
     """
     rewards = solved(runs).reward.to_numpy(np.float64)
     return {
@@ -200,5 +199,6 @@ def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
 
 
 def run_ids(*parts: pd.DataFrame) -> Row:
-    """Return the entry ``run_ids`` of a row: the ids of all runs in the parts, as one line."""
+    """Return a row with one entry, ``run_ids``: the ids of all runs in ``parts``, frames of runs,
+    separated by spaces."""
     return {"run_ids": " ".join(run_id for runs in parts for run_id in runs.run_id)}

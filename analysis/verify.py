@@ -44,9 +44,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
-SCHEMA = (
-    "4be4698e3d72c02c"  # of format 6: hash of all statements that make OURS, and of all triggers
-)
+SCHEMA = "4be4698e3d72c02c"  # of format 6: hash of the statements that make OURS, and of triggers
 OURS = (  # of tables, then of views
     *("suite", "plan", "cells", "environments", "results", "movements", "learning"),
     *("asked", "runs", "solutions"),
@@ -71,7 +69,7 @@ UNCHECKED = (
 
 
 def need(holds: Any, words: str) -> None:
-    """Raise ValueError with these words unless something holds."""
+    """Raise ValueError with the message ``words`` if ``holds`` is false."""
     if not holds:
         raise ValueError(words)
 
@@ -85,7 +83,7 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in ran
 
 def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     """Return cosine and sine of angles, rad, by the Taylor series of what is left after k quarters
-    of a turn (π/2)."""
+    of a turn (π/2); from 1e5 rad on by the C library."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
     z, k = x * x, quarters.astype(np.int64)
@@ -169,7 +167,7 @@ def path(q: Floats, waypoints: Floats, model: Any, most: int = MOST_TICKS) -> Fl
 
 
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
-    """Return the configuration where a movement from ``q`` stops, its ticks, and whether the hand
+    """Return the configuration where a movement from ``q`` stops, its ticks, and True if the hand
     hits its goal there. A movement that takes more ticks than are stored is cut one tick later."""
     _, goal, hand, kind, most, corners = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
@@ -187,8 +185,8 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 
 
 def _recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
-    """Return reward, hands, corrections made, and joint travel of the arms not chosen, from hit to
-    hit, rad. Raises ValueError if a movement breaks a rule or takes other ticks than are stored."""
+    """Return reward, hands, number of corrections made, and joint travel of idle arms from hit to
+    hit, rad. Raises ValueError if a movement breaks a rule or takes other ticks than stored."""
     _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
@@ -252,7 +250,8 @@ def check_runs(folder: Path) -> _Report:
 
 
 def _check_all(db: sqlite3.Connection) -> _Report:
-    """Return the report on plan, cells and runs; none is checked if a table or view is foreign."""
+    """Return the report of :func:`check_runs` on an open database; nothing is checked if a table or
+    view is not as coartic makes it. Raises ValueError for another format."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
     db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
@@ -349,7 +348,7 @@ def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]
 
 
 def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence if the plan is not as it was written, by its stored hash."""
+    """Yield a sentence if the hash of the plan is not the hash that was stored with it."""
     hashes = [row[0] for row in db.execute("SELECT plan_hash FROM suite")]
     rows = [[*row] for query in PLANNED for row in db.execute(query)]
     if hashes != [hash_of(rows)] and (hashes or rows):
@@ -358,7 +357,7 @@ def _check_plan(db: sqlite3.Connection) -> Iterator[str]:
 
 
 def _missing(db: sqlite3.Connection) -> Iterator[str]:
-    """Yield a sentence if the plan, or a part of its runs, is not there."""
+    """Yield a sentence if no plan is stored, or if runs of the plan are not stored."""
     if not db.execute("SELECT count(*) FROM suite").fetchone()[0]:
         yield NO_PLAN
     query = """SELECT runs, count(run), min(run) FROM plan LEFT JOIN asked USING (position)
@@ -379,9 +378,9 @@ def hash_of(content: Any) -> str:
 
 
 def _check_rewards(row: Any) -> bytes:
-    """Return the rewards of a run as bytes: the best reward, then by how much each trial is worse,
-    plus 1, or 0 without a reward; all lowest bytes come first, then the next. Raises ValueError for
-    damage, and if the stored best trial is not the first with the reward of the run."""
+    """Return a run's rewards, unpacked: integers of four bytes, the best reward, then of each trial
+    1 plus the ticks by which it is worse (0 without a reward), the lowest bytes of all first.
+    Raises ValueError for damage, and if the best trial is not the first with the run's reward."""
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
         content = (packed := zlib.decompressobj()).decompress(row["rewards"] or EMPTY, size + 1)

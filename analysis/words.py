@@ -86,7 +86,7 @@ def p_value(p: float) -> str:
 
 
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
-    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals, by default three figures.
+    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals, by default as :func:`number`.
 
     Empty for NaN, and for an interval of no length, which would look like certainty.
     """
@@ -165,7 +165,7 @@ def tally(counts: Mapping[Any, int]) -> str:
 
 
 def commonest(reasons: Iterable[str]) -> list[str]:
-    """Return texts of the (at most) three commonest reasons with numbers, ``12 × no hit``."""
+    """Return the three commonest reasons at most, each with its number, ``12 × no hit``."""
     return [f"{count} × {reason}" for reason, count in Counter(reasons).most_common(3)]
 
 

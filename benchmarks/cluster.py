@@ -47,8 +47,9 @@ class Dask:
         self.workers = 1  # their number can change: jobs are as large as methods allow
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish. If a worker dies,
-        another worker performs its jobs; a job on which worker after worker dies has crashed.
+        """Yield each job with the outcomes of its runs, in the order in which jobs finish. If a
+        worker dies, another worker performs its jobs; the outcomes of a job on which worker after
+        worker dies are ``crashed``.
 
         When iterated, raises CoarticError if the scheduler is missing or lost or has no worker for
         10 minutes, if a worker has another version or code of a method or cannot perform jobs, and
@@ -116,8 +117,9 @@ _kept = threading.local()
 
 
 def _remote(job: Job) -> list[Outcome]:
-    """Perform a job on the machine of a Dask worker, in a process that ends at its time limit.
-    Raises CoarticError if the method has another version or code on this machine."""
+    """Perform a job on the machine of a Dask worker, in a process that ends at its time limit, and
+    return the outcomes of its runs with the environment of this machine. Raises CoarticError if the
+    method has another version or code on this machine."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.cell.method
     here = current_code(method)

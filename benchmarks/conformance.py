@@ -211,7 +211,8 @@ def _laws_of_declaration(info: MethodInfo) -> list[Law]:
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a task out of reach, which validation would refuse, for the hands of another task."""
+    """Return a copy of a task with a locked base and one goal out of reach of its hands, which
+    validation would refuse."""
     return like.model_copy(
         update={
             "name": "hopeless",

@@ -88,8 +88,9 @@ def include_folders(
 def _join(
     plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
 ) -> list[Job]:
-    """Return the plan with the cells of the sources, its own cells first. A cell has the runs that
-    the plan asks for, and the runs that follow in the sources without a gap.
+    """Return the plan with the cells of the sources (stores by name), its own cells first; of the
+    sources only cells on ``tasks``, unless None. A cell has the runs that the plan asks for, and
+    the runs that follow in the sources without a gap.
 
     Raises CoarticError if sources contradict each other, or contradict the plan on a cell with runs
     that no source has.
@@ -131,9 +132,10 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of a source whose plan has runs that the joined plan ``jobs`` lacks, and of a source
-    that has fewer runs of a stochastic method's cell, not ``asked`` for, than are asked for of some
-    cell. ``asked`` (numbers of runs) and ``jobs`` are by digest, ``plans`` by name of source."""
+    """Warn of a source whose plan has runs that the joined plan lacks, and of a source with a cell
+    of a stochastic method that this command does not ask for, and of which it has fewer runs than
+    the command asks for of some cell. ``asked``: numbers of runs that the command asks for, by
+    digest of the cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
@@ -158,7 +160,8 @@ def _warn_of_gaps(
 
 
 def _named(jobs: Sequence[Job]) -> str:
-    """Return words that name the cell of the first job, and count the other cells."""
+    """Return words that name the cell of the first job, and count the other jobs, such as
+    ``cma-es/bandit on ascending and of 2 others``."""
     others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 

@@ -44,10 +44,10 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
     """Start a process that imports a method file, and return a function that asks the process about
     a method. ``shown`` is the name of the file in messages. The function takes the id of a method,
     a question of :class:`MethodInfo` and its arguments; the question ``methods``, with an empty id,
-    is the first: it imports the file, and gives the infos of all methods. The function raises
-    CoarticError for an error, for an answer of another kind, and for no answer in 5 minutes. The
-    process, with all processes that it starts, ends with this process. Raises CoarticError if no
-    process begins."""
+    is the first: it imports the file, and gives the declarations of all methods. The function
+    raises CoarticError for an error, for an answer of another kind, and for no answer in 5 minutes.
+    The process, with all processes that it starts, ends with this process. Raises CoarticError if
+    no process begins."""
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, path, shown
@@ -96,9 +96,9 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
 
 
 def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
-    """Answer questions (:func:`begin_reader`) that come through a pipe as JSON, by the number of
-    the question, ``"answer"`` and the answer, or the number, ``"error"`` and a sentence, until the
-    pipe is closed. A child that the file has forked ends instead of answering."""
+    """Answer questions (:func:`begin_reader`) that come through a pipe as JSON, ``[NUMBER, METHOD,
+    QUESTION, ARGUMENTS...]``, by ``[NUMBER, "answer", ANSWER]`` or ``[NUMBER, "error", SENTENCE]``,
+    until the pipe is closed. A child that the file has forked ends instead of answering."""
     begin_worker()
     reader = os.getpid()
     methods: dict[str, type[Method]] = {}
@@ -140,7 +140,7 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
 def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
-    """Yield the infos of ``methods``, the classes that ``module`` defines, with their code;
+    """Yield the declarations of ``methods``, the classes that ``module`` defines, with their code;
     ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
     declaration of name, title, citation or information, and a file that cannot be read."""
     for method in methods:

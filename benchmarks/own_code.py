@@ -60,7 +60,8 @@ def imported_packages(file: str) -> list[str]:
 
 @cache
 def _imported_by(files: Collection[str]) -> set[str]:
-    """Return the names of all that these files import (:func:`_imports`)."""
+    """Return the names of the modules and attributes that the Python files among these paths import
+    (:func:`_imports`)."""
     return {name for path in files if path.endswith(".py") for name in _imports(path)}
 
 
@@ -133,7 +134,8 @@ def _ours() -> tuple[str, ...]:
 
 @cache
 def _is_installed(path: str) -> bool:
-    """Return whether a file belongs to Python or to an installed package: editable ones do not."""
+    """Return True for the path of a file of the standard library or of an installed package, False
+    for any other file, also of a package installed in editable mode."""
     if {"site-packages", "dist-packages"} & {*Path(path).parts}:
         return True
     standard = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]

@@ -71,7 +71,7 @@ def _runs_asked(value: Any) -> int | range | None:
 
 
 def _file(value: object) -> object:
-    """Return what names a file, or refuse a method itself."""
+    """Return a text or a path as it is. Raises an error for any other value, such as a method."""
     if isinstance(value, str | Path):
         return value
     raise sentence_error(
@@ -213,7 +213,8 @@ def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> li
 
 
 def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
-    """Raise CoarticError for an option of a request that has no effect on its jobs."""
+    """Raise CoarticError if ``trials``, ``runs`` or a family file of a request has no effect on its
+    jobs."""
     methods = {job.cell.method.name: job.cell.method for job in jobs}
     if request.trials and not any("trials" in each.defaults for each in methods.values()):
         raise CoarticError(f"trials has no effect: no parameter of {', '.join(methods)} is trials")

@@ -93,11 +93,12 @@ class Local:
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with its outcomes, in the order in which jobs finish; the outcomes of a
-        job whose process ends are ``timeout`` or ``crashed``. A process performs jobs of one method
-        in order, with ``in_order`` all of them.
+        """Yield each job with the outcomes of its runs, in the order in which jobs finish. The jobs
+        of a method are divided among processes; with ``in_order`` one process performs them all in
+        their order. A job whose process ends is repeated once if its method may not be the cause,
+        or else has outcomes ``timeout`` or ``crashed`` (:meth:`Workers.perform`).
 
-        Raises CoarticError if process after process ends before its first job, and if answers
+        Raises CoarticError if five processes in a row end before their first job, and if answers
         cannot be written.
         """
         with closing(Workers(self)) as workers:
@@ -114,7 +115,7 @@ class Workers:
         self._idle: Worker | None = None
 
     def close(self) -> None:
-        """End the waiting worker, and remove the folder."""
+        """End the worker that waits for jobs, if there is one, and remove the folder of answers."""
         if self._idle is not None:
             self._idle.end()
         self.folder.cleanup()
@@ -122,8 +123,8 @@ class Workers:
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield each job with its outcomes, in the order in which jobs finish. The jobs of a method
-        are divided among all workers; with ``in_order`` one worker has them all, and performs them
+        """Yield each job with the outcomes of its runs, in the order in which jobs finish. The jobs
+        of a method are divided among all workers; with ``in_order`` one worker performs them all,
         in their order while none has to be repeated.
 
         A job whose process ends is repeated once if the process was late, was killed, or could not
@@ -194,8 +195,8 @@ class Workers:
                 worker.end()
 
     def worker_for(self, jobs: Sequence[Job]) -> Worker:
-        """Return the waiting worker if it has performed the method of these jobs; otherwise end it,
-        and return a new worker, which is not started."""
+        """Return a worker for jobs of one method: the worker that waits for jobs if its method is
+        the same; otherwise that worker is ended, and a new worker, not yet started, is returned."""
         method, waits = jobs[0].cell.method.key, self._idle
         self._idle = None
         if waits is not None and waits.method == method:
@@ -205,8 +206,8 @@ class Workers:
         return Worker(self.folder.name, method, self.local)
 
     def check_room(self) -> None:
-        """Raise OSError unless the folder of answers is there and has room: its loss can be the
-        reason why a process ended."""
+        """Raise OSError if a file of 1 MiB cannot be written into the folder of answers, whose loss
+        can be the reason why a process ended."""
         place = Path(self.folder.name, "room")
         place.write_bytes(bytes(_ROOM))
         place.unlink()
@@ -233,8 +234,9 @@ class Worker:
         self._reader = threading.Thread(target=_read, args=(output, self._printed), daemon=True)
 
     def give(self, jobs: Sequence[Job]) -> None:
-        """Send jobs to the process, and start it if it is new; if it cannot start, nothing is
-        raised and :attr:`exit_code` is 1."""
+        """Send jobs to the process, start it if it is new, and compile the kernels of the first
+        job's task in this process, too. If the process cannot start, nothing is raised and
+        :attr:`exit_code` is 1."""
         self.jobs.extend(jobs)
         self.since_s = self._since_cpu_s = math.inf
         (self._folder / _BEGUN).unlink(missing_ok=True)
@@ -265,14 +267,14 @@ class Worker:
 
     @property
     def spins(self) -> bool:
-        """True if the current job has used up its CPU time, and goes on: its method ignores the
-        signals."""
+        """True if the current job has used 2 s of CPU time more than its limit: its method ignores
+        the signals that end the process."""
         limit_s = (self.jobs and self.jobs[0].time_limit_s) or _LONGEST_S
         return self.cpu_s > self._since_cpu_s + limit_s + _SPINS_S
 
     @property
     def cpu_s(self) -> float:
-        """CPU time of the process so far, s; 0 where the system does not say it (Linux does)."""
+        """CPU time of the process so far, s; 0 where the system does not report it (Linux does)."""
         with contextlib.suppress(AttributeError, OSError, OverflowError):
             return time.clock_gettime((~(self.process.pid or 0) << 3) | 2)
         return 0.0
@@ -284,9 +286,9 @@ class Worker:
         return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._timeout_s
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield the jobs that have been answered since the last call, in order, with their
-        outcomes. Each leaves :attr:`jobs`, and the clock of the next job (:attr:`since_s`) starts;
-        the clock of the first starts in the first call after the process has begun."""
+        """Yield each job that has been answered since the last call, in order, with the outcomes of
+        its runs. The job leaves :attr:`jobs`, and the clock of the next job (:attr:`since_s`)
+        starts; the clock of the first job starts in the first call after the process has begun."""
         if self.since_s == math.inf and (self._folder / _BEGUN).exists():
             self.since_s, self._since_cpu_s = time.monotonic(), self.cpu_s
         while self.jobs and (answer := self._folder / str(self._answered)).is_file():
@@ -298,7 +300,8 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """Words on how the process ended, and the last three lines that it wrote."""
+        """How the process ended, and the last three lines that it wrote in the current job, as in
+        ``(exit code 1): LINES``."""
         code = self.exit_code or 0
         if self._reader.is_alive():
             self._reader.join(_END_S)
@@ -309,8 +312,8 @@ class Worker:
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None, *, spins: bool) -> list[Outcome]:
-        """Return the outcomes of the current job of a process that has ended, or (``exit_code``
-        None) that :attr:`spins` or is late."""
+        """Return the outcomes, ``timeout`` or ``crashed`` with a reason, of the current job of a
+        process that has ended with ``exit_code``, or (None) that :attr:`spins` or is late."""
         job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
         if exit_code is None and not spins:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
@@ -329,19 +332,19 @@ class Worker:
 
 
 def _read(output: connection.Connection, kept: bytearray) -> None:
-    """Read what a process prints, so that it never waits, until nobody can print there any more;
-    ``kept`` has the last bytes of it."""
+    """Read what a process prints into pipe ``output``, so that it never waits, until no process can
+    write there any more; ``kept`` always holds the last 4000 bytes."""
     with output:
         while text := os.read(output.fileno(), 2**16):
             kept[:] = (kept + text)[-_PRINTED:]
 
 
 def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: bool) -> None:
-    """Perform the jobs that come through a pipe, lists of jobs, in this worker process, and write
-    an answer to each into ``folder``, files ``0``, ``1`` and so on; what the process prints goes
-    into pipe ``prints``. File ``begun`` appears when the kernels of a list are loaded: then the
-    clock of its first job starts. End when the pipe is closed, or when no job has come for a
-    minute."""
+    """Perform the jobs that come through a pipe, lists of jobs, in this process, one of ``workers``
+    that share the machine, and write an answer to each job into ``folder``, files ``0``, ``1`` and
+    so on. What the process prints goes into pipe ``prints``, if ``verbose`` to the terminal. File
+    ``begun`` appears when the kernels of a list are loaded: then the clock of its first job starts.
+    End when the pipe is closed, or when no job has come for a minute."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:
@@ -398,7 +401,7 @@ def _answer_to(job: Job) -> bytes:
 
 def _limit_cpu_time(limit_s: float) -> None:
     """Let the system end this process after ``limit_s`` more seconds of CPU time (not on Windows),
-    by SIGPROF, or by SIGXCPU if a method has turned SIGPROF off. A limit of 0 lifts the limit."""
+    by SIGPROF, or by SIGXCPU if a method has turned SIGPROF off; 0: after a day."""
     if not hasattr(signal, "setitimer"):
         return
     import resource
@@ -413,9 +416,9 @@ def _limit_cpu_time(limit_s: float) -> None:
 
 
 def _bound_resources(workers: int) -> None:
-    """Limit the memory of this process, one of ``workers`` that share the machine, and the size of
-    its files, so that a method gets an error before the machine swaps or the disk is full; nothing
-    where the system has no such limits."""
+    """Limit the memory of this process, one of ``workers`` that share 80 % of the machine's memory
+    (at least 1 GiB each), and the size of its files to 256 MiB, so that a method gets an error
+    before the machine swaps or the disk is full; do nothing where the system has no such limits."""
     try:
         import resource
 
@@ -470,8 +473,8 @@ def start_process(process: Any) -> None:
 
 @contextlib.contextmanager
 def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes that compute as the workers of a suite do, for programs that run
-    methods or proofs themselves: the same bits on every x86-64 processor.
+    """Open a pool of processes with the environment variables of workers, for programs that run
+    methods or proofs themselves: results have the same bits on every x86-64 processor.
 
     Examples
     --------

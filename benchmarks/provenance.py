@@ -25,23 +25,16 @@ from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import threads_for, worker_variables
 from coartic.motion.compile import FINGERPRINT, PACKAGE
 
-_LIBRARIES = (
-    "casadi",
-    "daqp",
-    "llvmlite",
-    "numba",
-    "numpy",
-    "pandas",
-    "pydantic",
-    "scipy",
-)
+_LIBRARIES = ("casadi", "daqp", "llvmlite", "numba", "numpy", "pandas", "pydantic", "scipy")
 """Libraries that results may depend on."""
 
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Return, by name, versions, platform, processor, arithmetic and commit of this process, and
-    the environment variables of its workers: always the same dictionary, not to be changed."""
+    """Return what results of this process can depend on, by name: versions (``coartic``,
+    ``python``, ``packages``, ``model_code``, ``commit``), ``platform``, ``processor``,
+    ``arithmetic``, ``cores`` and ``threads``, the environment variables of workers. It is always
+    the same dictionary, not to be changed."""
     processor = platform.processor()
     with contextlib.suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
@@ -67,8 +60,8 @@ def now() -> str:
 
 
 def made_with() -> dict[str, Any]:
-    """Return the environment of this process with its ``command``, a list of words (``a notebook``
-    in a notebook), and the ``date``."""
+    """Return :func:`current_environment` with the ``command`` that started this process, a list of
+    words (``a notebook`` in a notebook), and the ``date``, UTC."""
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}
@@ -96,9 +89,9 @@ def _commit_of_checkout() -> dict[str, Any] | None:
 
 
 def arithmetic() -> str:
-    """Return how workers round, as ``NumPy HASH, libm HASH``: hashes of the bits of some results,
-    computed in a process that is started like a worker; empty if no process starts. Where a hash is
-    the same, that library rounds alike; a processor's name says little on virtual machines."""
+    """Return a fingerprint of how workers round, ``NumPy HASH, libm HASH``: hashes of the bits of
+    some results, computed in a process that is started like a worker; empty if no process starts.
+    Where a hash is the same, that library rounds alike."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
     process = CONTEXT.Process(target=_say_arithmetic, args=(theirs,), daemon=True)
     try:
@@ -110,8 +103,8 @@ def arithmetic() -> str:
 
 
 def _say_arithmetic(pipe: Any) -> None:
-    """Send hashes of bits through a pipe: of eigenvectors, logarithms and powers by NumPy and its
-    linear algebra, and of functions by the C library."""
+    """Send the text of :func:`arithmetic` through a pipe: a hash of eigenvectors, logarithms and
+    powers by NumPy, and a hash of functions by the C library."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
     numbers = np.abs(matrix).ravel().tolist()

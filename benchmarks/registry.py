@@ -34,7 +34,8 @@ Registry = Mapping[str, MethodInfo]
 
 
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
-    """Return every known method by id, built-in ones first.
+    """Return the declaration of every known method by id: of the built-in methods, then of the
+    methods in ``method_files``.
 
     Raises CoarticError for a file that cannot be loaded or holds no method, and for an id that is
     malformed, reserved or taken (:func:`check_id`).
@@ -49,7 +50,8 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
 
 @cache
 def built_in() -> Mapping[str, MethodInfo]:
-    """Return the built-in methods by id: always the same mapping, not to be changed."""
+    """Return the declarations of the built-in methods by id: always the same mapping, not to be
+    changed."""
     return {
         method.name: method_info(method, BUILT_IN, name, f"{MODEL_VERSION}.{method.version}")
         for name in MODULES
@@ -76,7 +78,8 @@ def current_code(method: MethodInfo) -> str:
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
     """Raise CoarticError for the id of a method from ``origin`` that has other characters than ids
-    have, is reserved or taken, or differs from another name in case alone."""
+    have, is reserved, or is an id in ``registered``, a condition of the learner or one of
+    :data:`NAMES`, whatever the case of its letters."""
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
             f"{origin}: the name {name!r} must begin with a letter or digit and have only letters, "
@@ -109,8 +112,9 @@ def methods_named(name: str, registered: Registry) -> list[str]:
 
 
 def _methods_of_file(path: Path) -> Iterator[MethodInfo]:
-    """Yield a MethodInfo for each method of a file, which a separate process imports; ``READERS``
-    keeps the function that asks this process. Raises CoarticError for an unusable file."""
+    """Yield the declaration of each method of a file, which a separate process imports; the
+    function that asks this process is added to ``READERS``, by path. Raises CoarticError for an
+    unusable file."""
     shown = plain(str(path), LONGEST_LINE)
     check_file(path)
     if path.suffix != ".py":

@@ -49,8 +49,8 @@ def find_run(prefix: str, folder: Path) -> Run:
 
 
 def trajectory_of(run: Run) -> Trajectory:
-    """Return the solution of a run tick by tick. Raises CoarticError if the run has no solution, or
-    if its solution cannot be executed or is too long."""
+    """Return the movements of a run's solution, executed and sampled at each tick. Raises
+    CoarticError if the run has no solution, or one that cannot be executed or is too long."""
     if "solution" not in run.scores:
         why = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
@@ -66,8 +66,9 @@ def trajectory_of(run: Run) -> Trajectory:
 def perform_in_order(
     jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
 ) -> Iterator[Run]:
-    """Perform jobs, those of a method in order in one new process, ``workers`` processes at once;
-    yield the scored runs, which are not stored, as they finish."""
+    """Perform jobs: one new process performs all jobs of a method in order, and ``workers``
+    processes run at once. Yield the scored runs, which are not stored, as they finish. ``verbose``
+    shows what methods print and log."""
     with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
         for job, outcomes in answers:
             yield from score(job, outcomes)

@@ -85,12 +85,13 @@ class Progress:
     """Runs still to perform that only show whether results of own methods repeat."""
 
     def count(self, status: str) -> None:
-        """Count a run of the folder by its status."""
+        """Count a run of the plan in :attr:`failed` unless its status is ``ok``, and in
+        :attr:`crashed` if it crashed."""
         self.failed += status != "ok"
         self.crashed += status == "crashed"
 
     def finish(self, run: Run) -> None:
-        """Count a run that has just been performed."""
+        """Count a run that has just been performed, by its status and method, with its time."""
         method, seconds = run.cell.method.name, run.outcome.times.wall_s
         self.done += 1
         self.count(run.outcome.status)
@@ -101,7 +102,8 @@ class Progress:
 
     @property
     def unused(self) -> Iterator[str]:
-        """Sentences on the runs of other versions of their methods, a sentence for each method."""
+        """Sentences on stored runs that are not used, as another version of their method made them:
+        a sentence for each method and version."""
         for (method, old, now), count in self.stale.items():
             changed = f"by version {old}, and here it is {now}"
             if not (VERSION.fullmatch(old) and VERSION.fullmatch(now)):
@@ -120,7 +122,7 @@ class Progress:
         return sum(each.get(m, mean) * count for m, count in coming.items()) / self.workers
 
     def __repr__(self) -> str:
-        """Say how many runs were made in which time, how many failed, and where the runs are."""
+        """Return a sentence: how many runs were made in which time, how many failed, the folder."""
         minutes, seconds = divmod(self.wall_s, 60)
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
@@ -299,7 +301,7 @@ def perform(
 
 
 def _seconds(run: Run) -> float:
-    """Wall time of a run, s, at least a minute: runs that take no longer are alike."""
+    """Return the wall time of a run, s, at least 60; infinite if it is not known."""
     return max(run.outcome.times.wall_s or math.inf, LONG_S)
 
 

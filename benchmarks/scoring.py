@@ -14,8 +14,8 @@ from coartic.tasks.task import Task, hands_of
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
-    """Return the runs of a job from its outcomes, in their order, executing all parts side by side.
-    A run that is ok has a score for each of its parts, other runs have no scores."""
+    """Return the scored runs of a job from their outcomes, in order. All ``parts`` (the solution,
+    and initial and replay if present) are executed; only runs that are ok have scores."""
     task = job.cell.task
     executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
     runs = []

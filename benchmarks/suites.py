@@ -32,7 +32,8 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter, a list as a tuple. Raises an error for any other value."""
+    """Return the value of a parameter: a bool, finite number or text as it is, a list of numbers as
+    a tuple of floats. Raises PydanticCustomError for any other value."""
     numbers = value if isinstance(value, list | tuple) else [value]
     if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
         return value if value is numbers[0] else tuple(map(float, numbers))
@@ -85,7 +86,8 @@ class _Block(FileData):
 
     @model_validator(mode="after")
     def says_everything_once(self) -> _Block:
-        """Refuse a parameter in both tables, and a value that stands twice in the grid."""
+        """Return this block. Raises ValueError for a parameter that is in ``parameters`` and in
+        ``grid``, and for a value that is in the grid twice."""
         for name, values in self.grid.items():
             if name in self.parameters:
                 raise sentence_error(
@@ -173,7 +175,7 @@ def load_suite(name: str) -> Suite:
 
 
 def _read_suite(path: Path) -> Suite:
-    """Read a suite file. Raises CoarticError with a line for each problem."""
+    """Return the suite of a file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
     if "cells" in content:
         raise CoarticError(f"{path}: tables [[cells]] are called [[blocks]]")

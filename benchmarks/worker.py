@@ -63,15 +63,15 @@ def fail(
     cpu_s: float | None = None,
 ) -> list[Outcome]:
     """Return an outcome for each run of a job whose worker gave no answer. ``wall_s`` and ``cpu_s``
-    are the times of the job, which its runs share."""
+    are the times of the job, s, of which each run has an equal share."""
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.numbers]
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
-    """Return outcomes as JSON, a list with a table of fields for each. Raises TypeError or
-    ValueError for data that JSON cannot hold."""
+    """Return outcomes as JSON, a list of objects with the fields of :class:`Outcome`. Raises
+    TypeError or ValueError for data that JSON cannot hold."""
 
     def plain(outcome: Outcome) -> dict[str, Any]:
         parts = {part: [*map(movement_data, made)] for part, made in outcome.parts.items()}
@@ -101,7 +101,9 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
 
 
 def _check_stated(job: Job, outcome: Outcome) -> None:
-    """Raise ValueError for an outcome that states what no run can have, and no folder can keep."""
+    """Raise ValueError for an outcome with a time or count that is negative or too large, more
+    rewards than trials, information that its method does not declare, or a malformed
+    environment."""
     meter = outcome.meter or Meter()
     for name, number in {**vars(outcome.times), **vars(meter)}.items():
         if number is not None and not 0 <= number <= MOST_COUNT:
@@ -170,8 +172,8 @@ _seen: set[str] = set()
 
 
 def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
-    """Return the outcome of a run from the result of its method, or from the error that the method
-    raised."""
+    """Return the outcome of a run from what its method returned, or the error that the method
+    raised; ``session`` has counted its trials and rewards."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
         "meter": session.meter,
@@ -207,9 +209,10 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
-    """Check a method's result, and return its movements, ``parts``, and ``details`` as keywords of
-    :class:`Outcome`. Raises SolutionError for a result that is no Result or cannot be stored, and
-    UndeclaredError for movements without a target if the corrective process is not declared."""
+    """Check a method's result, and return two fields of :class:`Outcome` by name: ``parts``, lists
+    of movements, and ``details``. Raises SolutionError for a result that is no Result or cannot be
+    stored, and UndeclaredError for movements without a target if the corrective process is not
+    declared."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     try:

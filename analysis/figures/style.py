@@ -24,7 +24,7 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
-from coartic.analysis.methods import COLORS, MARKS
+from coartic.analysis.methods import COLORS
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -59,16 +59,6 @@ Look = dict[str, Any]
 """Look of a method's lines and marks: arguments of Matplotlib's ``plot``."""
 
 
-def look_of(names: tuple[str, str], bold: bool) -> Look:
-    """Return the look of lines and marks by ``names``, of :data:`.COLORS` and of
-    :data:`.MARKS`; ``bold``: with a wider line and larger marks."""
-    marker, dash = MARKS[names[1]]
-    look: Look = {"color": COLORS[names[0]], "marker": marker, "linestyle": dash}
-    look |= {"markevery": 0.2, "markeredgewidth": 0}  # a mark at every fifth of the diagonal
-    sizes = {"linewidth": 2.4, "markersize": 7.0} if bold else {"linewidth": 1.2, "markersize": 4.2}
-    return look | sizes
-
-
 def grid(panels: int) -> tuple[int, int]:
     """Return the numbers of rows and columns for a number of panels: two columns for up to six
     panels, three for more; one for a single panel."""
@@ -78,8 +68,8 @@ def grid(panels: int) -> tuple[int, int]:
 
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
-    """Let :func:`panels` make figures of a width, inches, in the block of this context; with None,
-    figures have the width that is asked of :func:`panels`."""
+    """Let :func:`panels` make figures of a width, inches, within a ``with`` block; None: of the
+    width in its argument ``size``."""
     before = _width.set(width)
     try:
         yield
@@ -88,7 +78,7 @@ def drawn_at(width: float | None) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Return whether the width chosen by :func:`drawn_at` is below five inches; False without a
+    """Return True if the width chosen by :func:`drawn_at` is below five inches; False without a
     chosen width."""
     return (_width.get() or TWO) < 5
 

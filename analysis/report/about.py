@@ -53,7 +53,8 @@ def shown(text: str) -> str:
 
 
 def visible_sections(study: Study) -> list[Section]:
-    """Return the sections, without sections about single tasks if :func:`.one_by_one` is empty."""
+    """Return the sections of the page, without sections about single tasks if the tasks are many
+    random ones (:func:`.one_by_one` is empty)."""
     return [section for section in SECTIONS if one_by_one(study) or not section.single]
 
 
@@ -77,8 +78,8 @@ def attempt(
 
 
 def finding(study: Study, section: Section) -> list[str]:
-    """Return the lines of a section's sentence, a template, filled in from its tables; an empty
-    list if the section has no sentence, or its first table no rows."""
+    """Return the finding of a section in words, a list of lines: its template ``sentence``, filled
+    in from its tables; an empty list if it has no sentence, or its first table no rows."""
     if not section.sentence or not len(frame := section.tables[0](study)):
         return []
     rows, *others = (
@@ -114,9 +115,13 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 
 @cached
 def limits(study: Study) -> dict[str, Any]:
-    """Return facts that limit conclusions from a study's runs, by name, for the page's template:
-    numbers of ``runs`` and of ``failed`` runs, their ``reasons``, ``reconstructed`` tasks, and so
-    on; an empty list or 0 for a limit that does not apply."""
+    """Return facts that limit conclusions from a study's runs, by name: numbers of ``runs`` and of
+    ``failed`` runs with ``reasons``; ``reconstructed`` tasks, and tasks whose best reward is
+    ``unproven``, ``unknown`` or of this folder's ``own`` methods; ``trials`` of the learner (unless
+    as in the paper); ``few``, the fewest runs of the learner; ``seed``; ``processor`` and
+    ``cores``; True for runs ``side_by_side`` and code that is ``dirty``; built-in methods of
+    ``earlier`` versions; code that was loaded ``late``; ``imports`` by method. 0, False or empty
+    where a limit does not apply."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
@@ -158,7 +163,8 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """Return notes, a sentence each, on the gaps and optima in a table with these columns."""
+    """Return sentences for below a table with these columns: which best known rewards, to which
+    gaps are taken, are not proven, or known from this folder alone; none without such columns."""
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []
     if unproven and columns & {"gap", "optimum"}:

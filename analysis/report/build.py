@@ -20,13 +20,7 @@ from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
-from coartic.analysis.report.render import (
-    IN_LATEX,
-    classes_of,
-    html_table,
-    latex_table,
-    table_csv,
-)
+from coartic.analysis.report.render import IN_LATEX, classes_of, html_table, latex_table, table_csv
 from coartic.analysis.sections import SECTIONS, TABLES, Section, coarticulation, ranking
 from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, cached
@@ -64,40 +58,32 @@ def write_report(
         )
     make_folder(folder, ["report.html"])
     with lock(folder, command="coartic report"):
-        return _write_locked(study, folder, for_paper, width, watch)
-
-
-def _write_locked(
-    study: Study,
-    folder: Path,
-    for_paper: bool,
-    width: float | None,
-    watch: Callable[[str], object],
-) -> tuple[list[str], dict[str, str]]:
-    """Write a report as :func:`write_report` does into a folder that this process has locked."""
-    home, report = os.path.relpath(study.folder, folder), folder / "report.html"
-    if study.folder.absolute() in folder.absolute().parents:
-        check_inside(study.folder, folder)
-    else:
-        with errors_in_words(report):
-            head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
-        if head and f'-results" content="{home}"' not in html.unescape(head):
-            raise CoarticError(f"{folder} holds the report of other results: choose another folder")
-    failures: dict[str, str] = {}
-    files = {"report.html": _page(study, home, failures, watch).encode()}
-    names = {table.id: section.title for section in SECTIONS for table in section.tables}
-    for name, table in TABLES.items():
-        made = about.attempt(
-            failures, names.get(name, name), _files_of_table, study, table, for_paper
-        )
-        files |= made or {}
-    for section in about.visible_sections(study) if for_paper else ():
-        watch(f"{section.title}, for print")
-        files |= (
-            about.attempt(failures, section.title, _files_of_figures, study, section, width) or {}
-        )
-    publish(folder, files)
-    return list(files), failures
+        home, report = os.path.relpath(study.folder, folder), folder / "report.html"
+        if study.folder.absolute() in folder.absolute().parents:
+            check_inside(study.folder, folder)
+        else:
+            with errors_in_words(report):
+                head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
+            if head and f'-results" content="{home}"' not in html.unescape(head):
+                raise CoarticError(
+                    f"{folder} holds the report of other results: choose another folder"
+                )
+        failures: dict[str, str] = {}
+        files = {"report.html": _page(study, home, failures, watch).encode()}
+        names = {table.id: section.title for section in SECTIONS for table in section.tables}
+        for name, table in TABLES.items():
+            made = about.attempt(
+                failures, names.get(name, name), _files_of_table, study, table, for_paper
+            )
+            files |= made or {}
+        for section in about.visible_sections(study) if for_paper else ():
+            watch(f"{section.title}, for print")
+            files |= (
+                about.attempt(failures, section.title, _files_of_figures, study, section, width)
+                or {}
+            )
+        publish(folder, files)
+        return list(files), failures
 
 
 def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
@@ -128,15 +114,16 @@ def _files_of_figures(study: Study, section: Section, width: float | None) -> di
 
 @cached
 def _plots_of(study: Study, section: Section, width: float | None = None) -> list[Plot]:
-    """Return the figures of a section for which the folder has runs, of a width, inches."""
+    """Return the figures of a section for which the folder has runs, of a width, inches; None:
+    each of its usual width."""
     drawn = (draw(study, width=width) for draw in section.figures)
     return [plot for plot in drawn if plot is not None]
 
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
-    a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, a dictionary
-    for each table with rows.
+    a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, for each
+    table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers) and ``html``.
 
     Settings and ablations have rows in the ranking, in the table of contexts, whose verdicts are
     counted in a sentence, in the table of all methods, and in CSV files.
@@ -164,7 +151,7 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
 
 
 def stamp(runs: pd.DataFrame) -> str:
-    """Return the hash of the results of runs, by which a report identifies its runs."""
+    """Return a hash, 64 hexadecimal digits, of the ids and results of runs, in any order."""
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 

@@ -92,7 +92,8 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
     """Return the run of a cell (task, label) nearest the median reward, in the form of
-    ``model.js``: ``run``, the beginning of its id, ``ticks`` and ``movements``.
+    ``model.js``: ``run``, the beginning of its id, ``ticks``, and ``movements`` with ``goal`` (from
+    0), ``hand`` (index in HANDS), ``kind`` and ``target``.
 
     Empty if the cell has no solution, or a solution that follows a path.
     """

@@ -84,15 +84,15 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
 
 
 def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
-    """Return whether ``name`` is a column of a frame that has the end of an interval, or the SD, of
-    another of its columns: ``gap_low``, ``gap_high``, ``reward_sd``."""
+    """Return True if ``name`` is a column of the frame with the end of an interval, or the SD, of
+    another column of the frame, such as ``gap_low``, ``gap_high`` or ``reward_sd``."""
     start = re.sub("_(low|high|sd)$", "", name)
     both = start != name and {start, name} <= {*frame.columns}
     return both and table.column(start).ending in ("[]", "±", "[*]")
 
 
 def _is_number(values: pd.Series) -> bool:
-    """Return whether a column has numbers, or no value at all."""
+    """Return True if a column has numbers alone, or no value at all."""
     return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
 
 
@@ -167,8 +167,9 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
 
 
 def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
-    """Return the HTML classes of each row, separated by a space: ``own`` for methods from files in
-    a table with other methods, ``setting`` for settings and ablations of others in the ranking."""
+    """Return the HTML classes of each row, separated by a space: ``own`` for a method from a file,
+    if the table has other methods, and ``setting``, in the ranking, for a setting or an ablation
+    of a built-in method."""
     is_own = [label in frame.attrs.get("own", ()) for label in frame.get("method", frame.index)]
     is_folded = is_setting(frame) & (table.id == "ranking") & ~np.array(is_own, dtype=bool)
     return [

@@ -42,8 +42,8 @@ ROUNDING = 1e-9
 
 
 def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Yield the runs of a method at each of the first goals that two tasks share, once for each
-    hand that hit this goal on both tasks."""
+    """Yield the solved runs of a method (label) at each of the first goals that two tasks share,
+    for each hand that hits this goal on both tasks."""
     for first, second, shared in context_pairs(one_by_one(study)):
         keys = (first, label), (second, label)
         if study.cells.keys() >= {*keys}:
@@ -81,7 +81,9 @@ def shared_goal(study: Study) -> TwoContexts | None:
     "other: difference that moves the hand (per dimension) .3",
 )
 def list_contexts(study: Study) -> Rows:
-    """List posture differences at shared goals; p is corrected over a method's goals (Holm)."""
+    """Yield a row for each method, pair of tasks, goal that both share, and hand: the posture
+    difference between the tasks, its verdict, and random search; p is corrected over a method's
+    rows (Holm)."""
     for label in study.methods.index:
         every = list(_shared_goals(study, label))
         spreads = [shared.standardised_posture_difference for shared in every]
@@ -96,7 +98,7 @@ def list_contexts(study: Study) -> Rows:
                 "distance": shared.posture_difference,
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
-                **(control := _beside_control(study, shared)),
+                **(control := _of_random_search(study, shared)),
                 "verdict": verdict_of(study, shared, control, adjusted),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
@@ -122,7 +124,7 @@ def list_contexts(study: Study) -> Rows:
     ),
 )
 def list_signatures(study: Study) -> Rows:
-    """List the signatures of every method on every task, next to the signatures of random search.
+    """Yield rows with the signatures of every method on every task, and of random search there.
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
     the choice of hands (``hands`` empty). Means over runs; p is of the one-tailed exchange test and
@@ -157,14 +159,14 @@ def list_signatures(study: Study) -> Rows:
 def verdict_of(
     study: Study, shared: TwoContexts, control: Row | None = None, p: float = math.nan
 ) -> str:
-    """Return in words whether the posture at a shared goal depends on the next goal.
+    """Return a verdict on whether the posture at a shared goal depends on the next goal, such as
+    ``different postures``, ``the same posture`` or ``too few runs``.
 
     Of stochastic methods, the permutation test distinguishes postures, and the 90 % interval of the
     difference, below :data:`.SAME`, shows that they are the same; of others the difference itself
     does both. Methods that select their solution from trials are compared with random search, too.
-    ``control`` is the result of :func:`_beside_control` for
-    ``shared``; None: computed here. ``p`` is the p-value corrected for all shared goals of the
-    method; NaN: that of ``shared`` alone.
+    ``control`` is the result of :func:`_of_random_search` for ``shared``; None: computed here.
+    ``p`` is the p-value corrected for all shared goals of the method; NaN: ``shared.p`` is taken.
     """
     method: Any = study.methods.loc[shared.method]
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
@@ -182,7 +184,7 @@ def verdict_of(
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"
-    control = _beside_control(study, shared) if control is None else control
+    control = _of_random_search(study, shared) if control is None else control
     beyond = control.get("p_random_search", math.nan)
     if math.isnan(beyond):
         few = "too few runs of random search" if control else "no random search of as many trials"
@@ -190,10 +192,10 @@ def verdict_of(
     return "different postures" if beyond < LEVEL else "no more than random search"
 
 
-def _beside_control(study: Study, shared: TwoContexts) -> Row:
-    """Return the posture difference of random search in the same two contexts (``control``), the
-    number of its runs (``control_runs``), and the p-value of the permutation test that the method's
-    posture difference exceeds this difference (``p_random_search``); empty without such runs."""
+def _of_random_search(study: Study, shared: TwoContexts) -> Row:
+    """Return a dictionary: ``control``, the posture difference of random search in the same two
+    contexts; ``control_runs``, the number of its runs; ``p_random_search``, the p-value of the
+    permutation test that the method's posture difference is larger; empty without such runs."""
     control = contexts_of_control(study, shared)
     if control is None:
         return {}
@@ -210,9 +212,9 @@ def _beside_control(study: Study, shared: TwoContexts) -> Row:
     "task; method; runs; by_goal_[*]: goal {} .1",
 )
 def list_saved(study: Study) -> Rows:
-    """List by task, method and goal how many ticks more, or less, a movement takes than that of the
-    corrective process alone with the same hands; runs with hands with which this process fails are
-    left out."""
+    """Yield a row for each task and method with the mean difference of ticks at each goal,
+    ``by_goal_1`` and so on: ticks of the movement less the ticks of the corrective process alone
+    with the same hands. Runs with hands with which this process fails are left out."""
     for (task, label), runs in study.cells.items():
         if task not in one_by_one(study) or study.methods.is_search[label] or not len(solved(runs)):
             continue
@@ -290,8 +292,8 @@ def draw_saved(study: Study) -> Parts | None:
     "to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw a method's postures at a goal before two different next goals, and the postures of
-    random search there."""
+    """Draw the postures of the method of :func:`shared_goal` at a goal before two different next
+    goals, and the postures of random search there; None without a shared goal."""
     shared = shared_goal(study)
     if shared is None:
         return None
@@ -318,9 +320,9 @@ def draw_postures(study: Study) -> Parts | None:
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
-    """Draw the postures of runs at a shared goal, runs thin and their means thick; return two
-    frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``, ``hand`` and
-    the posture, a column for each joint."""
+    """Draw the postures of runs at a shared goal, runs thin and their mean on each task thick;
+    return two frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``,
+    ``hand`` and the posture, a column for each joint."""
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius

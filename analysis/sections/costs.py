@@ -51,9 +51,9 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 
 def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
-    """Return the best reward after numbers of trials, ticks, in the shape of ``trials``; NaN before
-    the first reward. ``steps``: the trials of a run with a new best reward, from 1, and these
-    rewards (:func:`improvements`)."""
+    """Return a run's best reward, negative ticks, after each number of trials in ``trials``, in the
+    shape of ``trials``; NaN before the first reward. ``steps``: the trials of the run with a new
+    best reward, from 1, and these rewards (:func:`improvements`)."""
     numbers, rewards = steps
     return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
 
@@ -116,8 +116,8 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 
 def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return the runs of each compared method on the common tasks of methods
-    (:func:`.common_tasks`) that have targets (:func:`spans`), by label.
+    """Return, by label, the runs of each compared method on those of :func:`.common_tasks` that
+    have targets (:func:`spans`).
 
     A method that did not run on all these tasks is left out; a method from a file then has its runs
     on all its tasks with targets.
@@ -203,7 +203,8 @@ def runtimes(
     "seconds_to_half[]: seconds to half of the targets; half on *: -",
 )
 def list_runtimes(study: Study) -> Rows:
-    """List the costs of reaching a quarter and half of the targets.
+    """Yield a row for each method: the share of targets reached, and the costs of reaching a
+    quarter and half of the targets (:data:`COSTS`).
 
     ``half on *``: median number of trials to the target halfway to the optimum on a task, infinite
     if most runs do not reach this target.
@@ -235,7 +236,8 @@ def list_runtimes(study: Study) -> Rows:
     f"{style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
-    """Draw the share of reached targets against trials and forward-kinematics evaluations."""
+    """Draw the share of targets that methods reach within a number of trials, and of
+    forward-kinematics evaluations, a panel each; None without a curve."""
     tabled = list_runtimes(study)
     rows = study.methods.loc[[*tabled.index]]
     rows = rows.loc[headline_methods(rows)]

@@ -32,8 +32,9 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1",
 )
 def list_learning(study: Study) -> Rows:
-    """List the best reward after each number of trials in :data:`BUDGETS` (mean over runs), for
-    methods whose runs on a task all made trials, 100 at least, and have a solution."""
+    """Yield a row for each task and method: the best reward, ticks, after each number of trials in
+    :data:`BUDGETS`, a mean over runs, if all runs there have a solution and made 100 trials or
+    more."""
     learned = improvements(study)
     for (task, label), every in study.cells.items():
         runs = [learned[run] for run in every.run_id if run in learned]
@@ -56,8 +57,8 @@ def list_learning(study: Study) -> Rows:
     "method on a task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Draw the best reward so far of the learner, hill climbing, CMA-ES and methods from files, by
-    task."""
+    """Draw :func:`learning_curves`, the best reward so far against the trial, a panel for each
+    task; None without a curve."""
     data = learning_curves(study)
     if not len(data):
         return None
@@ -110,10 +111,11 @@ def draw_learning_curves(study: Study) -> Parts | None:
 def learning_curves(study: Study) -> pd.DataFrame:
     """Return the best reward so far, ticks, by task, method and number of trials.
 
-    For solved runs of :data:`CURVES` and of methods from files; EC1 only on tasks without runs of
-    EC2 to EC4. Columns ``task``, ``method`` (label), ``runs`` (number of runs), ``trial`` (at most
-    120 numbers, from 1 to the trials of the shortest run), ``best`` (mean over runs, NaN until all
-    have a solution), quartiles ``best_low`` and ``best_high``; no columns without a curve.
+    For solved runs of :data:`CURVES` and of methods from files, :func:`.headline_methods`; EC1 only
+    on tasks without runs of EC2 to EC4. Columns ``task``, ``method`` (label), ``runs`` (number of
+    runs), ``trial`` (at most 120 numbers, from 1 to the trials of the shortest run), ``best`` (mean
+    over runs, NaN until all have a solution), quartiles ``best_low`` and ``best_high``; no columns
+    without a curve.
     """
     learned, cells, curves = improvements(study), {}, [pd.DataFrame()]
     for (task, label), every in study.cells.items():

@@ -21,7 +21,7 @@ from coartic.estimates import Estimate
 
 @cached
 def _instances(study: Study) -> dict[str, list[str]]:
-    """Return the names of the instances with a best known reward, by family."""
+    """Return, by family, the names of its instances (random tasks) with a best known reward."""
     families: dict[str, list[str]] = {}
     for name in study.optima:
         if (family := study.tasks[name].family) is not None:
@@ -44,9 +44,9 @@ def on_instances(study: Study) -> pd.DataFrame:
 
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
-    """Return the gaps of a method's runs on each instance, shape ``(n,)`` each, by family.
-    ``runs`` are rows of :func:`on_instances`; families that lack an instance there are left
-    out."""
+    """Return, by family, the gaps of a method's runs on each of its instances, a list of arrays of
+    shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; families that lack an
+    instance there are left out."""
     return {
         str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
         for family, of_family in runs.groupby("family", sort=False)
@@ -59,8 +59,8 @@ def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
     "method; instances; missing; gap[]: gap (%) .1; in [*]: {} (%) .1",
 )
 def list_family_gaps(study: Study) -> Rows:
-    """List gaps to the best known reward over families with two arms, and in each family, with
-    intervals about other tasks.
+    """Yield a row for each method: its gap to the best known reward, over families with two arms
+    and in each family, with intervals for other tasks of the families.
 
     A method that did not solve every run of every instance of a family has gap NaN in the family,
     and over families with two arms if the family has two, as in the ranking. ``instances`` is the
@@ -120,13 +120,9 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
             place = order.index(label)
             heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
             size = looks[label]["markersize"]
-            dot: Any = {
-                "color": looks[label]["color"],
-                "markersize": size / 2,
-                "markeredgewidth": 0,
-            }
+            dot: Any = {"color": looks[label]["color"], "markersize": size / 2, "alpha": 0.5}
             gaps = rows.gap.clip(upper=1.0)
-            axes.plot(gaps, heights, "o", linestyle="", alpha=0.5, **dot)
+            axes.plot(gaps, heights, "o", linestyle="", markeredgewidth=0, **dot)
             mean = rows.iloc[0]
             ends = [mean.mean_low, mean.mean_high]
             axes.plot(ends, [-place, -place], color=style.INK, linewidth=1)

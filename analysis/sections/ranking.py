@@ -51,7 +51,8 @@ _EARLY = 1_000
     "least_p: -",
 )
 def list_against_learner(study: Study) -> Rows:
-    """List the mean rewards of every method and of the learner (EC1, EC4 on two arms), by task.
+    """Yield a row for each method and task: mean rewards, ticks, of the method and of the learner
+    (EC1, with two arms EC4), and the p-value of their difference.
 
     For methods that solved every run; p is two-sided, of the exchange test, or, for a deterministic
     method, whose reward counts as exact, of the bootstrap test, and is corrected over the tasks of
@@ -102,8 +103,8 @@ def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     "forward_kinematics: -; cpu_s: -; runs; failed: -",
 )
 def list_ranking(study: Study) -> Rows:
-    """List gaps and shares over all tasks, and gaps on each, in the order of :func:`.board`,
-    settings after their method.
+    """Yield a row for each method: its gap and share of the gain over all tasks, and its gap on
+    each; in the order of :func:`.board`, settings after their method.
 
     ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
     them, which is not ``ranked``, over the ``tasks`` that it solved. Also the gap after a thousand
@@ -136,9 +137,9 @@ def list_ranking(study: Study) -> Rows:
 
 
 def _ranked(study: Study) -> list[str]:
-    """Return the labels of the methods of the ranking, in the order of :func:`.board`; methods
-    without a gap follow in the order of :attr:`.Study.methods`. But a setting or an ablation stands
-    after its method, if that method is in the list."""
+    """Return the labels of all compared methods in the order of :func:`.board`; methods that it
+    lacks follow in the order of :attr:`.Study.methods`. But a setting or an ablation stands after
+    its method, if that method is in the list."""
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
     under = study.methods.under
@@ -159,11 +160,14 @@ def _ranked(study: Study) -> list[str]:
     "p_holm: p (corrected) .p; tasks; runs",
 )
 def list_differences(study: Study) -> Rows:
-    """List other methods with their gaps less the gap of :attr:`.Study.against`, on the tasks on
-    which XX
-    Only methods that solved every run there are listed, without settings and ablations. Intervals
-    are for other runs on the same tasks; p is two-sided (:func:`.stratified_test`), corrected for
-    the number of methods (Holm).
+    """Yield a row for each other method: its gap less the gap of :attr:`.Study.against`, on the
+    tasks on which the latter solved every run; the smallest difference first.
+
+    If :attr:`.Study.against` is empty, the compared method is the first of :func:`.board` where one
+    parameter is varied; otherwise each method from a file is compared with the built-in methods
+    with the same use of the reward. Methods that failed a run there, settings and ablations are
+    left out. Intervals are for other runs on the same tasks; p is two-sided
+    (:func:`.stratified_test`), corrected over the rows (Holm).
     """
     methods = study.methods
     chosen = [study.against] if study.against in compared(study) else []
@@ -215,8 +219,8 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
 
 
 def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
-    """Draw the gap against the parameter that is varied alone (:attr:`.Study.varied`), or the gap
-    of every method."""
+    """Draw the gap against the values of the only parameter that is varied (:attr:`.Study.varied`),
+    or else the gap of every method; None without a gap. ``how``: see :data:`.DrawsFigure`."""
     plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
     return plot and replace(plot, id="ranking")
 
@@ -229,7 +233,8 @@ def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
     "n = {n} runs of a value.",
 )
 def _draw_varied(study: Study) -> Parts | None:
-    """Draw gaps against the values of the parameter that is varied."""
+    """Draw gaps against the values of the only parameter that is varied; None with fewer than two
+    values that have a gap."""
     name, values = study.varied
     rows = board(study)
     rows = rows.loc[[label for label in values if label in rows.index]]
@@ -273,7 +278,7 @@ def _draw_varied(study: Study) -> Parts | None:
 )
 def _draw_gaps(study: Study) -> Parts | None:
     """Draw the gap of each method of :func:`.board`, a mean over tasks, with interval and name,
-    without settings whose method is there; None without a method."""
+    without settings whose method is there; None if no method has a gap."""
     rows, tasks = board(study), common_tasks(study)
     rows = without_settings(rows).reset_index(names="method")
     if not len(rows):

@@ -26,8 +26,8 @@ from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, num
     "source: best known from; bound: proven bound",
 )
 def list_tasks(study: Study) -> Rows:
-    """List the tasks with their best known rewards, and the rewards of the corrective process alone
-    with the initial and the best hands."""
+    """Yield a row for each task with its best known reward, and the rewards of the corrective
+    process alone with the initial and the best hands, negative ticks."""
     for name, task in one_by_one(study).items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
         alone = study.sequences(name).reward.dropna()
@@ -52,7 +52,8 @@ def list_tasks(study: Study) -> Rows:
     "their numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
 )
 def draw_tasks(study: Study) -> Parts | None:
-    """Draw start configuration and goals, a panel for each task."""
+    """Draw start configuration and goals of the tasks of a study, a panel each; None without
+    tasks that are shown one by one."""
     shown = list(one_by_one(study).values())
     if not shown:
         return None

@@ -34,7 +34,8 @@ def _groups(*groups: Numbers) -> list[Array]:
 def distance_of_means(first: Array, second: Array) -> float:
     """Return ‖mean(first) − mean(second)‖, the distance of mean configurations of two contexts.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``; length unit and rad mixed.
+    ``first`` and ``second`` have shape ``(runs, dof)`` (ValueError for others); length unit and rad
+    mixed.
     """
     first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
@@ -47,7 +48,8 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
     d = ‖m₁ − m₂‖ / s, s² = (Σ‖x − m₁‖² + Σ‖x − m₂‖²) / (n₁ + n₂ − 2),
 
     a multivariate form of Cohen's d (Cohen 1988). Without an effect of the context the expectation
-    of d² is about 1/n₁ + 1/n₂, not 0. NaN if no context has two runs, or if s = 0.
+    of d² is about 1/n₁ + 1/n₂, not 0. NaN if no context has two runs, or if s = 0. Raises
+    ValueError for other shapes.
     """
     first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
@@ -74,7 +76,7 @@ def posture_difference_below(
     with runs drawn within each context, whose :func:`standardised_posture_difference` is at least
     ``bound`` (in SDs), or if not ``standardised`` whose :func:`distance_of_means` is; the observed
     sample counts, too. Noise adds to distances, so that p is rather too large. NaN if a context has
-    a single run.
+    a single run. Raises ValueError for other shapes.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -99,7 +101,7 @@ def permutation_p(
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if all
     permutations are no more than ``resamples``, 1 if all runs are equal, NaN if a context has a
-    single run.
+    single run. Raises ValueError for other shapes.
     """
     first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
@@ -141,7 +143,8 @@ def beyond_p(
 
     The posture difference is the distance of the mean configurations in the two contexts. The
     statistic is the difference of the two methods' posture differences. Permutations exchange the
-    runs of both methods within each context.
+    runs of both methods within each context. Raises ValueError for other numbers of contexts than
+    two, and for other shapes.
 
     Parameters
     ----------

@@ -17,9 +17,7 @@ from numpy.typing import ArrayLike
 
 from coartic import Execution, Hand, Task
 from coartic.analysis.solutions import Solutions, initial_solution
-from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.text import unknown
 from coartic.motion.trial import reach_goals
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
@@ -33,8 +31,8 @@ def _other(hand: Hand) -> Hand:
 def isolated_reaches(
     task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
 ) -> tuple[Array, Array]:
-    """Return r(q, g, h) and R(q, g, h), the ticks and the configurations at the end of reaches from
-    q to goal g with hand h by the corrective process.
+    """Return the ticks r(q, g, h) of reaches by the corrective process from configuration q to goal
+    g with hand h, and the configurations R(q, g, h) at their ends.
 
     Parameters
     ----------
@@ -163,19 +161,19 @@ class Signature:
 
 @checked_arguments
 def hand(runs: Solutions) -> Array:
-    """Return, for each run, the share of goals before the last whose hand is not the fastest for
-    that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`. NaN on a task for
-    one hand or with one goal."""
+    """Return for each run, shape ``(n,)``, the share of goals before the last whose hand is not the
+    fastest for that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`. NaN on
+    a task for one hand or with one goal."""
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
 @checked_arguments
 def as_in_isolation(runs: Solutions) -> Array:
-    """Return a(i, g): 1 if the chosen hand is the fastest for goal g alone, or else 0.
+    """Return a(i, g) for run i and goal g, shape ``(n, G)``: 1 if the chosen hand is the fastest
+    for goal g alone, or else 0; NaN on a task for one hand.
 
-    a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)]. Shape ``(n, G)``;
-    NaN on a task for one hand.
+    a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)].
     """
     if not runs.runs or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals)), np.nan)
@@ -237,10 +235,3 @@ SIGNATURES = {
 """Signatures by their names in claims: ``first`` is t(i, 1) − c(i, 1), and ``whole`` is
 Σ_g c(i, g) − t(i, g); NaN if the corrective process does not complete the task with the hands of
 the run."""
-
-
-def signature_named(name: str) -> Signature:
-    """Return a signature by its name. Raises CoarticError for an unknown name."""
-    if name not in SIGNATURES:
-        raise CoarticError(unknown("signature", name, SIGNATURES))
-    return SIGNATURES[name]

@@ -49,8 +49,8 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
 
 
 def movable(task: Task, hand: Hand) -> Array:
-    """Return the indices in a configuration that move a hand, shape ``(k,)``: of base coordinates
-    that are not locked, and of the joints of its arm."""
+    """Return the indices of the entries of a configuration that move a hand, shape ``(k,)``: base
+    coordinates that are not locked, and joints of its arm."""
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
@@ -127,17 +127,18 @@ class TwoContexts:
 
     @property
     def n(self) -> int:
-        """Number of runs in both contexts."""
+        """Number of runs in the two contexts together."""
         return sum(map(len, self.configurations))
 
     @property
     def posture_difference(self) -> float:
-        """Distance of the mean postures in both contexts, length unit and rad mixed."""
+        """Distance between the mean postures of the two contexts, length unit and rad mixed."""
         return distance_of_means(*self.configurations)
 
     @property
     def standardised_posture_difference(self) -> float:
-        """Posture difference in pooled SDs within contexts; NaN if runs do not differ."""
+        """Posture difference in pooled SDs within contexts; NaN if runs within contexts do not
+        differ, and if each context has a single run."""
         return standardised_posture_difference(*self.configurations)
 
     @cached_property

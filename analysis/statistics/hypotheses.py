@@ -136,8 +136,8 @@ def stratified_test(
     """Return the p-value, two-sided, of a difference of means that is itself a mean over strata,
     such as tasks: pairs of samples, shapes ``(n,)`` and ``(m,)``, or a number that is exact.
 
-    In each stratum labels are exchanged, as in :func:`exchange_test`; beside an exact number the
-    values are drawn again, moved to its mean, as in :func:`bootstrap_test`. The statistic is the
+    In each stratum labels are exchanged, as in :func:`exchange_test`; a sample that is compared
+    with an exact number is resampled, as in :func:`bootstrap_test`. The statistic is the
     sum of the differences over the root of the sum of their variances; p = (1 + resamples at least
     as extreme) / (1 + resamples). p is NaN with fewer than three values in a sample, and without a
     sample.
@@ -184,8 +184,8 @@ def stratified_test(
 
 def _moments(pool: Array, places: NDArray[Any], n: int) -> tuple[Array, Array]:
     """Return the difference of means (first less second sample) and the variance of the difference
-    for each row of ``places``, shapes ``(rows,)``. A row has the places in ``pool`` of the first
-    sample, of ``n`` values, or, with fewer places, of the second sample."""
+    for each row of ``places``, shapes ``(rows,)``. A row has the indices in ``pool``, the values of
+    both samples, of the first sample, ``n`` values, or, with fewer indices, of the second."""
     few = places.shape[1]
     values = pool[places]
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
@@ -203,8 +203,9 @@ def _moments(pool: Array, places: NDArray[Any], n: int) -> tuple[Array, Array]:
 
 
 def _studentised(differences: Array, variances: Array, size: float) -> Array:
-    """Return differences over the roots of variances, 0 for no difference and infinite without
-    variance. Differences and variances that are rounding of values of ``size`` count as 0."""
+    """Return differences over the square roots of variances, 0 for no difference, and otherwise
+    infinite without variance. Differences and variances that are rounding of values of ``size``
+    count as 0."""
     differences = np.where(np.abs(differences) < NEGLIGIBLE * size, 0.0, differences)
     variances = np.where(variances < (NEGLIGIBLE * size) ** 2, 0.0, variances)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -233,22 +234,23 @@ def _places(size: int, resamples: int) -> Iterator[tuple[slice, NDArray[np.int64
 
 @lru_cache(maxsize=16)  # most samples have as many values as another
 def _kept_places(size: int, resamples: int) -> list[tuple[slice, NDArray[np.int64]]]:
-    """Return a list of pairs of a slice of the resamples and the places that these draw, ``(size,
-    length of the slice)`` (:func:`_places`). It is kept for further samples of this size: do not
-    change it."""
+    """Return the pairs of :func:`_places` as a list, which is cached for further samples of this
+    size: do not change it."""
     return [*_places(size, resamples)]
 
 
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
-    """Draw ``chosen`` of ``runs`` without replacement, ``size`` times, shape ``(size, chosen)``."""
+    """Return ``size`` draws of ``chosen`` of the indices 0 to ``runs`` - 1 without replacement,
+    shape ``(size, chosen)``."""
     order = rng.random((size, runs)).argpartition(chosen - 1, axis=1)
     return order[:, :chosen].astype(np.int32)  # no view, which would keep all of the order
 
 
 def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.int32]]:
-    """Yield parts of ``count`` exchanges, all possible ones if ``exact``: arrays ``(rows, min(n,
-    m))``, with a row for each exchange, the places in a pool of ``n + m`` values that become the
-    smaller sample (of two equal ones the first). Equal arguments give equal places."""
+    """Yield parts of ``count`` exchanges between samples of ``n`` and ``m`` values, all possible
+    exchanges if ``exact``, else random ones: arrays ``(rows, min(n, m))``, with a row for each
+    exchange, the indices in the pool of ``n + m`` values that become the smaller sample (of two
+    equal ones the first). Equal arguments give equal indices."""
     rng, few = np.random.default_rng(SEED), n if n <= m else m
     every = combinations(range(n + m), few)
     for part in slices(count, max(1, IN_CACHE // (n + m))):
@@ -259,8 +261,8 @@ def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.i
 
 @lru_cache(maxsize=16)
 def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.int32]]:
-    """Return a list of the parts of ``count`` exchanges, arrays of places ``(rows, min(n, m))``
-    (:func:`_exchanges`). It is kept for further samples of these sizes: do not change it."""
+    """Return the arrays of :func:`_exchanges` as a list, which is cached for further samples of
+    these sizes: do not change it."""
     return [*_exchanges(n, m, count, exact)]
 
 
@@ -268,8 +270,8 @@ def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.
 def share_test(count: _Count, total: _Count, share: _Share, alternative: Alternative) -> Estimate:
     """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
-    The value of the estimate is the difference ``count / total - share``, its ``p`` one-tailed for
-    ``"greater"`` and ``"less"``.
+    The value of the estimate is the difference ``count / total - share``; its ``p`` is one-tailed
+    for ``"greater"`` and ``"less"``. Raises ValueError if ``count`` exceeds ``total``.
     """
     p = float(scipy.stats.binomtest(count, total, share, alternative).pvalue)
     return Estimate(count / total - share, p=p, n=(total,))

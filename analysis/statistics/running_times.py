@@ -23,8 +23,8 @@ RunningTimes = Sequence[Array]
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the finite running times in ascending order, and for each its weight and the number of
-    its run, from 0 through all tasks; shape ``(k,)`` each.
+    """Return the finite running times in ascending order, their weights, and the numbers of their
+    runs, counted from 0 through all tasks; shape ``(k,)`` each.
 
     The weights of all pairs of run and target, also of pairs that are not reached, sum to 1; each
     task has the same weight and needs a run.
@@ -38,8 +38,8 @@ def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Return the budgets at which the share of reached targets rises, ``(k,)``, and the share from
-    each budget on, ``(k,)``.
+    """Return the budgets at which the share of reached targets rises, ``(k,)``, and the share that
+    is reached within each of these budgets, ``(k,)``.
 
     If no target is reached, one infinite budget with a share of 0.
     """
@@ -51,7 +51,8 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 
 def share_reached(times: RunningTimes) -> float:
-    """Return the share of pairs of run and target that are reached at all; tasks weigh the same."""
+    """Return the share, 0 to 1, of all pairs of run and target that are reached at any cost; each
+    task has the same weight."""
     return float(_pairs(times)[1].sum())
 
 
