@@ -47,7 +47,8 @@ def tabulate_equal(cells):
                 mine, learner = pairs[[measure, f"learner {measure}"]].to_numpy().T
                 places = drawn(pairs.group)
                 differences = (mine - learner)[places].mean(axis=1)
-                ratios = mine[places].sum(axis=1) / learner[places].sum(axis=1)
+                with np.errstate(invalid="ignore"):  # 0 / 0 where no drawn task shows anything
+                    ratios = mine[places].sum(axis=1) / learner[places].sum(axis=1)
                 for word, value, each in (
                     ("difference", (mine - learner).mean(), differences),
                     ("ratio", mine.sum() / learner.sum(), ratios),
