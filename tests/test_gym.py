@@ -451,6 +451,8 @@ def test_an_agent_is_scored_as_it_was_trained(tmp_path):
     for wrong, words in ((tmp_path / "agent.zip", "no VecNormalize.save wrote"), (0, "it must be")):
         with pytest.raises(TypeError, match=words):
             score(TWO, loaded(), vec_normalize=wrong)
+    with pytest.raises(ValueError, match="in a VecNormalize already"):
+        score(vec_env.VecFrameStack(norm, 2), agent, vec_normalize=norm)
     # In wrappers that change what it sees or does.
     scaled = wrappers.RescaleAction(gymnasium.make(TWO), *np.float32([-2, 2]))
     stacked = vec_env.VecFrameStack(robots(), 2)

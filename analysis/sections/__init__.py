@@ -143,8 +143,7 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
 {{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
-{{ " of the targets (rewards from the corrective process alone to the %s, evenly spaced)" \
-% reference if loop.first }}, {{ "never half" if \
+{{ " of the reward targets" if loop.first }}, {{ "never half" if \
 row.trials_to_half == infinite else "half of them after %s trials" % \
 interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them without a trial" }}\
 {{ "." if loop.last else "; " }}

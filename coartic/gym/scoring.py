@@ -84,7 +84,8 @@ def score(
     ------
     ValueError, TypeError
         The environment is not coartic's, an option is wrong, the policy is no policy, or an agent
-        whose spaces or wrappers differ from those of the environment.
+        whose spaces or wrappers differ from those of the environment; or observations would be
+        normalised twice, in ``env`` and by ``vec_normalize``.
     OSError
         The file of ``vec_normalize`` cannot be read.
 
@@ -105,6 +106,8 @@ def score(
     given, wrapped = options_of(env) | options, not isinstance(env, str) and wrappers_of(env)
     if wrapped == [env] and is_normaliser(env):
         vec_normalize, wrapped = vec_normalize or env, False
+    if vec_normalize is not None and wrapped and any(map(is_normaliser, layers(env))):
+        raise ValueError("the environment is in a VecNormalize already: leave vec_normalize out")
     if wrapped and options:
         raise ValueError(f"{', '.join(options)}: make the environment in the wrappers with this")
     if isinstance(task := given.get("task"), str | Path) and is_family(str(task)):
