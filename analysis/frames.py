@@ -179,7 +179,8 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 
 def _scored_runs(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the frame of :func:`scored`. Raises CoarticError also for two rows of a run."""
+    """Return a user's frame of runs, checked, with the gap of each (:func:`scored`). Raises
+    CoarticError as :func:`scored` does, and for two rows of a run."""
     runs = scored(frame)
     _refuse_rows(runs, "method", runs.duplicated("key"), f"{_TWICE}; needed is a row for a run")
     return runs

@@ -225,7 +225,8 @@ def shown_name(study: Study, method: str) -> str:
 
 def _on_tasks(study: Study, method: str) -> str:
     """Return on how many of all tasks a method solved every run, ``3 of 8 tasks``, with the number
-    of its failed runs; empty if it did so on :func:`common_tasks`."""
+    of its failed runs if there are any; empty if it solved every run on the tasks over which
+    methods are ranked (:func:`common_tasks`)."""
     on = {*solved_tasks(study, method)}
     if {*common_tasks(study)} <= on:
         return ""

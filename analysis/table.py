@@ -163,8 +163,8 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
 
 
 def caption_of(table: Table, frame: pd.DataFrame) -> str:
-    """Return the caption of a table's frame; ``{tasks}`` in it is the number of compared tasks,
-    ``{reference}`` the name of the rewards to which gaps are taken."""
+    """Return the caption of a table, with the number of compared tasks in place of ``{tasks}``, and
+    the name of the rewards to which gaps are taken in place of ``{reference}``."""
     caption = table.caption.replace("{tasks}", frame.attrs["compared"])
     return caption.replace("{reference}", frame.attrs["reference"])
 

@@ -238,10 +238,10 @@ class _Report(NamedTuple):
 
 
 def check_runs(folder: Path) -> _Report:
-    """Execute all stored runs of a results folder again, check its cells and plan; report what
-    differs or is unchecked.
+    """Execute the stored solutions of a results folder, check its tasks, methods and plan, and
+    report what differs or is unchecked. No method is run.
 
-    Runs that the last plan does not ask for are among them. Raises sqlite3.Error or ValueError if
+    Runs that the last plan does not ask for are checked, too. Raises sqlite3.Error or ValueError if
     the folder cannot be read.
     """
     with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:

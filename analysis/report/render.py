@@ -122,9 +122,9 @@ def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
 def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
     """Return a table in HTML.
 
-    Its first column stays while other columns scroll. Rows have links, and the classes ``own`` and
-    ``setting`` (:func:`classes_of`). A text that is the same in all of three rows or more moves to
-    the caption. Cells without a value are empty.
+    Each row has a link to itself, and the classes ``own`` and ``setting`` (:func:`classes_of`). A
+    column whose text is the same in all rows moves to the caption if there are three rows or more.
+    Cells without a value are empty.
     """
     slug = slugs(map(str, frame.index))
     cells: list[list[str]] = []

@@ -119,7 +119,7 @@ def play(
     show: Annotated[bool, typer.Option("--open/--no-open", help="Open it in the browser.")] = True,
     replace: given.Replace = False,
 ) -> None:
-    """Move goals and watch the learner learn, in the browser."""
+    """Write a page on which goals can be moved and the learner learns; open it in the browser."""
     import webbrowser
 
     from coartic import load_task

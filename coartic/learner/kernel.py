@@ -262,9 +262,10 @@ def _best_hand(entries: Any, hands: Any) -> int:
 def choose_hand(
     n: int, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
 ) -> int:
-    """Return the hand (0 left, 1 right) of run ``n`` for its goal: the hand of highest value in
-    ``entries``, the records of Q and q* by hand; with ``explore``, with probability ε, the hand
-    that the condition explores (random, closest to the goal, or nearest in posture)."""
+    """Return the hand (0 left, 1 right) of run ``n`` of a batch for its present goal: the hand of
+    highest value in ``entries`` (value Q and target posture q* by hand); with ``explore``, with
+    probability ε, the hand that the condition explores (random, closest to the goal, or nearest in
+    posture). ``workspace`` holds the batch and arrays to compute in."""
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:

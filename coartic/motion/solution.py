@@ -266,8 +266,9 @@ def _with_targets(movements: list[Movement]) -> list[Movement | None]:
 
 
 def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool) -> list[Execution]:
-    """Execute plans (movements by goal) without paths side by side; return the executions in the
-    order of plans. Trials are counted as made outside the session of a run if ``outside``."""
+    """Execute plans side by side, and return the executions in their order. A plan has the
+    movements to each goal, here with targets alone, without paths. With ``outside``, trials count
+    as made outside the session of a run."""
     if not plans:
         return []
     given = [[_with_targets(movements) for movements in plan] for plan in plans]

@@ -627,8 +627,9 @@ class Trials(NamedTuple):
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Return the results of trials from their accounts. The results share memory with ``accounts``,
-    which are changed: ``q`` becomes NaN for goals that are not hit."""
+    """Return the results of trials from what the kernels noted of them, the first ``dof`` joints of
+    each posture. The results share memory with ``accounts``, whose postures ``q`` at goals that are
+    not hit become NaN."""
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
