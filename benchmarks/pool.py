@@ -274,9 +274,11 @@ class Worker:
 
     @property
     def cpu_s(self) -> float:
-        """CPU time of the process so far, s; 0 where the system does not report it (Linux does)."""
-        with contextlib.suppress(AttributeError, OSError, OverflowError):
-            return time.clock_gettime((~(self.process.pid or 0) << 3) | 2)
+        """CPU time of the process so far, s; 0 before its start, after its end, and where the
+        system does not report it (Linux does)."""
+        if self.process.pid is not None:
+            with contextlib.suppress(AttributeError, OSError, OverflowError):
+                return time.clock_gettime((~self.process.pid << 3) | 2)
         return 0.0
 
     @property

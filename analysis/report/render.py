@@ -123,8 +123,8 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
     """Return a table in HTML.
 
     Each row has a link to itself, and the classes ``own`` and ``setting`` (:func:`classes_of`). A
-    column whose text is the same in all rows moves to the caption if there are three rows or more.
-    Cells without a value are empty.
+    later column of texts that are the same in all rows moves to the caption if there are three rows
+    or more. Cells without a value are empty.
     """
     slug = slugs(map(str, frame.index))
     cells: list[list[str]] = []

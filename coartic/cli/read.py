@@ -162,8 +162,8 @@ def verify(
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Execute every stored solution again, or perform runs again, and compare; exit with code 1 if
-    something differs."""
+    """Execute every stored solution again and, with --again, perform runs again, or only one with
+    --run; exit with code 1 if something differs, or if runs of the plan are missing."""
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 

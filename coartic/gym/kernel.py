@@ -87,9 +87,10 @@ class VectorState(NamedTuple):
         ahead: int,
         reach: float,
     ) -> VectorState:
-        """Return a state in which no task is loaded and no trial goes on. ``shape`` is ``(N, T,
-        G)``, the numbers of environments, of tasks and, at most, of goals; ``entries`` is the
-        length of an observation; the other arguments are fields (:class:`VectorState`)."""
+        """Return a state in which no task is loaded and no trial goes on. ``robot`` gives arrays
+        their sizes; ``shape`` is ``(N, T, G)``, the numbers of environments, of tasks and, at most,
+        of goals; ``entries`` is the length of an observation; the other arguments are fields
+        (:class:`VectorState`)."""
         count, tasks, goals = shape
         batch = batch_for(robot)
         return cls(
