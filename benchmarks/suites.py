@@ -175,7 +175,8 @@ def load_suite(name: str) -> Suite:
 
 
 def _read_suite(path: Path) -> Suite:
-    """Return the suite of a file. Raises CoarticError with a line for each problem."""
+    """Return the suite of a file. Raises CoarticError with a line for each of its first 20
+    problems, or with one line if it cannot be read or has tables ``[[cells]]``."""
     content = read_toml(path)
     if "cells" in content:
         raise CoarticError(f"{path}: tables [[cells]] are called [[blocks]]")

@@ -57,11 +57,11 @@ def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
 
 @cached
 def shared_goal(study: Study) -> TwoContexts | None:
-    """Return the runs at the first goal that two tasks share, of the first method with such runs,
-    in this order: the paper's learner, methods from files, methods that represent their algorithms,
-    other methods.
+    """Return the runs at the first goal that two tasks share and that runs on both hit with the
+    same hand, of the first method with such runs, in this order: the paper's learner, methods from
+    files, methods that represent their algorithms, other methods.
 
-    None if no method has solved runs on two such tasks.
+    None if no method has such runs.
     """
     rows = study.methods
     subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]

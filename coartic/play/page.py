@@ -64,8 +64,8 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
 
 def preset_of(task: Task) -> dict[str, Any]:
     """Return a task as the figure offers it: ``label``, with † if its goals are reconstructed;
-    ``task``, the fields that the figure needs as plain data; and ``optimum``, the reward of the best
-    known solution if it is proven to be the best, or None."""
+    ``task``, the fields that the figure needs as plain data; and ``optimum``, the reward of the
+    best known solution if it is proven to be the best, or None."""
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
