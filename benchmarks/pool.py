@@ -302,7 +302,7 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """How the process ended, and the last three lines that it wrote in the current job, as in
+        """The end of the process, and the last three lines that it wrote in the current job, as in
         ``(exit code 1): LINES``."""
         code = self.exit_code or 0
         if self._reader.is_alive():

@@ -257,7 +257,7 @@ def compact(rows: Any, slot: int, last: int) -> None:
 @inner
 def padded_count(count: int) -> int:
     """Return the number of slots to work on if ``count`` are in use: ``count`` itself for 0 and 1,
-    else ``count`` rounded up to whole vectors of 8 slots, the last of which may hold no run; so no
+    else ``count`` rounded up to whole vectors of 8 slots, whose last slots may hold no run; so no
     slots are left over that would be worked on one by one."""
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 

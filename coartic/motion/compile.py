@@ -62,8 +62,8 @@ class _Kernel:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """What Numba makes of the function: a dispatcher, which compiles it when it is first
-        called, or an intrinsic. Raises CoarticError where Numba cannot compile."""
+        """The compiled function: a dispatcher of Numba, which compiles it when it is first called,
+        or an intrinsic. Raises CoarticError where Numba cannot compile."""
         return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:

@@ -731,8 +731,8 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Return ``hands`` as a tuple; for None return all hands of the task. Raises ValueError if
-    there is none, or one is not a hand of the task."""
+    """Return ``hands`` as a tuple; for None return all hands of the task. Raises ValueError
+    for an empty ``hands`` and for a hand that the task does not have."""
     if hands is None:
         return task.hands
     chosen = tuple(hands) if isinstance(hands, Iterable) else ()

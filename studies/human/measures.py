@@ -25,7 +25,7 @@ TICKS_OF_A_TURN = 5
 
 def unmoved(runs, model, arms):
     """Return a model's paths by task, on tasks with this number of arms and fewer than :data:`LONG`
-    goals of which none is moved."""
+    goals, all of them in their places."""
     short = (runs.moved == 0) & (runs.goals < LONG)
     ours = runs[short & (runs.model == model) & (runs.arms == arms)]
     return ours.set_index("task").path
