@@ -74,6 +74,9 @@ def test_the_commonest_reasons_and_few_runs_are_said(traced):
     for count, few in ((19, 19), (20, 0)):
         runs = runs_of("ascending", "dual-process/EC1", [-300] * count, commit="c0de")
         assert limits(study_of(runs))["few"] == few
+    counts = {"trials": [100, 10_000], "commit": "c0de"}
+    runs = runs_of("ascending", "dual-process/EC1", [-300, -300], **counts)
+    assert limits(study_of(runs))["trials"] == [100]
 
 
 def test_p_is_small_below_a_thousandth():

@@ -136,7 +136,7 @@ def limits(study: Study) -> dict[str, Any]:
         "failed": len(failed),
         "reasons": commonest(reasons) + [f"{others} for other reasons"] * bool(others),
         "reconstructed": [task.label for task in tasks if task.reconstructed],
-        "trials": sorted(trials) if trials != {TRIALS} else [],
+        "trials": sorted(trials - {TRIALS}),
         "few": fewest if fewest < RUNS else 0,
         "seed": study.plan[0].seed,
         "unproven": [
