@@ -65,9 +65,8 @@ def tidy(study):
     best = solved.groupby("task").reward.max()
     rows = []
     for cell in solved.drop_duplicates(["task", "method", "setting"]).itertuples():
-        task, parameters = study.tasks[cell.task], json.loads(cell.parameters)
-        parameters["hands"] = parameters.get("hands") or ""
-        learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
+        task = study.tasks[cell.task]
+        parameters = study.declared[cell.method].defaults | json.loads(cell.parameters)
         origin, moved = re.fullmatch(r"(.+?)(?:\.goal(\d+)_.+)?", cell.task).groups()
         place = task.goals[int(moved) - 1][1] if moved else np.nan
         facts = {
@@ -75,16 +74,26 @@ def tidy(study):
             "best": best[cell.task], "origin": origin, "moved": int(moved or 0), "place": place,
             "horizon": parameters.get("horizon"),
         }  # fmt: skip
-        for name, model in (MODELS | FURTHER).items():
-            wanted = model.get("parameters", {}).items()
-            if (model["method"] or learner) == cell.method and wanted <= parameters.items():
-                replay = model.get("replayed", False)
-                for run in study.executed(
-                    cell.task, f"{cell.method} {cell.setting}".strip(), replay=replay
-                ).runs:
-                    path = trajectory(task, run.movements)
-                    rows.append({"model": name, **facts, "hands": run.hands, "path": path})
+        for name, model in models_of(task, cell.method, parameters).items():
+            replay = model.get("replayed", False)
+            label = f"{cell.method} {cell.setting}".strip()
+            for run in study.executed(cell.task, label, replay=replay).runs:
+                path = trajectory(task, run.movements)
+                rows.append({"model": name, **facts, "hands": run.hands, "path": path})
     return pd.DataFrame(rows)
+
+
+def models_of(task, method, parameters):
+    """Return the models, by name, whose runs of a task are those of a method with all its
+    ``parameters``, defaults included."""
+    learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
+    given = parameters | {"hands": parameters.get("hands") or ""}
+    return {
+        name: model
+        for name, model in (MODELS | FURTHER).items()
+        if (model["method"] or learner) == method
+        and model.get("parameters", {}).items() <= given.items()
+    }
 
 
 def of_control(runs, model, measure):

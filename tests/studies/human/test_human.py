@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from coartic.benchmarks.planning import plan_suite
 from coartic.estimates import Estimate
 from tests.support.processes import programs
 
@@ -57,3 +58,15 @@ def test_the_control_of_two_arms_has_the_hands_of_each_run(monkeypatch):
     first, repeats = "first movement against isolated reach", "near-tie repeats"
     assert HUMAN.of_control(runs, "learner EC3", first)["a"] == (1 + 3 + 1 + 3 + 8) / 5
     assert HUMAN.of_control(runs, "learner EC3", repeats)["a"] == 7
+
+
+def test_the_suite_runs_each_model_and_each_control():
+    """Cells leave out parameters at their defaults, such as a moving idle arm."""
+    found = {
+        name
+        for cell in (job.cell for job in plan_suite(HUMAN.HERE / "suite.toml"))
+        for name in HUMAN.models_of(
+            cell.task, cell.method.name, cell.method.defaults | cell.parameters
+        )
+    }
+    assert found == {*HUMAN.MODELS, *HUMAN.FURTHER}
