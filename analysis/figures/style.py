@@ -46,7 +46,7 @@ BACKGROUND = "#ffffff"
 TIP = "tip:"
 """Beginning of the id of a mark with a :func:`tip`."""
 BLUE, SKY, GREEN, ORANGE = "#0072b2", "#56b4e9", "#009e73", "#e69f00"
-VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#7a7a7a", COLORS["ink"]
+VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#6b6b6b", COLORS["ink"]
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
 OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": (0, (1, 1.2))}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.2))}

@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 import pandas as pd
@@ -18,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from coartic import CoarticError
 from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.figures.style import ONE
+from coartic.analysis.methods import EXPLORED, KNOWN_METHODS
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import IN_LATEX, classes_of, html_table, latex_table, table_csv
@@ -202,11 +202,16 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         suite=study.suite,
         home=home,
         stamp=stamp(study.runs),
-        folder=quote(str(study.folder)),
+        folder=study.folder_in_commands,
         version=made_with["coartic"],
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         limits=about.limits(study),
+        explored={
+            KNOWN_METHODS[each].name: words
+            for each, words in EXPLORED.items()
+            if (study.methods.base == each).any()
+        },
         failures=failures,
         links=dict(link.split(", ", 1) for link in links),
     )
