@@ -22,19 +22,6 @@ LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
 """Ids of the learner under EC1 (for one arm) to EC4, which explore more and more."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two."""
-EXPLORED = dict(
-    zip(
-        LEARNERS,
-        (
-            "its one arm",
-            "both arms, and the hand nearest to a goal",
-            "the moving arm, and any hand",
-            "both arms, and any hand",
-        ),
-        strict=True,
-    )
-)
-"""What the learner explores under each condition, in words, by id."""
 RANDOM_SEARCH = "random-search"
 """Id of random search: the best of random targets around postures of the corrective process."""
 

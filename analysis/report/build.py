@@ -17,7 +17,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from coartic import CoarticError
 from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.figures.style import ONE
-from coartic.analysis.methods import EXPLORED, KNOWN_METHODS
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import IN_LATEX, classes_of, html_table, latex_table, table_csv
@@ -207,11 +206,7 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         limits=about.limits(study),
-        explored={
-            KNOWN_METHODS[each].name: words
-            for each, words in EXPLORED.items()
-            if (study.methods.base == each).any()
-        },
+        conditions={*study.methods.condition},
         failures=failures,
         links=dict(link.split(", ", 1) for link in links),
     )

@@ -57,8 +57,10 @@ def _guarded(value: Any) -> Any:
 
 
 def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
-    """Return the headings of the columns that the page and LaTeX show, by name of the column: those
-    with a heading and with a value in some row. A task goes by its title, with † where it is reconstructed.
+    """Return the headings of the columns that the page and LaTeX show, by name of the column:
+    those with a heading and a value in some row.
+
+    A task goes by its title, with † where it is reconstructed.
     """
     headers, titles = {}, frame.attrs.get("titles", {})
     names = [name for name in frame.columns if not _is_end(table, frame, name)]

@@ -58,7 +58,7 @@ SECTIONS = (
 {{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
 if next.p_holm >= 0 else ", too few runs to test" }}.
 {%- endfor %}
-{%- for row in rows[rows.method.isin(papers) & (rows.method != best.method)].to_dict("records") %}
+{%- for row in rows[rows.method.isin(papers)].to_dict("records") if row.method != best.method %}
  {{ row.title }} leaves {{ interval(row, "gap", scale=100, unit=" %") }}.
 {%- endfor %}
 
@@ -146,7 +146,8 @@ Methods at shared goals by verdict: {{ every.verdict | counts }}.""",
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
 {{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
-{{ " of the reward targets between the corrective process alone and the " ~ reference if loop.first }}, {{ "never half" if \
+{{ " of the reward targets between the corrective process alone and the " ~ \
+reference if loop.first }}, {{ "never half" if \
 row.trials_to_half == infinite else "half of them after %s trials" % \
 interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them without a trial" }}\
 {{ "." if loop.last else "; " }}

@@ -228,9 +228,9 @@ def list_runtimes(study: Study) -> Rows:
 
 @figure(
     "What it costs to come near",
-    f"Share of {len(TARGETS)} reward targets reached within a budget. Targets are evenly spaced from "
-    "the corrective process alone, with its best hands, to the {reference}; a run counts for each "
-    "target that it has reached. Forward-kinematics evaluations are spread evenly over a run's "
+    f"Share of {len(TARGETS)} reward targets reached within a budget. Targets are evenly spaced "
+    "from the corrective process alone, with its best hands, to the {reference}; a run counts for "
+    "each target that it has reached. Forward-kinematics evaluations are spread evenly over a run's "
     f"trials. Bands: {style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
@@ -305,4 +305,4 @@ def draw_runtimes(study: Study) -> Parts | None:
         )  # fmt: skip
     shares = spoken(study, ends, "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
-    return drawing, data, alt, " Means over all tasks." * (tabled.tasks.max() > 1)
+    return drawing, data, alt, " Means over all tasks." * bool(tabled.tasks.max() > 1)

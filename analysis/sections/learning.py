@@ -52,7 +52,7 @@ def list_learning(study: Study) -> Rows:
 
 @figure(
     "Learning curves",
-    "Best reward so far (mean over runs; band: their quartiles). n = {n} runs of a method on a task.",
+    "Best reward so far (mean over runs; band: quartiles). n = {n} runs of a method on a task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
     """Draw :func:`learning_curves`, the best reward so far against the trial, a panel for each

@@ -142,4 +142,4 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     means = spoken(study, first, "{title}, {family}: {mean:.1%}")
     words = f" {means}." if means else ""
     alt = f"Gaps of instances by method and family.{words}"
-    return drawing, data, alt, " Gaps above 100 % stand at the right end." * (data.gap > 1).any()
+    return drawing, data, alt, " Gaps above 100 % stand at the right end." * any(data.gap > 1)

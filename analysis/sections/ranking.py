@@ -245,10 +245,10 @@ def _draw_varied(study: Study) -> Parts | None:
     drawing, (axes,) = style.panels((1, 1), (style.TWO, 2.6))
     if is_number and places[0] > 0 and places[-1] >= 5 * places[0]:
         axes.set_xscale("log")
-    values = [f"{value:g}" if is_number else str(value) for value in rows.value]
+    texts = [f"{value:g}" if is_number else str(value) for value in rows.value]
     papers = rows.is_learner & (rows.setting == "")
-    axes.set_xticks(places, [value + "\n(the paper's)" * paper
-                             for value, paper in zip(values, papers, strict=True)])  # fmt: skip
+    axes.set_xticks(places, [text + "\n(the paper's)" * paper
+                             for text, paper in zip(texts, papers, strict=True)])  # fmt: skip
     axes.set_xticks([], minor=True)
     mean: Any = {"color": style.BLUE, "marker": "o", "markersize": 5, "linewidth": 1.6}
     shown = rows.assign(place=places)

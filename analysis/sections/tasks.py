@@ -48,8 +48,8 @@ def list_tasks(study: Study) -> Rows:
 
 @figure(
     "Tasks",
-    "Start configuration and goals of each task. Open circles are the goals, drawn to scale and hit "
-    "in the order of their numbers.",
+    "Start configuration and goals of each task. Open circles are the goals, drawn to scale and "
+    "hit in the order of their numbers.",
 )
 def draw_tasks(study: Study) -> Parts | None:
     """Draw start configuration and goals of the tasks of a study, a panel each; None without
