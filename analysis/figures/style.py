@@ -14,6 +14,7 @@ from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib import rc_params_from_file, style
 from matplotlib.artist import Artist
@@ -137,9 +138,10 @@ def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any)
     more than two lines of entries the figure becomes taller."""
     widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
     while columns > 1:
-        lines = -(-len(handles) // columns)
-        by_column = [widths[at : at + lines] for at in range(0, len(widths), lines)]
-        if sum(map(max, by_column)) <= figure.get_figwidth():
+        if (
+            sum(max(each, default=0) for each in np.array_split(widths, columns))
+            <= figure.get_figwidth()
+        ):
             break
         columns -= 1
     lines = -(-len(handles) // columns)

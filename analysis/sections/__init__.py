@@ -146,7 +146,7 @@ Methods at shared goals by verdict: {{ every.verdict | counts }}.""",
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
 {{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
-{{ " of the reward targets between the corrective process alone and the " ~ \
+{{ " of the reward targets from the corrective process alone to the " ~ \
 reference if loop.first }}, {{ "never half" if \
 row.trials_to_half == infinite else "half of them after %s trials" % \
 interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them without a trial" }}\

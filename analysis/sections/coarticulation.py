@@ -303,8 +303,8 @@ def draw_postures(study: Study) -> Parts | None:
     parts, differences = [], []
     for axes, each in zip(panels, contexts, strict=True):
         title = study.methods.title[each.method]
-        if len(contexts) > 1:
-            axes.set_title(f"{title}: difference {number(each.posture_difference, 2)}")
+        difference = number(each.posture_difference, 2)
+        axes.set_title(f"{name_in_figure(study, each.method)}: difference {difference}")
         parts += _draw_contexts(axes, each)
         differences.append(f"{title} {each.posture_difference:.2f}")
     hands = [shared.tasks[0].robot.forward_kinematics(runs.mean(axis=0), shared.hand)

@@ -230,7 +230,7 @@ def list_runtimes(study: Study) -> Rows:
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget. Targets are evenly spaced "
     "from the corrective process alone, with its best hands, to the {reference}; a run counts for "
-    "each target that it has reached. Forward-kinematics evaluations are spread evenly over a run's "
+    "each target that it reached. Forward-kinematics evaluations are spread evenly over a run's "
     f"trials. Bands: {style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
