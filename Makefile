@@ -70,7 +70,7 @@ shipped: $(READY)
 findings: $(READY)
 	@for suite in $(STORED); do \
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
-	  $(BIN)/coartic report $(OUT)/$$suite --for-paper || exit; \
+	  $(BIN)/coartic report $(OUT)/$$suite --for-paper --width 3.5 || exit; \
 	done
 	$(BIN)/python studies/replication/study.py $(STORED:%=$(OUT)/%)
 	$(BIN)/python docs/make_findings.py --from $(OUT)

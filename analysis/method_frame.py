@@ -71,7 +71,8 @@ def methods_of(
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
         named = setting
         if label in values:
-            named = in_words({varied: values[label]}) + ", default" * (not setting)
+            which = ", the paper's" if base in LEARNERS else ", default"
+            named = in_words({varied: values[label]}) + which * (not setting)
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""

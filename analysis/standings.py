@@ -19,12 +19,13 @@ from coartic.runs.plan import trials_in
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return a name for the best known rewards of these tasks: ``optimum`` if all are proven, or
-    without tasks, else ``best known``. Unproven rewards of methods of this folder alone do not
-    count there, and add ``or best of this folder``; if all are such, the name is ``best of this
+    without tasks, else ``best known reward``. Unproven rewards of methods of this folder alone do
+    not count there, and add ``or best of this folder``; if all are such, the name is ``best of this
     folder``. Raises KeyError for a task without a best known reward."""
     best = [study.optima[task] for task in tasks]
     others = [each.proven for each in best if each.proven or not each.only_here]
-    names = ["optimum" if all(others) else "best known"] if others or not best else []
+    known = "optimum" if all(others) else "best known reward"
+    names = [known] if others or not best else []
     if len(others) < len(best):
         names.append("best of this folder")
     return " or ".join(names)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from pathlib import Path
+from shlex import quote
 from typing import Any, Concatenate, Literal
 
 import numpy as np
@@ -228,6 +229,13 @@ class Study:
     def suite(self) -> str:
         """Name of the suite that was run."""
         return self.plan[0].suite
+
+    @property
+    def folder_in_commands(self) -> str:
+        """The folder for commands on a page that others read, quoted for a shell: its name alone if
+        it lies outside the working folder."""
+        path = self.folder.absolute()
+        return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
 
     @property
     def question(self) -> tuple[str, str]:

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from coartic import CoarticError, load_task
@@ -17,7 +18,7 @@ from coartic.analysis.methods import COLORS, KNOWN_METHODS, title_of
 from coartic.analysis.report.about import finding
 from coartic.analysis.sections import FIGURES, SECTIONS
 from coartic.pictures import drawing
-from tests.support.figures import misplaced
+from tests.support.figures import misplaced, texts_of
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, ROOT
 
@@ -63,10 +64,29 @@ def test_no_text_leaves_a_figure_of_any_width_or_lies_on_another(name, shipped):
         if plot is None and name == "gaps-by-family":
             pytest.skip("the shipped results have no such figure")
         assert misplaced(plot.figure) == ([], []), width
+        light = [lightness(to_hex(text.get_color()), np.eye(3)) for text in texts_of(plot.figure)]
+        assert max(light) < 49.9  # a contrast of 4.5 : 1 with white
+        assert ("†" in plot.caption) == any(
+            "†" in each.get_text() for each in texts_of(plot.figure)
+        )
         assert (plot.figure.get_figwidth() == width) == bool(width)
         assert width is None or plot.figure.get_figheight() < 4.01
         assert plot.id == name
         assert all(map(len, (plot.alt, plot.caption, plot.data)))
+
+
+@pytest.mark.parametrize(
+    ("method", "task", "named"),
+    [
+        ("dual-process/EC1", "ascending", ["learner (diamonds)"]),
+        ("mine", "ascending", ["methods from files"]),
+        ("cma-es/bandit", "two-armed-1", ["†"]),
+    ],
+)
+def test_a_caption_names_what_its_figure_shows(method, task, named):
+    caption = FIGURES["ranking"](study_of([row(method, -500, task=task)])).caption
+    absent = "learner (diamonds)", "methods from files", "all tasks", "†"
+    assert [words for words in absent if words in caption] == named
 
 
 def test_a_figure_has_chosen_methods_tasks_and_style(shipped, tmp_path):

@@ -96,10 +96,13 @@ def test_a_method_that_failed_on_an_instance_has_no_gap_in_its_family():
 @pytest.mark.parametrize(
     ("names", "to"),
     [
-        (["many-goals/v1/i000"], "best known"),
+        (["many-goals/v1/i000"], "best known reward"),
         (["two-armed/v1/2030-000"], "best of this folder"),
         (["ascending", "two-armed/v1/2030-000"], "optimum or best of this folder"),
-        (["many-goals/v1/i000", "two-armed/v1/2030-000"], "best known or best of this folder"),
+        (
+            ["many-goals/v1/i000", "two-armed/v1/2030-000"],
+            "best known reward or best of this folder",
+        ),
     ],
 )
 def test_what_only_a_folder_says_is_not_called_known(names, to):

@@ -196,21 +196,27 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     rows = [re.match(name, line) for line in lines[heading + 2 :]]
     assert [float(row[1]) for row in rows[:3]] == means.sort_values().index.tolist()
     answer = " ".join(" ".join(lines).partition("Answer ")[2].split())
-    default = {0.05: ", default"}
+    papers = {0.05: ", the paper's"}
     begin = (
-        f"learner EC1 (σ {best}{default.get(best, '')}) comes nearest to the optimum: its gap is "
+        f"learner EC1 (σ {best}{papers.get(best, '')}) comes nearest to the optimum: its gap is "
         f"{100 * means[best]:.1f} %"
     )
     assert answer.startswith(begin)
     difference = 100 * (means[other] - means[best])
-    behind = f"Next is learner EC1 (σ {other}{default.get(other, '')}), {difference:.1f} ["
+    behind = f"Next is learner EC1 (σ {other}{papers.get(other, '')}), {difference:.1f} ["
     assert behind in answer
     plot = FIGURES["ranking"](seen)
     assert plot.data.set_index("value").gap.to_dict() == pytest.approx(means.to_dict())
+    marked = [label.get_text() for label in plot.figure.axes[0].get_xticklabels()]
+    assert marked == ["0.02", "0.05\n(the paper's)", "0.1"]
+    leaves = f"learner EC1 (σ 0.05, the paper's) leaves {100 * means[0.05]:.1f} %"
+    assert (leaves in answer) == (best != 0.05)
     write_report(seen, tmp_path / "report", for_paper=False)
     written = (tmp_path / "report" / "report.html").read_text("utf-8")
     assert "<h1>Noise</h1>\n<p>How much exploration noise?</p>" in written
-    assert 'class="setting"' not in written
+    assert not [
+        part for part in ('class="setting"', "after_1000", str(tmp_path)) if part in written
+    ]
     assert load(out).question == ("Noise", "How much exploration noise?")
     suite.write_text(text.replace("0.1]", "0.1], epsilon = [0.0, 0.5]").replace("5000", "2"))
     assert coartic("run", suite, "--out", tmp_path / "two", "--runs", "1")[0] == 0

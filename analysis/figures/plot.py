@@ -18,8 +18,8 @@ from matplotlib import rc_context
 from matplotlib import style as styles
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
-from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.methods import COLORS, MARKS
@@ -64,8 +64,9 @@ class Plot:
         return f"<figure>{for_page(self)}<figcaption>{words}</figcaption></figure>"
 
 
-Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
-"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and its tasks."""
+Parts = tuple[Figure, pd.DataFrame, str, str]
+"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and the end of its
+caption, sentences on what only some of these figures show."""
 DrawsFigure = Callable[..., Plot | None]
 """A figure of the report, as a function of a study; None if the folder has no runs for it.
 
@@ -79,8 +80,8 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
     """Return a decorator that turns a drawing function of a study into a figure of the report.
 
     The figure is in the style of all figures; its id is the function's name without ``draw_``, with
-    dashes for underscores. The caption gets an explanation of the dagger if one of the tasks that
-    the function returns is reconstructed; ``{n}`` in it is the range of column ``runs`` of the
+    dashes for underscores. The caption gets the sentences that the function returns, and an
+    explanation of the dagger if one is drawn; ``{n}`` in it is the range of column ``runs`` of the
     drawn numbers, empty without this column, ``{reference}`` the name of the rewards to which gaps
     are taken.
     """
@@ -102,14 +103,13 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
             with styles.context(["default", RC, *([style] if style else [])]), drawn_at(width):
                 if (parts := draw(study)) is None:
                     return None
-                drawing, data, alt, shown = parts
-            dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in shown) else ""
+                drawing, data, alt, more = parts
+            has_dagger = any("†" in text.get_text() for text in drawing.findobj(Text))
+            words = f"{caption}{more}{f' {RECONSTRUCTED}' * has_dagger}"
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
             to = reference(study, study.optima)
             n = " to ".join(dict.fromkeys(map(number, ends)))
-            return Plot(
-                id_of(draw), title, caption.format(n=n, reference=to) + dagger, alt, drawing, data
-            )
+            return Plot(id_of(draw), title, words.format(n=n, reference=to), alt, drawing, data)
 
         return plot
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib import rc_params_from_file, style
 from matplotlib.artist import Artist
@@ -46,7 +47,7 @@ BACKGROUND = "#ffffff"
 TIP = "tip:"
 """Beginning of the id of a mark with a :func:`tip`."""
 BLUE, SKY, GREEN, ORANGE = "#0072b2", "#56b4e9", "#009e73", "#e69f00"
-VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#7a7a7a", COLORS["ink"]
+VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#6b6b6b", COLORS["ink"]
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
 OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": (0, (1, 1.2))}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.2))}
@@ -137,9 +138,10 @@ def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any)
     more than two lines of entries the figure becomes taller."""
     widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
     while columns > 1:
-        lines = -(-len(handles) // columns)
-        by_column = [widths[at : at + lines] for at in range(0, len(widths), lines)]
-        if sum(map(max, by_column)) <= figure.get_figwidth():
+        if (
+            sum(max(each, default=0) for each in np.array_split(widths, columns))
+            <= figure.get_figwidth()
+        ):
             break
         columns -= 1
     lines = -(-len(handles) // columns)

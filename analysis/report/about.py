@@ -35,7 +35,6 @@ from coartic.analysis.words import (
     marked,
     number,
     p_value,
-    tally,
 )
 from coartic.errors import CoarticError
 from coartic.estimates import LEVEL
@@ -87,7 +86,7 @@ def finding(study: Study, section: Section) -> list[str]:
         for each in (table(study) for table in section.tables)
     )
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "counts": lambda each: tally(Counter(each))}
+    environment.filters |= {"number": number, "counts": _counts}
     standings, asked = without_settings(board(study)), trials_of(study)
     below = standings.index[~standings.ranked.astype(bool)]
     is_unequal = [asked[label] != equal_trials(study) for label in standings.index]
@@ -100,10 +99,16 @@ def finding(study: Study, section: Section) -> list[str]:
         "uses": GROUPS, "first": next(iter(standings.index), ""), "titles": frame.attrs["titles"],
         "reference": reference(study, common_tasks(study)),
         "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
+        "papers": study.methods.index[study.methods.is_learner & (study.methods.setting == "")],
         "rivals": "other" if study.against else "built-in",
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
     return [shown(line.strip()) for line in text.split("\n") if line.strip()]
+
+
+def _counts(values: pd.Series) -> str:
+    """Write how often each value occurs, the commonest first: ``14 × a and 6 × b``."""
+    return listed(f"{count} × {value}" for value, count in Counter(values).most_common())
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:

@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 import pandas as pd
@@ -202,11 +201,12 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         suite=study.suite,
         home=home,
         stamp=stamp(study.runs),
-        folder=quote(str(study.folder)),
+        folder=study.folder_in_commands,
         version=made_with["coartic"],
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         limits=about.limits(study),
+        conditions={*study.methods.condition},
         failures=failures,
         links=dict(link.split(", ", 1) for link in links),
     )

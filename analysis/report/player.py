@@ -7,7 +7,6 @@ solves the changed task.
 from __future__ import annotations
 
 import math
-from shlex import quote
 from typing import Any
 
 from coartic.analysis.control import contexts_of_control
@@ -60,7 +59,7 @@ def player(study: Study) -> str:
     return player_figure(
         presets,
         page=None,
-        folder=quote(str(study.folder)),
+        folder=study.folder_in_commands,
         first=next(own, {"who": first if first in ids[0] else ids[0][0]}),
         cells=[
             (method, f"on {task}", {"preset": where[task], "who": label})

@@ -57,7 +57,8 @@ def _guarded(value: Any) -> Any:
 
 
 def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
-    """Return the headings of the columns that the page and LaTeX show, by name of the column.
+    """Return the headings of the columns that the page and LaTeX show, by name of the column:
+    those with a heading and a value in some row.
 
     A task goes by its title, with † where it is reconstructed.
     """
@@ -65,7 +66,7 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
     names = [name for name in frame.columns if not _is_end(table, frame, name)]
     for name in names:
         column = table.column(name)
-        if not column.header:
+        if not column.header or not (frame[name].notna() & (frame[name] != "")).any():
             continue
         what = name.removeprefix(column.name)
         header = column.header.replace("{}", titles.get(what, what))

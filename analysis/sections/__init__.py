@@ -58,6 +58,9 @@ SECTIONS = (
 {{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
 if next.p_holm >= 0 else ", too few runs to test" }}.
 {%- endfor %}
+{%- for row in rows[rows.method.isin(papers)].to_dict("records") if row.method != best.method %}
+ {{ row.title }} leaves {{ interval(row, "gap", scale=100, unit=" %") }}.
+{%- endfor %}
 
 {% endfor %}
 {% else %}
@@ -121,7 +124,7 @@ posture difference {{ row.distance | number(2) }} (length units and rad; {{ row.
 {{ "; random search: %s" % number(row.control, 2) if row.control >= 0 }}\
 {{ " (%s)" % p_value(row.p_random_search) if row.p_random_search >= 0 }}.
 {% endfor %}
-Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
+Methods at shared goals by verdict: {{ every.verdict | counts }}.""",
         note="Postures are compared in length units and rad. Ticks are compared with those of the "
         "corrective process with the same hands. A first movement that gets slower while the whole "
         "task gets faster is sacrificed for it. Idle hand nearer: share of the path to its next "
@@ -143,7 +146,8 @@ Methods and shared goals by verdict: {{ every.verdict | counts }}.""",
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
 {{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
-{{ " of the reward targets" if loop.first }}, {{ "never half" if \
+{{ " of the reward targets from the corrective process alone to the " ~ \
+reference if loop.first }}, {{ "never half" if \
 row.trials_to_half == infinite else "half of them after %s trials" % \
 interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them without a trial" }}\
 {{ "." if loop.last else "; " }}

@@ -231,8 +231,8 @@ def list_saved(study: Study) -> Rows:
     "Ticks saved, goal by goal",
     "Ticks that a movement takes more (up) or less (down) than that of the corrective process "
     "alone with the same hands: what is paid at one goal is saved at later ones. Means over runs. "
-    "Shown are the paper's learner, random search, the methods nearest to the {reference} by "
-    "trials and by formula, and methods from files. n = {n} runs.",
+    "Shown are the methods nearest to the {reference}, and those to compare them with. "
+    "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
     """Draw for each task a row for each of some methods (the learner, random search, the best by
@@ -282,14 +282,13 @@ def draw_saved(study: Study) -> Parts | None:
     data = pd.concat(parts, ignore_index=True).drop(columns=["run_ids", "gap", "use"])
     words = spoken(study, data, "{task}, {title}: {by_goal_1:+.0f}")
     alt = f"Ticks more or less than by the corrective process, at goal 1: {words}."
-    return drawing, data, alt, study.tasks.values()
+    return drawing, data, alt, ""
 
 
 @figure(
     "One goal, two postures",
-    "Postures of one method's runs when they hit a goal that two tasks share, and of all runs of "
-    "random search with as many trials. Thick: mean posture; thin: every run. Dashed arrows lead "
-    "to the next goal. The bar is one length unit.",
+    "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
+    "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
     """Draw the postures of the method of :func:`shared_goal` at a goal before two different next
@@ -304,8 +303,8 @@ def draw_postures(study: Study) -> Parts | None:
     parts, differences = [], []
     for axes, each in zip(panels, contexts, strict=True):
         title = study.methods.title[each.method]
-        if len(contexts) > 1:
-            axes.set_title(f"{title}: difference {number(each.posture_difference, 2)}")
+        difference = number(each.posture_difference, 2)
+        axes.set_title(f"{name_in_figure(study, each.method)}: difference {difference}")
         parts += _draw_contexts(axes, each)
         differences.append(f"{title} {each.posture_difference:.2f}")
     hands = [shared.tasks[0].robot.forward_kinematics(runs.mean(axis=0), shared.hand)
@@ -316,7 +315,10 @@ def draw_postures(study: Study) -> Parts | None:
         f"Posture difference: {'; '.join(differences)}. The distance of the hands is "
         f"{np.linalg.norm(hands[0] - hands[1]):.2f}."
     )
-    return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
+    compared = " Compared with all runs of random search with as many trials." * (
+        chance is not None
+    )
+    return drawing, pd.concat(parts, ignore_index=True), alt, compared
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
@@ -350,12 +352,12 @@ def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
         arrow = {"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4, "linewidth": 0.8}
         axes.annotate("", following, at, zorder=2, arrowprops={**arrow, "linestyle": (0, (3, 2))})
         axes.add_artist(Circle(following, radius, fill=False, edgecolor=color))
-        then = f"then goal {shared.goal + 1}\n({task.label})"
+        then = f"then goal {shared.goal + 1}\n({marked(task)})"
         axes.annotate(then, following, (5, 0), va="center", ha="left", **words)
         # The base's name stands on the side of the next goal.
         x, y = outlines[place].T
         end, off, side = (y.max(), 3, "bottom") if following[1] >= at[1] else (y.min(), -3, "top")
-        name = f"base,\n{task.label}"
+        name = f"base,\n{marked(task)}"
         axes.annotate(name, (x.mean(), end), (0, off), ha="center", va=side, **words)
         angles = dict(zip(robot.joint_names, runs.T, strict=True))
         named = {"task": task.name, "method": shared.method, "goal": shared.goal}

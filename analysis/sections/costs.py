@@ -228,12 +228,10 @@ def list_runtimes(study: Study) -> Rows:
 
 @figure(
     "What it costs to come near",
-    f"Share of {len(TARGETS)} reward targets reached within a budget (mean over all "
-    "tasks where there are several). Targets are evenly spaced from the corrective process alone, "
-    "with its best hands, to the {reference}; a run counts for each target that it has reached. a: "
-    "trials, for methods that make trials. b: forward-kinematics evaluations, spread evenly over a "
-    "run's trials. Bands: "
-    f"{style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
+    f"Share of {len(TARGETS)} reward targets reached within a budget. Targets are evenly spaced "
+    "from the corrective process alone, with its best hands, to the {reference}; a run counts for "
+    "each target that it reached. Forward-kinematics evaluations are spread evenly over a run's "
+    f"trials. Bands: {style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of targets that methods reach within a number of trials, and of
@@ -297,12 +295,14 @@ def draw_runtimes(study: Study) -> Parts | None:
     height = -math.inf
     for end in ends.to_dict("records"):
         height = max(end["share"], height + (9 if style.is_narrow() else 6.5))
+        at, look = panels[-1].get_yaxis_transform(), looks[end["method"]]
+        mark: Any = {"color": look["color"], "markersize": 4, "markeredgewidth": 0}
+        panels[-1].plot(1.03, height, look["marker"], transform=at, clip_on=False, **mark)
         panels[-1].annotate(
-            name_in_figure(study, end["method"]), (1, height), (4, 0), va="center",
-            color=looks[end["method"]]["color"], xycoords=panels[-1].get_yaxis_transform(),
-            textcoords="offset points", annotation_clip=False,
+            name_in_figure(study, end["method"]), (1.03, height), (5, 0), va="center",
+            xycoords=at, textcoords="offset points", annotation_clip=False,
             weight="normal" if study.methods.built_in[end["method"]] else "bold",
         )  # fmt: skip
     shares = spoken(study, ends, "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
-    return drawing, data, alt, study.tasks.values()
+    return drawing, data, alt, " Means over all tasks." * bool(tabled.tasks.max() > 1)

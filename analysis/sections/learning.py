@@ -52,9 +52,7 @@ def list_learning(study: Study) -> Rows:
 
 @figure(
     "Learning curves",
-    "Best reward so far (mean over runs; band: their quartiles). Grey lines: corrective process "
-    "alone, best hands (dash-dotted); {reference} (dotted). n = {n} runs of a "
-    "method on a task.",
+    "Best reward so far (mean over runs; band: quartiles). n = {n} runs of a method on a task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
     """Draw :func:`learning_curves`, the best reward so far against the trial, a panel for each
@@ -105,7 +103,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(study, ends, "{task}, {title}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."
-    return drawing, data, alt, tasks
+    return drawing, data, alt, ""
 
 
 def learning_curves(study: Study) -> pd.DataFrame:

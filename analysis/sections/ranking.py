@@ -36,7 +36,7 @@ from coartic.analysis.statistics.hypotheses import (
 )
 from coartic.analysis.study import Study, one_by_one, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
-from coartic.analysis.words import capital, interval, marked, number
+from coartic.analysis.words import capital, interval, listed, marked, number
 from coartic.estimates import FEWER_RESAMPLES, LEVEL, Estimate, mean_of_means
 from coartic.internal.text import counted
 from coartic.robot import Array
@@ -229,8 +229,7 @@ def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
     "Gap by value of a parameter",
     "Gap from the mean reward to the {reference}, as a share of it, with its "
     f"{style.COVERAGE} bootstrap interval over runs, by the value of the only parameter that is "
-    "varied; a mean over all tasks where there are several, then also the gap on each (thin). "
-    "n = {n} runs of a value.",
+    "varied. n = {n} runs of a value.",
 )
 def _draw_varied(study: Study) -> Parts | None:
     """Draw gaps against the values of the only parameter that is varied; None with fewer than two
@@ -246,13 +245,17 @@ def _draw_varied(study: Study) -> Parts | None:
     drawing, (axes,) = style.panels((1, 1), (style.TWO, 2.6))
     if is_number and places[0] > 0 and places[-1] >= 5 * places[0]:
         axes.set_xscale("log")
-    axes.set_xticks(places, [f"{value:g}" if is_number else str(value) for value in rows.value])
+    texts = [f"{value:g}" if is_number else str(value) for value in rows.value]
+    papers = rows.is_learner & (rows.setting == "")
+    axes.set_xticks(places, [text + "\n(the paper's)" * paper
+                             for text, paper in zip(texts, papers, strict=True)])  # fmt: skip
     axes.set_xticks([], minor=True)
     mean: Any = {"color": style.BLUE, "marker": "o", "markersize": 5, "linewidth": 1.6}
     shown = rows.assign(place=places)
     tasks = common_tasks(study)
     on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
-    for task in tasks if 1 < len(tasks) <= 8 else ():
+    each_task = tasks if 1 < len(tasks) <= 8 else ()
+    for task in each_task:
         gaps = [100 * each[task] for each in on]
         axes.plot(places, gaps, color=style.GREY, linewidth=0.8)
         at: Any = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
@@ -265,16 +268,14 @@ def _draw_varied(study: Study) -> Parts | None:
     words = (f"{row['value']}: {interval(row, 'gap', scale=100, unit=' %')}"
              for row in rows.to_dict("records"))  # fmt: skip
     alt = f"Gap to the {reference(study, tasks)} by {name}: {'; '.join(words)}."
-    return drawing, shown, alt, study.tasks.values()
+    thin = "; thin: the gap on each" * bool(each_task)
+    return drawing, shown, alt, f" Means over all tasks{thin}." * (len(tasks) > 1)
 
 
 @figure(
     "Gap to the best reward",
     "Gap from the mean reward to the {reference}, as a share of it, with its "
-    f"{style.COVERAGE} bootstrap interval over runs. Means over all tasks where there are several. "
-    "The axis is logarithmic from 0.1 % on. Bars: intervals; methods that are run once "
-    "have none. n: runs. Diamonds: the paper's learner. Bold names: the learner and methods from "
-    "files, whose marks are larger.",
+    f"{style.COVERAGE} bootstrap interval over runs. The axis is logarithmic from 0.1 % on.",
 )
 def _draw_gaps(study: Study) -> Parts | None:
     """Draw the gap of each method of :func:`.board`, a mean over tasks, with interval and name,
@@ -317,7 +318,7 @@ def _draw_gaps(study: Study) -> Parts | None:
         axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **places)
 
     if not narrow:
-        write_right(1, f"gap (%) [{style.COVERAGE}]", "n", style.GREY)
+        write_right(1, f"gap (%) [{style.COVERAGE}]", "runs", style.GREY)
     for place, (row, label) in enumerate(zip(lines, axes.get_yticklabels(), strict=True)):
         if isinstance(row, str):
             label.set_color(style.GREY)
@@ -337,7 +338,11 @@ def _draw_gaps(study: Study) -> Parts | None:
             write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)
-    where = "" if len(tasks) > 1 else study.tasks[tasks[0]].label + (":\n" if narrow else ": ")
+    where = "" if len(tasks) > 1 else marked(study.tasks[tasks[0]]) + (":\n" if narrow else ": ")
     axes.set_xlabel(f"{where}gap to the {to} (%)")
     alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
-    return drawing, rows, alt, study.tasks.values()
+    bold = ["the paper's learner (diamonds)"] * any(rows.is_learner)
+    bold += ["methods from files (larger marks)"] * (not all(rows.built_in))
+    more = " Means over all tasks." * (len(tasks) > 1)
+    more += " Methods that are run once have no interval." * (not all(rows.stochastic))
+    return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")

@@ -18,6 +18,7 @@ from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.words import marked, titled_apart
 from coartic.motion.solution import initial_reward
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
+from coartic.tasks.task import shipped_tasks
 
 
 @table(
@@ -47,9 +48,8 @@ def list_tasks(study: Study) -> Rows:
 
 @figure(
     "Tasks",
-    "Start configuration and goals of each task. Open squares on grey mark the left arm, closed "
-    "circles the right arm. Open circles are the goals, drawn to scale and hit in the order of "
-    "their numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
+    "Start configuration and goals of each task. Open circles are the goals, drawn to scale and "
+    "hit in the order of their numbers.",
 )
 def draw_tasks(study: Study) -> Parts | None:
     """Draw start configuration and goals of the tasks of a study, a panel each; None without
@@ -67,7 +67,9 @@ def draw_tasks(study: Study) -> Parts | None:
         ]
     names = ", ".join(task.name for task in shown)
     alt = f"The robot in its start configuration with the goals of the tasks {names}."
-    return picture_of_tasks(shown), pd.DataFrame(rows), alt, ()
+    are_papers = {task.name for task in shown} <= shipped_tasks().keys()
+    source = " After Figure 4 of Shah, Barto & Fagg (2013)." * are_papers
+    return picture_of_tasks(shown), pd.DataFrame(rows), alt, source
 
 
 @style.styled
