@@ -387,7 +387,7 @@ USUAL = {
     "differences": [1.0, 2.0], "total": 5, "share": 0.5, "folder": "nowhere", "tables": {},
     "draw": lambda results: Figure(), "template": "nowhere.jinja", "ticks_per_unit": 1.0,
     "difference": np.ones(10), "jacobian": ROBOT.jacobian(TASK.q0, "right"),
-    "rewards": [-300.0, None],
+    "rewards": [-300.0, None], "locked_base": ["y"],
 }  # fmt: skip
 """Arguments by the names of parameters, for all functions that take no others of these names."""
 
