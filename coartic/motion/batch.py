@@ -88,7 +88,7 @@ def robot_parameters(
     that the corrective process leaves. ``checks`` says whether an arm without a target may be in
     its goal already. Raises ValueError for a lock other than "x" and "y".
     """
-    if not all(isinstance(lock, str) and lock in ("x", "y") for lock in locked_base):
+    if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     parameters = np.zeros(1, _parameters_type(_links_for(robot)))
     for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
