@@ -9,6 +9,7 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence, Set
 from contextlib import suppress
 from typing import Any
@@ -51,17 +52,20 @@ def checked(
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
     """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
-    missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` has
-    to agree: a run has a reward if it is ``ok``.
+    missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` is
+    kept and has to agree: a run has a reward if it is ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
     that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
-    that is missing or a list, and for ``numbers`` that are text or infinite.
+    that is missing, a value of ``names`` or ``others`` that is a list, and for ``numbers`` that are
+    text, infinite or too large for a float.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
-    wanted = [*dict.fromkeys((*names, *others, *numbers))]
-    if missing := [name for name in wanted if name not in frame.columns]:
+    there = {*frame.columns}  # of a MultiIndex tuples
+    status = ["status"] if "reward" in numbers and "status" in there else []
+    wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
+    if missing := [name for name in wanted if name not in there]:
         raise CoarticError(f"the frame has no column {', '.join(map(inline, missing))}")
     if several := [name for name in wanted if [*frame.columns].count(name) > 1]:
         raise CoarticError(
@@ -74,6 +78,7 @@ def checked(
     not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
     for name in names:
         _refuse_rows(columns, name, columns[name].isna(), not_na)
+    for name in (*names, *others):
         is_list = ~columns[name].map(is_hashable).astype(bool)
         _refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
     for name in numbers:
@@ -81,13 +86,15 @@ def checked(
         if kind not in ("integer", "floating", "mixed-integer-float", "empty"):
             is_number = columns[name].map(lambda value: isinstance(value, (int, float)))
             _refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
-        columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
+        try:
+            columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
+        except OverflowError:
+            raise CoarticError(f"column {inline(name)} has a number beyond 1e308") from None
         _refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
-    if "reward" in numbers and "status" in frame.columns:
-        is_ok = (frame.status.astype(object) == "ok").to_numpy(bool)
-        stated = columns.assign(status=frame.status)
+    if status:
+        is_ok = columns.status.astype(object) == "ok"
         rule = "a run has a reward if its status is ok, and NaN otherwise"
-        _refuse_rows(stated, "status", is_ok != columns.reward.notna(), rule)
+        _refuse_rows(columns, "status", is_ok != columns.reward.notna(), rule)
     return columns
 
 
@@ -100,15 +107,12 @@ def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
     """Return a list of the names of columns that an argument has; a text is one name.
 
     Raises CoarticError, with ``what`` as the name of the argument, for an argument that is no list
-    of columns, or names a column twice.
+    of columns.
     """
     if isinstance(names, str):
         return [names]
-    if not isinstance(names, Iterable):
+    if not isinstance(names, Iterable) or not all(map(is_hashable, listed := list(names))):
         raise CoarticError(f"{what} is {brief_value(names)}: needed are names of columns")
-    listed = list(names)
-    if len(set(map(str, listed))) < len(listed):
-        raise CoarticError(f"{what} is {brief_value(names)}: it names a column twice")
     return listed
 
 
@@ -274,7 +278,7 @@ def means(
     ------
     CoarticError
         The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``;
-        ``by`` is empty or has a column that is in ``columns``, too.
+        ``by`` is empty; or the table would have a column twice.
 
     Examples
     --------
@@ -287,8 +291,11 @@ def means(
     by, columns = _names_given("by", by), _names_given("columns", columns)
     if not by:
         raise CoarticError("by is empty: needed are names of columns")
-    if both := [name for name in columns if name in by]:
-        raise CoarticError(f"column {inline(both[0])} is in by and in columns: needed is one")
+    ends = [end for name in columns for end in (name, f"{name}_low", f"{name}_high")]
+    made = [*by, "rows", *ends]
+    if twice := [name for name, count in Counter(made).items() if count > 1]:
+        wrong = f"the table would have two columns {inline(twice[0])}"
+        raise CoarticError(f"{wrong}: name it once, or give it another name in the frame")
     values, rows = checked(frame, numbers=columns, others=by), []
     for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
@@ -296,8 +303,7 @@ def means(
             there = group[name].dropna().to_numpy(dtype=np.float64)
             row |= mean(there).columns(name) if len(there) else {}
         rows.append(row)
-    ends = [f"{name}{end}" for name in columns for end in ("", "_low", "_high")]
-    return pd.DataFrame(rows, columns=[*by, "rows", *ends])
+    return pd.DataFrame(rows, columns=made)
 
 
 def by_task(frame: pd.DataFrame) -> pd.DataFrame:

@@ -124,7 +124,7 @@ def mean_beyond(
     Raises
     ------
     CoarticError
-        For another side, and for a sentence that has not one ``{}``.
+        For another side or shape, and for a sentence that has not one ``{}``.
 
     Examples
     --------
@@ -135,6 +135,8 @@ def mean_beyond(
     if sentence.count("{}") != 1:
         raise CoarticError(f"the sentence {brief_value(sentence)} needs one {{}}, for the mean")
     there = np.asarray(values)
+    if there.ndim != 1:
+        raise CoarticError(f"values have shape {there.shape}; needed is a value for each task")
     there = there[~np.isnan(there)]
     if len(there) < FEWEST:
         return Finding(None, f"fewer than {FEWEST} random tasks can be judged")

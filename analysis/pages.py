@@ -110,8 +110,8 @@ def fill_page(template: str | Path, **values: Any) -> str:
         There is no such template.
     ValueError
         A sentence that the template expects of the results does not hold.
-    jinja2.UndefinedError
-        The template uses an unknown name.
+    jinja2.TemplateError
+        The template is wrong, or uses an unknown name.
     """
     import jinja2
 

@@ -125,7 +125,7 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     names = column, f"{column}_low", f"{column}_high"
     try:
         value, low, high = (scale * float(row[name]) for name in names)
-    except (KeyError, IndexError, TypeError):
+    except (KeyError, IndexError, TypeError, ValueError, OverflowError):
         raise CoarticError(f"the row has no numbers {', '.join(names)}") from None
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 

@@ -153,8 +153,11 @@ def _distributions() -> dict[str, list[str]]:
 def _imports(path: str) -> Iterator[str]:
     """Yield the full name of each module or attribute that a Python file imports anywhere, such as
     ``numpy.linalg``, and of each attribute of ``coartic`` that the file uses, such as
-    ``coartic.learn``. Relative imports are left out."""
-    tree = ast.parse(Path(path).read_bytes())
+    ``coartic.learn``. Relative imports are left out; nothing of a file that cannot be read."""
+    try:
+        tree = ast.parse(Path(path).read_bytes())
+    except (OSError, SyntaxError):  # it was removed or changed since it was imported
+        return
     names = {"coartic"}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

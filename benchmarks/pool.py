@@ -323,7 +323,8 @@ class Worker:
         if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME):
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
-            return fail(job, "crashed", "its answer could not be written: its folder was removed")
+            why = "a method removes its folder or limits the size of files"
+            return fail(job, "crashed", f"its answer could not be written, as where {why}")
         return fail(job, "crashed", f"the worker process ended {self.last_output}")
 
     def end(self) -> None:

@@ -227,8 +227,8 @@ def perform(
     Raises
     ------
     CoarticError
-        The folder holds something else or cannot be written, another process writes into it, or
-        a method with missing runs has no code here.
+        The plan has no jobs, the folder holds something else or cannot be written, another process
+        writes into it, or a method with missing runs has no code here.
     """
     folder, clock = folder_named(folder), time.perf_counter()
     watches = [watch] if watch else []
@@ -245,6 +245,8 @@ def perform(
     if not isinstance(executor, Local | Dask):
         known = " or ".join(_EXECUTORS.values())
         raise CoarticError(f"executor is {brief_value(executor)}; it must be {known}")
+    if not isinstance(plan, Sequence) or {*map(type, plan)} != {Job}:
+        raise CoarticError(f"plan is {brief_value(plan)}; it must be a list of jobs of plan_suite")
     with writing(folder) as store:
         store.replace_plan(plan, made_with())
         progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())

@@ -131,8 +131,8 @@ _TAKEN_BY = {
 def kind_of(name: str) -> str:
     """Return the kind of the thing that is named: ``suite`` or ``shipped family`` for the name of a
     shipped one; ``method file`` for a name that ends in ``.py``; ``suite``, ``family`` or ``task``
-    for a file ``.toml``, by its keys; ``results folder``; or an empty text for anything else.
-    Raises CoarticError for a ``.toml`` that cannot be read."""
+    for a file ``.toml``, by its keys; ``results folder``, also for a folder that may not be opened;
+    or an empty text for anything else. Raises CoarticError for a ``.toml`` that cannot be read."""
     if name in suites():
         return "suite"
     if {name, f"{name}/v1"} & {*shipped_families()}:
@@ -140,7 +140,8 @@ def kind_of(name: str) -> str:
     if name.endswith(".py"):
         return "method file"
     if not name.endswith(".toml"):
-        return "results folder" if os.path.isfile(Path(name) / RUNS_FILE) else ""
+        closed = os.path.isdir(name) and not os.access(name, os.X_OK)
+        return "results folder" if closed or os.path.isfile(Path(name) / RUNS_FILE) else ""
     content = read_toml(Path(name))
     keys = {"blocks": "suite", "region": "family", "goals": "task"}  # a key that only this kind has
     return next((kind for key, kind in keys.items() if key in content), "")

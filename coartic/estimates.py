@@ -81,13 +81,16 @@ class Estimate:
 
 def vector(values: ArrayLike) -> Array:
     """Return a sample as a float vector ``(n,)``. Raises ValueError if it is no vector or empty, or
-    holds NaN, infinity or masked values.
+    holds NaN, masked values, or numbers of a size whose third power is no float.
 
     Runs without a solution have no reward: the caller decides what becomes of them.
     """
     sample = real_array("a sample", values)
-    if sample.ndim != 1 or sample.size == 0 or not np.isfinite(sample).all():
-        raise ValueError("a sample is a vector of at least one value, all of them finite")
+    size = np.abs(sample)
+    usable = (size <= 1e100) & ((size >= 1e-100) | (size == 0))
+    if sample.ndim != 1 or sample.size == 0 or not usable.all():
+        words = "all of them finite, and 0 or from 1e-100 to 1e100 in size"
+        raise ValueError(f"a sample is a vector of at least one value, {words}")
     return sample
 
 

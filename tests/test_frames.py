@@ -90,6 +90,8 @@ def small_frame(**changes):
         ({"reward": [-300, -np.inf]}, "reward has -inf in row 1: needed are finite numbers"),
         ({"method": ["a", None]}, "method has (nan|None) in row 1: needed is a name"),
         ({"task": [["t"], ["t"]]}, "task has .'t'. in row 0: needed is a name, a number or a tup"),
+        ({"seed": [[1], [2]]}, "seed has .1. in row 0: needed is a name, a number or a tuple"),
+        ({"reward": [-300, -(10**400)]}, "reward has a number beyond 1e308"),
     ],
 )
 def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
@@ -143,6 +145,16 @@ LACKING = pd.DataFrame({"best_known": [-292]})
         ("needed is a pandas.DataFrame, not a list", frames.ranking, [1]),
         ("reward twice", frames.gaps, pd.concat([small_frame(), small_frame()["reward"]], axis=1)),
         ("no column reward", frames.gaps, LACKING),
+        (
+            "status twice",
+            frames.gaps,
+            pd.concat([pd.DataFrame({"status": ["ok"] * 2}), small_frame(status="ok")], axis=1),
+        ),
+        (
+            "no column reward",
+            frames.gaps,
+            pd.concat({"x": small_frame()}, axis=1).swaplevel(axis=1),
+        ),
         ("no column method, task, reward", frames.ranking, LACKING),
         ("no column run", lambda frame: frames.ecdf(frame, [0.1]), LACKING),
         ("no column method, reward", lambda of: frames.means(of, "method", "reward"), LACKING),
@@ -163,6 +175,9 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
         ):  # fmt: skip
             pd.testing.assert_frame_equal(compute(named), compute(frame))
     assert frames.gaps(frame.set_index("run")).index.name == "run"
+    assert frames.means(frame.assign(**{"1": 5}).rename(columns={"reward": 1}), "run", [1])[
+        1
+    ].tolist() == [-305]
 
 
 @pytest.mark.parametrize(
@@ -171,8 +186,9 @@ def test_a_frame_whose_index_has_the_name_of_a_column_counts_as_any_other():
         *((words, frames.means, {}, (by, ["reward"])) for words, by in (
             ("by is empty: needed are names", []),
             ("by is 3: needed are names", 3),
-            ("it names a column twice", ["method", "method"]),
-            ("column reward is in by and in columns", ["reward"]),
+            ("needed are names", [["method"]]),
+            *((f"would have two columns {by[0]}", by)
+              for by in (["method", "method"], ["reward"], ["rows"], ["reward_low"])),
         )),
         ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
         ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),

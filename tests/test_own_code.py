@@ -145,6 +145,13 @@ def test_packages_that_a_file_imports_are_named_without_those_of_this_project(tm
     assert not [line for line in lines if line.startswith("numpy")]
 
 
+def test_a_file_that_was_removed_or_broken_since_imports_nothing(tmp_path):
+    (tmp_path / "broken.py").write_text("import numba\ndef (", encoding="utf-8")
+    none = own_code.imported_packages(str(tmp_path / "no-module.txt"))
+    for name in ("removed.py", "broken.py"):
+        assert own_code.imported_packages(str(tmp_path / name)) == none
+
+
 def test_declared_data_and_compiled_files_count_byte_by_byte(tmp_path):
     (tmp_path / "a.bin").write_bytes(b"x = 1  # one")
     (tmp_path / "a.py").write_bytes(b"x = 1  # one")

@@ -130,3 +130,4 @@ def test_a_place_that_cannot_be_used_gets_a_sentence(said, place):
         assert words.startswith("Error: "), command
         assert len(words.splitlines()) == 1, words
         assert len(words) < 1200, command
+    assert place != "locked" or "Permission denied" in said["list locked"][1]

@@ -247,6 +247,8 @@ def test_ten_thousand_movements_are_not_too_many():
              for count in (39_999, 40_000)]  # fmt: skip
     assert too_long(task, still[:1]) is None
     assert "400010 numbers; at most 400000" in str(too_long(task, still[1:]))
+    far = Movement(1, "right", "planned", np.full(10, 1e308))
+    assert "its path has inf steps" in str(too_long(task, [far]))
 
 
 @pytest.mark.usefixtures("in_this_process")

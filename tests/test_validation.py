@@ -50,7 +50,7 @@ from coartic.analysis.statistics.hypotheses import (
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import built_in, registry
-from coartic.benchmarks.runner import run_suite
+from coartic.benchmarks.runner import perform, run_suite
 from coartic.internal.text import RENAMED, did_you_mean
 from coartic.method import Information, Session
 from coartic.motion.trial import reach_goals
@@ -360,6 +360,7 @@ ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
     *(-3, np.inf, np.full(10, np.nan), pd.NA, {"a": 1}, MASKED, Path("x"), [True, 1.0]),
+    *(10**400, [10**400]),
 )
 TASK, ROBOT = load_task("ascending"), Robot()
 TRIAL = corrective_trial(TASK, "RRR")
@@ -386,7 +387,7 @@ USUAL = {
     "differences": [1.0, 2.0], "total": 5, "share": 0.5, "folder": "nowhere", "tables": {},
     "draw": lambda results: Figure(), "template": "nowhere.jinja", "ticks_per_unit": 1.0,
     "difference": np.ones(10), "jacobian": ROBOT.jacobian(TASK.q0, "right"),
-    "rewards": [-300.0, None],
+    "rewards": [-300.0, None], "locked_base": ["y"],
 }  # fmt: skip
 """Arguments by the names of parameters, for all functions that take no others of these names."""
 
@@ -464,7 +465,7 @@ def is_ours(error):
     file, number = Path(last.filename), last.lineno or 1
     if ".venv" in file.parts or ROOT not in file.parents:
         return False
-    return "raise " in "".join(file.read_text("utf-8").splitlines(True)[number - 2 : number])
+    return "raise " in file.read_text("utf-8").splitlines()[number - 1]
 
 
 @pytest.mark.parametrize(("call", "usual"), CALLS)
@@ -564,6 +565,27 @@ def test_only_findings_are_joined(wrong):
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
         (lambda: Robot(*[(1.0,)] * 9), "Robot: .*; it takes 5 arguments"),
         (lambda: Task(goals=[(3.0, 2.0)], q0=TASK.q0 * np.nan), "Task: q0 is .*; needed are fin"),
+        (
+            lambda: interval({"a": "x", "a_low": 0, "a_high": 1}, "a"),
+            "the row has no numbers a, a_l",
+        ),
+        *(
+            (lambda values=values: mean(values), "from 1e-100 to 1e100 in size")
+            for values in ([1e101, 0.0, 1.0], [1e-101, 0.0, 1.0])
+        ),
+        (lambda: mean_beyond("{}", [[1.0, 2.0], [3.0, 4.0]]), "values have shape .2, 2."),
+        *(
+            (lambda given=given: holm(*given), "needed are p-values, 0 to 1, of . tests at most")
+            for given in (([0.1, 1.01],), ([-0.01],), ([0.1, 0.2], 1))
+        ),
+        *(
+            (lambda plan=plan: perform(plan, "x"), "plan is .*; it must be a list of jobs")
+            for plan in (None, [], "x", [1])
+        ),
+        (
+            lambda: learn(TASK, "EC1", seed=10**5000, trials=1),
+            "seed is a value of type int; it must",
+        ),
         (lambda: judge(), "judge: claims is missing"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
         (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),

@@ -278,15 +278,19 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
 
 
 @checked_arguments
-def holm(p_values: Numbers, family: int | None = None) -> list[float]:
+def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
     Rejecting adjusted p-values at or below α has a family-wise error rate of α at most, whatever
     the dependence. NaN, a missing test, stays NaN and does not count, unless ``family`` says the
-    number of planned tests: then missing tests count as p = 1.
+    number of planned tests: then missing tests count as p = 1. Raises ValueError for numbers that
+    are no p-values, and for more tests than ``family``.
     """
     p = np.reshape(p_values, -1)
-    planned = int((~np.isnan(p)).sum()) if family is None else family
+    made = int((~np.isnan(p)).sum())
+    planned = made if family is None else family
+    if made > planned or not ((p >= 0) & (p <= 1) | np.isnan(p)).all():
+        raise ValueError(f"needed are p-values, 0 to 1, of {planned} tests at most")
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))
     adjusted = np.empty_like(p)

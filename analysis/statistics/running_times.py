@@ -105,5 +105,9 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     least 200. The array is cached: do not change it."""
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MOST_RUNS_DRAWN // sum(sizes), 200))
-    drawn = (rng.multinomial(size, np.full(size, 1 / size), resamples) for size in sizes)
-    return np.hstack([of_task.astype(np.uint8) for of_task in drawn])
+    drawn = np.empty((resamples, sum(sizes)), dtype=np.uint8)
+    for size, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True):
+        for part in slices(resamples, 100):
+            rows = rng.multinomial(size, np.full(size, 1 / size), part.stop - part.start)
+            drawn[part, end - size : end] = rows
+    return drawn

@@ -132,11 +132,7 @@ def play(
         check_ending(out, [".html"])
     chosen = [] if task is None else given.tasks_meant([task])
     page = play_page(*map(load_task, chosen)).encode()
-    if out is None:
-        with tempfile.NamedTemporaryFile(suffix=".html", prefix="coartic-", delete=False) as file:
-            file.write(page)
-        out = Path(file.name)
-    else:
-        write_output(out, page, replace=replace)
+    out = out or Path(tempfile.mkdtemp(prefix="coartic-"), "play.html")
+    write_output(out, page, replace=replace)
     opened = show and webbrowser.open(out.absolute().as_uri())
     say(f"{out}: {len(page) // 1000} kB" + ("." if opened else "; open it in a browser."))

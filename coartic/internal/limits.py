@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numbers
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from coartic.internal.text import plain
@@ -35,7 +36,7 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
-    if not is_number or is_span(value) or not least <= float(value) <= most:
+    if not is_number or is_span(value) or not least <= value <= most:
         raise ValueError(
             f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
             f"from {least:{'' if whole else 'g'}} to {most:{',' if isinstance(most, int) else 'g'}}"
@@ -72,7 +73,8 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
     if array.dtype == object and all(
         isinstance(each, numbers.Real) and not is_span(each) for each in array.flat
     ):
-        array = array.astype(np.float64)  # a nullable column of pandas
+        with suppress(OverflowError):  # an integer beyond 1e308
+            array = array.astype(np.float64)  # a nullable column of pandas
     if array.dtype.kind not in "uif":
         raise ValueError("should be real numbers")
     return array.astype(np.float64, copy=False)
@@ -94,4 +96,7 @@ def _refuse_entries(value: Any) -> None:
 
 def brief_value(value: object) -> str:
     """Return the ``repr`` of a value as one printable line, cut to 80 characters."""
-    return plain(repr(value), 80)
+    try:
+        return plain(repr(value), 80)
+    except Exception:  # an integer of more digits than Python writes, or an object of the user
+        return f"a value of type {type(value).__name__}"

@@ -571,7 +571,7 @@ def correct(
     run, figures = batch.runs[0], slice(robot.dof)
     run["q"][figures] = run["target"][figures] = configuration(robot, q)
     run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal)
-    locked = tuple(locked_base)
+    locked = tuple(map(str, locked_base if isinstance(locked_base, Collection) else [locked_base]))
     _correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))
 

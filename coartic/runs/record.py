@@ -383,7 +383,8 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     if (
         len({np.shape(corner) for corner in corners}) == 1
     ):  # otherwise the solution breaks the rules
-        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / PAPER.step
+        with np.errstate(over="ignore"):
+            steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / PAPER.step
         if steps > MOST_STEPS:
             return SolutionError(
                 f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
