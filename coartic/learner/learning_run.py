@@ -80,15 +80,13 @@ class LearningRun:
     @property
     def completed(self) -> NDArray[np.bool_]:
         """True for the trials that hit every goal, bool, shape ``(trials,)``. Other trials failed,
-        and changed neither ``values`` nor ``targets``.
-        """
+        and changed neither ``values`` nor ``targets``."""
         return ~np.ma.getmaskarray(self.rewards)
 
     @property
     def learned(self) -> tuple[Movement, ...]:
         """Movements of the learned solution: of the best trial, or, if the condition has
-        ``learned="replay"``, of the replay, the noiseless trial after learning; empty if this trial
-        did not hit every goal."""
+        ``learned="replay"``, of the replay; empty if this trial did not hit every goal."""
         if self.condition.learned == "best":
             return self.solution
         return self.replay
@@ -108,8 +106,7 @@ class LearningRun:
     @property
     def reward(self) -> int | None:
         """Total reward of the learned solution: the highest reward of any trial, or, if the
-        condition has ``learned="replay"``, the reward of the replay, the noiseless trial after
-        learning; None without a solution."""
+        condition has ``learned="replay"``, the reward of the replay; None without a solution."""
         if self.condition.learned == "replay":
             return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])
