@@ -416,9 +416,9 @@ def make_trial(
 
 @inlined
 def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
-    """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial,
-    ticks below 0: Σ γ^|h − g| r_h over goals h from g on, or, if earlier goals count, over all; r_h
-    is minus the ticks."""
+    """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial: Σ
+    γ^|h − g| r_h over goals h from g on, or, if earlier goals count, over all; r_h is minus the
+    ticks of goal h."""
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
         returns[number] = earlier

@@ -50,9 +50,9 @@ class LearningRun:
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. In ticks, below
-    0: total rewards, or returns of the goal where the condition credits subtasks; -inf
-    where nothing was learned."""
+    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Minus ticks: total
+    rewards, or returns of the goal where the condition credits subtasks; -inf where nothing was
+    learned."""
     targets: Array
     """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
     -inf."""

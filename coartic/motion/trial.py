@@ -691,7 +691,7 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
     """Return a sentence that a task, called ``task``, has more than 4096 hand sequences, too many
-    to try; None for fewer. ``goals`` and ``hands`` are numbers of goals and of hands."""
+    to try; else None. ``goals`` and ``hands`` are numbers of goals and of hands."""
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
