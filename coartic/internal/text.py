@@ -27,7 +27,7 @@ _MOST_FIGURES = 12  # of an array in a repr
 def plain(text: str, most: int = LONGEST_REASON) -> str:
     """Return text as one printable line (:func:`one_line`), without blanks at its ends; a line of
     more than ``most`` characters is cut to that length and ends in ``…``."""
-    line = one_line(text[: 4 * most].strip())  # an escape takes longer than what it shows
+    line = one_line(text.strip()[: 4 * most])  # an escape takes longer than what it shows
     return line if len(line) <= most else line[: most - 1] + "…"
 
 

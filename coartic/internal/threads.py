@@ -58,6 +58,9 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     parallel: at least ``least`` indices each, unless one slice has all, and at most as many slices
     as ``OMP_NUM_THREADS`` says, or, if it is not set, as the process may use cores. Returns when
     all calls have ended; raises what ``work`` raises."""
+    if count < 2 * least:
+        work(slice(0, count))
+        return
     allowed = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
     most = int(allowed) if allowed.isdigit() else threads_for(-1)
     threads = max(1, min(count // least, most))

@@ -110,7 +110,7 @@ def learn(
     CoarticError
         The condition is unknown.
     TypeError
-        An argument has another type.
+        ``task``, ``condition`` or ``model`` has another type.
     SolutionError
         The first solution breaks the task's rules.
     ValueError

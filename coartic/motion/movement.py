@@ -461,9 +461,9 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 @inner
 def _pull_to_preferred(at: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
-    """Set ``pull`` in each of the first ``count`` columns of ``at``, in place, to β N(q) (p − q):
-    the share β (``pull`` of the run, a record of ``runs``) of the way to its preferred posture p,
-    projected by N onto the null space of the hand's Jacobian."""
+    """Set ``pull`` in each of the first ``count`` columns of ``at`` to β N(q) (p − q), 0 for a
+    locked base: the share β of the way to the preferred posture p (``pull`` and ``preferred`` of
+    the run), projected by N onto the null space of the hand's Jacobian."""
     tip = len(at.length)
     for i in range(count):
         run, v = runs[at.run[i]], at.pull[:, i]

@@ -22,7 +22,7 @@ from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
 from coartic.internal.validation import equal_contents
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import width_of
 from coartic.motion.movement import LARGEST_ENTRY, configuration, correct, follow, move
 from coartic.motion.trial import (
@@ -172,7 +172,7 @@ def execute(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or is neither a Task nor a text nor a path.
+        The task cannot be used, or ``task`` or ``model`` has another type.
     SolutionError
         The solution breaks the task's rules: goals are missing or out of order, the robot does
         not have a hand, a target has the wrong shape or is not finite, a locked base moves by more
@@ -546,7 +546,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or is neither a Task nor a text nor a path.
+        The task cannot be used, or ``task`` or ``model`` has another type.
     ValueError
         The hands do not fit the task, or a constant of the model is out of bounds.
 
@@ -617,7 +617,7 @@ def initial_hands(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or is neither a Task nor a text nor a path.
+        The task cannot be used, or ``task`` or ``model`` has another type.
     NotApplicableError
         No candidate completes the task, or there are more than 4096.
     ValueError
@@ -629,7 +629,7 @@ def initial_hands(
     Source: paper, section *Experiments*.
     """
     task = as_task(task)
-    return search_initial_hands(task, hands, model=model)[0]
+    return search_initial_hands(task, hands, model=check_model(model))[0]
 
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:

@@ -380,10 +380,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Account
         reach_kernel(parameters, *results, *some, *batch)
         idle.append(batch)
 
-    if count >= 2 * SHARE:
-        in_parts(work, count, SHARE)
-    else:
-        work(slice(0, count))
+    in_parts(work, count, SHARE)
     return accounts
 
 
@@ -451,8 +448,8 @@ def reach_goals(
     Raises
     ------
     ValueError
-        A shape is wrong, a number is not finite, a hand is neither 0 nor 1, or the model does not
-        fit the radius. An arm with a target beyond 1e5 makes no movement and does not hit.
+        A shape is wrong, a number is not finite, a hand is neither 0 nor 1, or the model is out of
+        bounds or does not fit the radius. An arm with a target beyond 1e5 does not move or hit.
 
     Notes
     -----
